@@ -1,0 +1,299 @@
+"""The sparse multidimensional (S-D) assignment problem that every solver takes."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assoc.errors import InvalidInputError, LimitExceededError
+
+FORMAT = "assoc.problem"
+VERSION = 1
+
+_MAX_DENSE_ELEMENTS = 200_000_000
+# sums of costs beyond this could overflow on the way through a solver
+_MAX_TOTAL_COST = 1e300
+
+
+class AssignmentProblem:
+    """Choose tuples of minimum total cost such that each measurement is in exactly one.
+
+    Parameters
+    ----------
+    tuples : array_like of int, shape (M, S)
+        One index per sensor, 1..n_s; 0 is the dummy (that sensor missed the target).
+    costs : array_like of float, shape (M,)
+        Cost of each tuple: negative log likelihood ratio, natural log. ``inf`` forbids the tuple.
+    sizes : array_like of int, shape (S,)
+        Number of measurements n_s of each sensor.
+    dummy : bool, default True
+        With dummies a missing singleton (a false alarm) is added at cost 0, so that a solution always
+        exists. Without, the problem is the axial one: every index of the smallest dimension exactly
+        once, those of larger dimensions at most once, and no tuple may contain a 0.
+
+    Attributes
+    ----------
+    tuples, costs, sizes, dummy
+        As given, in canonical types (int32, float64, int32), read-only; forbidden tuples are left out.
+
+    Raises
+    ------
+    InvalidInputError
+        Wrong shape, an index out of range, the all-dummy tuple, or a cost that is NaN or -inf.
+
+    Notes
+    -----
+    With dummies this is eq. 6 of the ant colony paper, written over the listed tuples alone. A tuple
+    listed twice counts with its smaller cost.
+    """
+
+    __slots__ = ("_prepared", "costs", "dummy", "sizes", "tuples")
+
+    tuples: NDArray[np.int32]
+    costs: NDArray[np.float64]
+    sizes: NDArray[np.int32]
+    dummy: bool
+
+    def __init__(self, tuples: ArrayLike, costs: ArrayLike, sizes: ArrayLike, *, dummy: bool = True) -> None:
+        sizes_ = _integers(sizes, "sizes", 1)
+        if sizes_.size == 0:
+            raise InvalidInputError("sizes: expected at least one sensor, got none")
+        if sizes_.min() < 0:
+            raise InvalidInputError(f"sizes: expected numbers >= 0, got {sizes_.min()}")
+        if int(sizes_.sum(dtype=np.int64)) > np.iinfo(np.int32).max:
+            raise InvalidInputError("sizes: more measurements in total than 32-bit indices can name")
+        tuples_ = _integers(tuples, "tuples", 2)
+        costs_ = _numbers(costs, "costs")
+        if tuples_.shape == (0, 0):
+            tuples_ = tuples_.reshape(0, sizes_.size)
+        if tuples_.shape[1] != sizes_.size:
+            raise InvalidInputError(
+                f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}"
+            )
+        if costs_.shape != (tuples_.shape[0],):
+            raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
+        _check_indices(tuples_, sizes_, dummy)
+        costs_, tuples_ = _check_costs(costs_, tuples_)
+        if dummy:
+            tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_)
+        self.tuples = _frozen(tuples_, np.int32)
+        self.costs = _frozen(costs_, np.float64)
+        self.sizes = _frozen(sizes_, np.int32)
+        self.dummy = bool(dummy)
+        self._prepared: Any = None
+
+    @property
+    def num_sensors(self) -> int:
+        """Number of sensors (dimensions) S."""
+        return int(self.sizes.size)
+
+    @property
+    def num_tuples(self) -> int:
+        """Number of allowed tuples M, singletons included."""
+        return int(self.costs.size)
+
+    def __repr__(self) -> str:
+        sizes = " x ".join(str(n) for n in self.sizes)
+        kind = "" if self.dummy else ", no dummies"
+        return f"AssignmentProblem({sizes} measurements, {self.num_tuples} tuples{kind})"
+
+    @classmethod
+    def from_dense(cls, tensor: ArrayLike, dummy: bool = True) -> AssignmentProblem:
+        """Read a dense cost tensor.
+
+        Parameters
+        ----------
+        tensor : array_like of float
+            With ``dummy``: shape (n_1 + 1, ..., n_S + 1), index 0 is the dummy and the all-dummy entry
+            is ignored. Without: shape (n_1, ..., n_S), the classical axial problem, also rectangular.
+            ``inf`` is forbidden; a singleton that is ``inf`` costs 0, as if it were not listed.
+        dummy : bool, default True
+            Whether index 0 is the dummy.
+
+        Raises
+        ------
+        InvalidInputError
+            The tensor has no dimension, an empty dummy dimension, NaN or -inf.
+        """
+        dense = _numbers(tensor, "tensor")
+        if dense.ndim == 0:
+            raise InvalidInputError("tensor: expected one dimension per sensor, got a scalar")
+        if dummy and min(dense.shape) == 0:
+            raise InvalidInputError(f"tensor: each dimension needs its dummy at index 0, got {dense.shape}")
+        keep = ~np.isposinf(dense)
+        if dummy:
+            keep[(0,) * dense.ndim] = False
+        index = np.stack(np.nonzero(keep), axis=1)
+        offset = 0 if dummy else 1
+        sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
+        return cls(index + offset, dense[keep], sizes, dummy=dummy)
+
+    def to_dense(self) -> NDArray[np.float64]:
+        """Return the dense tensor of ``from_dense``; what is not listed is ``inf``, the all-dummy entry 0.
+
+        Raises
+        ------
+        LimitExceededError
+            The tensor would have more than 2e8 elements.
+        """
+        shape = tuple(int(n) + (1 if self.dummy else 0) for n in self.sizes)
+        elements = float(np.prod(np.array(shape, dtype=float)))
+        if elements > _MAX_DENSE_ELEMENTS:
+            raise LimitExceededError(
+                f"a dense tensor of {elements:.3g} elements exceeds {_MAX_DENSE_ELEMENTS:.0e}: use .tuples, .costs"
+            )
+        dense = np.full(shape, np.inf)
+        index = self.tuples if self.dummy else self.tuples - 1
+        np.minimum.at(dense, tuple(index.T), self.costs)
+        if self.dummy:
+            dense[(0,) * len(shape)] = 0.0
+        return dense
+
+    def components(self) -> list[NDArray[np.intp]]:
+        """Split into independent clusters: tuples that share measurements, directly or through others.
+
+        Returns
+        -------
+        list of int arrays
+            Indices into ``tuples`` for each cluster, ascending; clusters in order of their first tuple.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        if self.num_tuples == 0:
+            return []
+        offsets = np.concatenate([[0], np.cumsum(self.sizes)])
+        which, sensor = np.nonzero(self.tuples)
+        rows = offsets[sensor] + self.tuples[which, sensor] - 1
+        num_rows = int(offsets[-1])
+        nodes = num_rows + self.num_tuples
+        graph = coo_array((np.ones(rows.size, np.int8), (rows, num_rows + which)), shape=(nodes, nodes))
+        label = connected_components(graph, directed=False)[1][num_rows:]
+        order = np.argsort(label, kind="stable")
+        parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+        return sorted(parts, key=lambda part: int(part[0]))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write ``problem.npz`` (format "assoc.problem", version 1; docs/formats.md)."""
+        from assoc._files import save_npz
+
+        save_npz(
+            path,
+            FORMAT,
+            VERSION,
+            {"tuples": self.tuples, "costs": self.costs, "sizes": self.sizes, "dummy": np.array(self.dummy)},
+        )
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> AssignmentProblem:
+        """Read ``problem.npz``.
+
+        Raises
+        ------
+        InvalidInputError
+            The file is missing, damaged, of another format or a future version, or its content is wrong.
+        """
+        from assoc._files import load_npz
+
+        data = load_npz(path, FORMAT, VERSION, required=("tuples", "costs", "sizes"), optional=("dummy",))
+        dummy = data.get("dummy", np.array(True))
+        if dummy.shape != () or dummy.dtype.kind not in "bui":
+            raise InvalidInputError(f"{path}: dummy: expected one boolean")
+        try:
+            return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(dummy))
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{path}: {error}") from None
+
+
+def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: {error}") from None
+    if array.size == 0 and array.dtype.kind == "f":
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise InvalidInputError(f"{name}: expected integers, got {array.dtype}")
+    if array.ndim == 1 and ndim == 2 and array.size == 0:
+        array = array.reshape(0, 0)
+    if array.ndim != ndim:
+        raise InvalidInputError(f"{name}: expected {ndim} dimension(s), got shape {array.shape}")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InvalidInputError(f"{name}: a value exceeds 64 bits")
+    return array.astype(np.int64, copy=False) if array.dtype != np.int32 else array
+
+
+def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: {error}") from None
+    if array.dtype.kind not in "fiu" and array.size:
+        raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
+    return array.astype(np.float64, copy=False)
+
+
+def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> None:
+    if tuples.shape[0] == 0:
+        return
+    low, high = tuples.min(axis=0), tuples.max(axis=0)
+    least = 0 if dummy else 1
+    for sensor in np.flatnonzero((low < least) | (high > sizes)):
+        column = tuples[:, sensor]
+        row = int(np.flatnonzero((column < least) | (column > sizes[sensor]))[0])
+        raise InvalidInputError(
+            f"tuples: row {row}, sensor {sensor + 1}: index {column[row]} is outside {least}..{sizes[sensor]}"
+        )
+    if dummy and low.max() == 0:
+        empty = ~tuples.any(axis=1)
+        if empty.any():
+            raise InvalidInputError(f"tuples: row {int(np.argmax(empty))} is the all-dummy tuple")
+
+
+def _check_costs(
+    costs: NDArray[np.float64], tuples: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    total = float(np.abs(costs).sum()) if costs.size else 0.0
+    if total <= _MAX_TOTAL_COST:
+        return costs, tuples
+    bad = np.isnan(costs) | np.isneginf(costs)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InvalidInputError(f"costs: row {row} is {costs[row]}; expected a number, or inf for a forbidden tuple")
+    keep = ~np.isposinf(costs)
+    costs, tuples = costs[keep], tuples[keep]
+    with np.errstate(over="ignore"):
+        total = float(np.abs(costs).sum())
+    if not total <= _MAX_TOTAL_COST:
+        raise InvalidInputError(f"costs: the sum of magnitudes exceeds {_MAX_TOTAL_COST:.0e}; rescale the costs")
+    return costs, tuples
+
+
+def _with_singletons(
+    tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Append the singletons that are not listed, at cost 0."""
+    total = int(sizes.sum())
+    offsets = np.cumsum(sizes) - sizes
+    present = np.zeros(total, dtype=bool)
+    singles = np.flatnonzero(np.count_nonzero(tuples, axis=1) == 1)
+    if singles.size:
+        listed = tuples[singles]
+        sensor = np.argmax(listed != 0, axis=1)
+        present[offsets[sensor] + listed[np.arange(singles.size), sensor] - 1] = True
+    missing = np.flatnonzero(~present)
+    if missing.size == 0:
+        return tuples, costs
+    sensor = np.searchsorted(offsets, missing, side="right") - 1
+    extra = np.zeros((missing.size, sizes.size), dtype=tuples.dtype)
+    extra[np.arange(missing.size), sensor] = missing - offsets[sensor] + 1
+    return np.concatenate([tuples, extra]), np.concatenate([costs, np.zeros(missing.size)])
+
+
+def _frozen(array: NDArray[Any], dtype: type) -> NDArray[Any]:
+    result = np.array(array, dtype=dtype, order="C")
+    result.flags.writeable = False
+    return result

@@ -1,0 +1,104 @@
+"""What a solver answers: the chosen tuples, what they cost, and how far from optimal that can be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OPTIMALITY_TOLERANCE = 1e-6
+
+
+class TracePoint(NamedTuple):
+    """One line of a solver's history: when, after how much work, and what was known then."""
+
+    iteration: int
+    """Iterations done so far (what one iteration is, each solver's documentation says)."""
+    seconds: float
+    """Seconds since the solver started."""
+    cost: float
+    """Cost of the best solution known."""
+    lower_bound: float
+    """Best valid lower bound known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A feasible choice of tuples with its certificate.
+
+    Attributes
+    ----------
+    tuples : int32 array, shape (K, S)
+        The chosen tuples in lexicographic order; false alarms (singletons) are among them.
+    indices : int array, shape (K,)
+        The same as rows of ``problem.tuples``.
+    cost : float
+        Total cost.
+    lower_bound : float
+        No solution of the problem can cost less.
+    status : str
+        "optimal" when the gap is closed to 1e-6 * max(1, abs(cost)), else "feasible".
+    solver : str
+        Name of the solver.
+    iterations : int
+        Iterations used.
+    runtime : float
+        Seconds from the problem to this solution.
+    stopped_by : str
+        Why the solver stopped: "gap", "iterations", "converged", "time_limit" or "callback".
+    duals : tuple of float arrays
+        One multiplier per measurement of each sensor, from which the bound can be checked: with them
+        every tuple's reduced cost is >= 0 up to rounding. Empty where the proof was by enumeration.
+    trace : tuple of TracePoint
+        History of cost and bound.
+    parameters : mapping
+        The solver's parameters.
+    """
+
+    tuples: NDArray[np.int32]
+    indices: NDArray[np.intp]
+    cost: float
+    lower_bound: float
+    solver: str
+    iterations: int
+    runtime: float
+    stopped_by: str = "converged"
+    duals: tuple[NDArray[np.float64], ...] = ()
+    trace: tuple[TracePoint, ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def gap(self) -> float:
+        """How much more than the optimum this can cost at most: ``cost - lower_bound`` >= 0."""
+        return self.cost - self.lower_bound
+
+    @property
+    def status(self) -> str:
+        """Whether the gap is closed ("optimal") or not ("feasible")."""
+        return "optimal" if self.gap <= OPTIMALITY_TOLERANCE * max(1.0, abs(self.cost)) else "feasible"
+
+    @property
+    def num_targets(self) -> int:
+        """Number of chosen tuples with at least two measurements."""
+        return int((np.count_nonzero(self.tuples, axis=1) >= 2).sum())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per chosen tuple: columns ``sensor_1`` .. ``sensor_S`` (0: missed) and ``measurements``."""
+        import pandas as pd
+
+        columns = [f"sensor_{s + 1}" for s in range(self.tuples.shape[1])]
+        frame = pd.DataFrame(self.tuples, columns=columns)
+        frame["measurements"] = np.count_nonzero(self.tuples, axis=1)
+        return frame
+
+    def __repr__(self) -> str:
+        return (
+            f"Solution({self.solver}: cost {self.cost:.6g}, lower bound {self.lower_bound:.6g}, {self.status}, "
+            f"{len(self.tuples)} tuples, {self.num_targets} targets, {1e3 * self.runtime:.3g} ms)"
+        )
