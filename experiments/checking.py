@@ -1,0 +1,62 @@
+"""An independent reading of "this is a solution": plain Python, nothing shared with the solvers."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assoc.problem import AssignmentProblem
+
+Tuple = tuple[int, ...]
+
+
+class InfeasibleAnswerError(AssertionError):
+    """A solver's answer breaks a constraint of the problem; the message says which."""
+
+
+def price_list(problem: AssignmentProblem) -> dict[Tuple, float]:
+    """Cost of every allowed tuple; one listed twice counts with its smaller cost."""
+    prices: dict[Tuple, float] = {}
+    for row, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
+        key = tuple(row)
+        prices[key] = min(cost, prices.get(key, np.inf))
+    return prices
+
+
+def check_answer(problem: AssignmentProblem, tuples: ArrayLike) -> float:
+    """Check that tuples solve the problem and return what they cost.
+
+    Parameters
+    ----------
+    problem : AssignmentProblem
+        The problem that was to be solved.
+    tuples : array_like of int, shape (K, S)
+        The chosen tuples, in any order.
+
+    Returns
+    -------
+    float
+        Their total cost, read from the problem and not from the solver.
+
+    Raises
+    ------
+    InfeasibleAnswerError
+        A tuple that the problem does not list, or a measurement used too often or not at all.
+    """
+    prices = price_list(problem)
+    chosen = [tuple(int(i) for i in row) for row in np.asarray(tuples).reshape(-1, problem.num_sensors)]
+    for key in chosen:
+        if key not in prices:
+            raise InfeasibleAnswerError(f"tuple {key} is not in the problem")
+    smallest = min(problem.sizes.tolist())
+    for sensor, size in enumerate(problem.sizes.tolist()):
+        used = Counter(key[sensor] for key in chosen if key[sensor] != 0)
+        must_cover = problem.dummy or size == smallest
+        for index in range(1, size + 1):
+            if used[index] > 1 or (must_cover and used[index] == 0):
+                raise InfeasibleAnswerError(
+                    f"sensor {sensor + 1}: measurement {index} is in {used[index]} chosen tuples"
+                )
+    return float(sum(prices[key] for key in chosen))
