@@ -1,0 +1,1 @@
+"""Families of assignment problems, each a plain function of a seed."""

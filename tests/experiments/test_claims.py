@@ -1,0 +1,76 @@
+"""Claims decide, round-trip and print."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from experiments import claims
+from experiments.claims import Claim
+
+SAMPLE = [
+    Claim("mean cycles", "", 4.03, 4.9, (4.8, 5.0), (3.5, 5.5)),
+    Claim("time of a scan", "ms", None, 2.5, band=(None, 2.0)),
+    Claim("no accepted band", "km", 1.0, 2.0),
+]
+
+
+def test_holds_follows_the_band_unless_given() -> None:
+    assert [c.holds for c in SAMPLE] == [True, False, None]
+    assert Claim("x", ours=1.0, band=(1.0, 1.0)).holds is True
+    assert Claim("x", ours=0.9, band=(1.0, None)).holds is False
+    assert Claim("x", ours=0.9, band=(1.0, None), holds=True).holds is True
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {},
+        {"ours": 1.0, "paper": float("nan")},
+        {"ours": 1.0, "band": (2, 1)},
+        {"ours": 1, "interval": (2, 1)},
+    ],
+)
+def test_nonsense_is_refused(bad: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="claim 'x'"):
+        Claim("x", **bad)  # type: ignore[arg-type]
+
+
+def test_json_round_trip_and_form(tmp_path: Path) -> None:
+    path = tmp_path / "claims.json"
+    claims.save_json(path, SAMPLE, "sample", 7)
+    assert claims.load_json(path) == SAMPLE
+    data = json.loads(path.read_text())
+    assert {k: data[k] for k in ("format", "version", "experiment", "seed")} == {
+        "format": "assoc.claims",
+        "version": 1,
+        "experiment": "sample",
+        "seed": 7,
+    }
+    assert list(data["claims"][0]) == ["quantity", "unit", "paper", "ours", "interval", "band", "holds"]
+    path.write_text(json.dumps({**data, "version": 2}))
+    with pytest.raises(ValueError, match="version 2"):
+        claims.load_json(path)
+    path.write_text("[]")
+    with pytest.raises(ValueError, match=r"not an assoc\.claims file"):
+        claims.load_json(path)
+
+
+def test_csv(tmp_path: Path) -> None:
+    path = tmp_path / "claims.csv"
+    claims.save_csv(path, SAMPLE)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert rows[0]["interval_low"] == "4.8"
+    assert (rows[1]["band_low"], rows[1]["band_high"], rows[1]["holds"]) == ("", "2.0", "False")
+    assert rows[2]["holds"] == ""
+
+
+def test_table_shows_every_claim(capsys: pytest.CaptureFixture[str]) -> None:
+    claims.print_table(SAMPLE, "Sample")
+    text = capsys.readouterr().out
+    assert all(c.quantity in text for c in SAMPLE)
+    assert "<= 2" in text
+    assert "3.5 .. 5.5" in text
