@@ -1,0 +1,231 @@
+"""Files that are written whole or not at all, and npz files that are read without trusting them."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SIZE_LIMIT = 4 * 1024**3
+"""The most bytes that the arrays of one npz file may hold together."""
+
+_HEADER_LIMIT = 10_000
+# deflate cannot expand by more than about 1032; a member that claims more is a lie or a trap
+_LARGEST_EXPANSION = 1_100
+
+_KINDS = {"float": "fiu", "int": "iu", "str": "U", "bool": "b"}
+_TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_, "bool": np.bool_}
+
+
+class Field(NamedTuple):
+    """What an array of an npz file must be.
+
+    Parameters
+    ----------
+    kind : {"float", "int", "str", "bool"}
+        "float" also takes integers; the array is returned as float64, int64, str or bool.
+    ndim : int
+        Number of dimensions.
+    required : bool
+        Whether a file without it is refused.
+    """
+
+    kind: str
+    ndim: int
+    required: bool = True
+
+
+def write_atomically(path: str | os.PathLike[str], writer: Callable[[IO[bytes]], object]) -> None:
+    """Write a file so that readers see the old one or the whole new one, never a part.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the file goes.
+    writer : callable
+        Called with a binary file object; it writes the content. If it raises, nothing is left behind.
+
+    Raises
+    ------
+    InvalidInputError
+        The path is a folder, its folder does not exist, or it cannot be written.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise InvalidInputError(f"{target}: is a folder, expected a file name to write")
+    if not target.parent.is_dir():
+        raise InvalidInputError(f"{target}: the folder {target.parent} does not exist")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
+    except OSError as error:
+        raise InvalidInputError(f"{target}: cannot be written ({error.strerror})") from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            writer(file)
+        # mkstemp makes private files; give the file the mode that a plain open() would have given
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException as error:
+        Path(name).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise InvalidInputError(f"{target}: cannot be written ({error.strerror or error})") from error
+        raise
+
+
+def save_npz(
+    path: str | os.PathLike[str], format_name: str, version: int, arrays: Mapping[str, Array | str | int]
+) -> None:
+    """Write arrays as a compressed npz with its format name and version; see `load_npz`."""
+    content = {name: np.asarray(value) for name, value in arrays.items()}
+    for name, value in content.items():
+        if value.dtype.hasobject:
+            raise InvalidInputError(
+                f"{path}: the field {name!r} holds Python objects, expected a plain array"
+            )
+    header = {"format": np.asarray(format_name), "version": np.asarray(version)}
+    write_atomically(path, lambda file: np.savez_compressed(file, **header, **content))  # type: ignore[arg-type]
+
+
+def load_npz(
+    path: str | os.PathLike[str], format_name: str, version: int, fields: Mapping[str, Field]
+) -> dict[str, Array]:
+    """Read an npz file written by `save_npz`, or refuse it with one line.
+
+    Nothing in the file is executed (no pickles), and no memory is taken for an array before its header
+    has been checked against the bytes that the file really holds.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    format_name, version : str, int
+        What its fields "format" and "version" must say; older versions are read, later ones are refused.
+    fields : mapping of str to Field
+        The arrays to read. Arrays that are not named are left alone.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The arrays, contiguous; optional fields that the file does not have are missing.
+
+    Raises
+    ------
+    InvalidInputError
+        Anything else than a readable file of this format; the message begins with the path.
+    """
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise InvalidInputError(f"{file}: is a folder, expected a file of format {format_name!r}")
+        if not file.exists():
+            raise InvalidInputError(f"{file}: no such file")
+        if file.stat().st_size == 0:
+            raise InvalidInputError(f"{file}: is empty, expected a file of format {format_name!r}")
+        with zipfile.ZipFile(file) as archive:
+            return _read(file, archive, format_name, version, fields)
+    except InvalidInputError:
+        raise
+    except zipfile.BadZipFile as error:
+        raise InvalidInputError(
+            f"{file}: is not a readable npz file ({_one_line(error)}), "
+            f"expected a file of format {format_name!r}"
+        ) from error
+    except (OSError, EOFError, zlib.error, RuntimeError, ValueError, NotImplementedError) as error:
+        raise InvalidInputError(f"{file}: cannot be read ({_one_line(error)})") from error
+
+
+def _one_line(error: BaseException) -> str:
+    text = str(getattr(error, "strerror", None) or error).strip()
+    return text.splitlines()[0][:160] if text else type(error).__name__
+
+
+def _read(
+    file: Path, archive: zipfile.ZipFile, format_name: str, version: int, fields: Mapping[str, Field]
+) -> dict[str, Array]:
+    members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+    if "format" not in members:
+        raise InvalidInputError(f"{file}: has no field 'format', expected a file of format {format_name!r}")
+    wanted = {name: spec for name, spec in fields.items() if spec.required or name in members}
+    found = str(_member(file, archive, members["format"], Field("str", 0))[()])
+    if found != format_name:
+        raise InvalidInputError(f"{file}: has the format {found[:60]!r}, expected {format_name!r}")
+    if "version" not in members:
+        raise InvalidInputError(f"{file}: the field 'version' is missing")
+    stored = int(_member(file, archive, members["version"], Field("int", 0))[()])
+    if stored > version:
+        raise InvalidInputError(
+            f"{file}: has version {stored} of {format_name!r}, this program reads up to version {version}"
+        )
+    if stored < 1:
+        raise InvalidInputError(f"{file}: the field 'version' is {stored}, expected 1 or more")
+    for name in wanted:
+        if name not in members:
+            raise InvalidInputError(f"{file}: the field {name!r} is missing")
+    total = sum(members[name].file_size for name in wanted)
+    if total > SIZE_LIMIT:
+        raise InvalidInputError(f"{file}: its arrays take {total} bytes, the limit is {SIZE_LIMIT}")
+    return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
+
+
+def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field) -> Array:
+    """One array, its header checked before memory is taken for it."""
+    name = info.filename.removesuffix(".npy")
+    if info.file_size > SIZE_LIMIT or info.file_size > _LARGEST_EXPANSION * info.compress_size + 1000:
+        raise InvalidInputError(
+            f"{file}: the field {name!r} claims {info.file_size} bytes, more than it can hold"
+        )
+    with archive.open(info) as stream:
+        try:
+            major, minor = np.lib.format.read_magic(stream)
+            if (major, minor) == (1, 0):
+                shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream, _HEADER_LIMIT)
+            elif (major, minor) == (2, 0):
+                shape, fortran, dtype = np.lib.format.read_array_header_2_0(stream, _HEADER_LIMIT)
+            else:
+                raise ValueError(f"npy version {major}.{minor}")
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError) as error:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} is not a plain array ({_one_line(error)})"
+            ) from error
+        if dtype.hasobject:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} holds pickled objects, expected {spec.kind} values"
+            )
+        if dtype.kind not in _KINDS[spec.kind]:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values"
+            )
+        if len(shape) != spec.ndim:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}"
+            )
+        if any(side < 0 for side in shape):
+            raise InvalidInputError(f"{file}: the field {name!r} has a negative shape {shape}")
+        size = math.prod(shape) * dtype.itemsize
+        if size > info.file_size:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} claims {size} bytes of data, the file holds {info.file_size}"
+            )
+        data = stream.read(size)
+        if len(data) != size:
+            raise InvalidInputError(f"{file}: the field {name!r} ends after {len(data)} of {size} bytes")
+    if size == 0:
+        array: Array = np.zeros(shape, dtype)
+    else:
+        array = np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+    if spec.kind == "int" and dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
+        raise InvalidInputError(f"{file}: the field {name!r} has integers beyond 64 bits")
+    return np.array(array, dtype=_TARGETS[spec.kind], order="C")

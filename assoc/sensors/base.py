@@ -1,0 +1,231 @@
+"""What all sensors have: a place, noise, detection probability, false alarms and a field of view."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+LARGEST = 1e12
+"""Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
+
+
+def wrap_angle(angle: Array) -> Array:
+    """Angles brought into (-pi, pi]."""
+    wrapped: Array = math.pi - np.mod(math.pi - angle, 2 * math.pi)
+    return wrapped
+
+
+def finite_array(value: object, what: str, shape: tuple[int, ...] | None = None) -> Array:
+    """Return a read-only float64 copy; what is not finite numbers is refused by a line naming `what`."""
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{what} must be numbers, got {type(value).__name__}") from error
+    if shape is not None and array.shape != shape:
+        raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
+    if not np.isfinite(array).all():
+        raise InvalidInputError(f"{what} must be finite, got {array[~np.isfinite(array)][0]}")
+    if array.size and np.abs(array).max() > LARGEST:
+        raise InvalidInputError(f"{what} must be within +-{LARGEST:g}, got {np.abs(array).max():g}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Sensor(ABC):
+    """A sensor that measures the positions of targets, misses some and reports false alarms.
+
+    Parameters
+    ----------
+    position : array_like (3,)
+        Its place, metres.
+    noise : array_like (d,) or (d, d)
+        Standard deviations, or the covariance matrix, of one measurement.
+    detection_probability : float
+        P_d, strictly between 0 and 1.
+    false_alarm_rate : float
+        Mean number of false alarms per scan (Poisson), above 0.
+    field_of_view : array_like (d, 2)
+        Lower and upper bound of each component of a measurement.
+    name : str
+        For people.
+
+    Raises
+    ------
+    InvalidInputError
+        Any of these is not as described.
+    """
+
+    position: Array
+    noise: Array
+    detection_probability: float = 0.9
+    false_alarm_rate: float = 1.0
+    field_of_view: Array = None  # type: ignore[assignment]  # only sensors with a natural default leave it out
+    name: str = ""
+
+    kind: ClassVar[str]
+    components: ClassVar[tuple[str, ...]]
+    angular: ClassVar[tuple[bool, ...]]
+
+    def __post_init__(self) -> None:
+        label = self._label
+        if not isinstance(self.name, str):
+            raise InvalidInputError(
+                f"{type(self).__name__}: name must be text, got {type(self.name).__name__}"
+            )
+        put = object.__setattr__
+        put(self, "position", finite_array(self.position, f"{label}: position", (3,)))
+        put(self, "noise", self._checked_noise())
+        for field in ("detection_probability", "false_alarm_rate"):
+            value = getattr(self, field)
+            if isinstance(value, (bool, str)) or np.ndim(value) != 0:
+                raise InvalidInputError(f"{label}: {field} must be one number, got {value!r}")
+            put(self, field, float(value))
+        if not 0.0 < self.detection_probability < 1.0:
+            raise InvalidInputError(
+                f"{label}: detection_probability must be strictly between 0 and 1, "
+                f"got {self.detection_probability}"
+            )
+        if not 0.0 < self.false_alarm_rate < math.inf:
+            raise InvalidInputError(
+                f"{label}: false_alarm_rate must be above 0 per scan, got {self.false_alarm_rate}"
+            )
+        view: object = self.field_of_view
+        if view is None:
+            put(self, "field_of_view", self._default_field_of_view())
+        put(self, "field_of_view", finite_array(self.field_of_view, f"{label}: field_of_view", (self.dim, 2)))
+        for component, angular, (low, high) in zip(
+            self.components, self.angular, self.field_of_view, strict=False
+        ):
+            if not low < high:
+                raise InvalidInputError(
+                    f"{label}: field_of_view of {component} must have lower < upper, got {low:g}, {high:g}"
+                )
+            if angular and high - low > 2 * math.pi * (1 + 1e-9):
+                raise InvalidInputError(
+                    f"{label}: field_of_view of {component} spans {high - low:g} rad, more than a full circle"
+                )
+
+    def _checked_noise(self) -> Array:
+        label = self._label
+        noise = finite_array(np.atleast_1d(np.asarray(self.noise)), f"{label}: noise")
+        dims = self._allowed_dims()
+        if noise.ndim > 2 or noise.shape[0] not in dims or noise.shape[-1] != noise.shape[0]:
+            wanted = " or ".join(f"({d},) or ({d}, {d})" for d in dims)
+            raise InvalidInputError(f"{label}: noise must have shape {wanted}, got {noise.shape}")
+        if noise.ndim == 1:
+            if not (noise > 0).all():
+                raise InvalidInputError(
+                    f"{label}: noise must be positive standard deviations, got {noise.min():g}"
+                )
+            variances = noise**2
+        else:
+            if not np.allclose(noise, noise.T, rtol=1e-9, atol=0.0):
+                raise InvalidInputError(f"{label}: noise must be a symmetric covariance matrix")
+            variances = np.linalg.eigvalsh(noise)
+            if not variances.min() > 0:
+                raise InvalidInputError(f"{label}: noise must be a positive definite covariance matrix")
+        if np.sqrt(variances.min()) < 1e-12:
+            raise InvalidInputError(f"{label}: noise below 1e-12 is too small to compute with")
+        return noise
+
+    @classmethod
+    def _allowed_dims(cls) -> tuple[int, ...]:
+        return (len(cls.components),)
+
+    def _default_field_of_view(self) -> Array:
+        raise InvalidInputError(f"{self._label}: field_of_view is missing, expected ({self.dim}, 2) bounds")
+
+    @property
+    def _label(self) -> str:
+        name = f" {self.name!r}" if isinstance(self.name, str) and self.name else ""
+        return f"{type(self).__name__}{name}"
+
+    @property
+    def dim(self) -> int:
+        """Number of components of a measurement, d."""
+        return int(self.noise.shape[0])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Measurement covariance R, shape (d, d)."""
+        full = np.diag(self.noise**2) if self.noise.ndim == 1 else np.array(self.noise)
+        full.setflags(write=False)
+        return full
+
+    @property
+    def volume(self) -> float:
+        """Volume V of the field of view in measurement space (m, rad and their products)."""
+        return float(np.prod(self.field_of_view[:, 1] - self.field_of_view[:, 0]))
+
+    @abstractmethod
+    def measure(self, positions: Array) -> Array:
+        """Noise-free measurements of targets.
+
+        Parameters
+        ----------
+        positions : ndarray (n, 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray (n, d)
+        """
+
+    @abstractmethod
+    def jacobian(self, positions: Array) -> Array:
+        """Derivatives of `measure` by the position, shape (n, d, 3).
+
+        At the sensor's own place, where angles have no derivative, the distance is taken as 1e-9 m.
+        """
+
+    def residual(self, measured: Array, predicted: Array) -> Array:
+        """Return measured - predicted, shape (n, d), angles wrapped into (-pi, pi]."""
+        difference = np.asarray(measured, dtype=np.float64) - np.asarray(predicted, dtype=np.float64)
+        for axis in range(self.dim):
+            if self.angular[axis]:
+                difference[..., axis] = wrap_angle(difference[..., axis])
+        return difference
+
+    def in_view(self, measurements: Array) -> Array:
+        """Whether measurements (n, d) lie in the field of view; azimuth intervals may pass through pi."""
+        z = np.asarray(measurements, dtype=np.float64)
+        low, high = self.field_of_view[:, 0], self.field_of_view[:, 1]
+        inside = np.ones(z.shape[:-1], dtype=np.bool_)
+        for axis in range(self.dim):
+            if self.angular[axis]:
+                inside &= np.mod(z[..., axis] - low[axis], 2 * math.pi) <= high[axis] - low[axis]
+            else:
+                inside &= (z[..., axis] >= low[axis]) & (z[..., axis] <= high[axis])
+        return inside
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return (
+            self.name == other.name
+            and self.detection_probability == other.detection_probability
+            and self.false_alarm_rate == other.false_alarm_rate
+            and np.array_equal(self.position, other.position)
+            and np.array_equal(self.covariance, other.covariance)
+            and np.array_equal(self.field_of_view, other.field_of_view)
+        )
+
+    def __hash__(self) -> int:
+        return hash((type(self), self.name, self.detection_probability, self.position.tobytes()))
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{x:g}" for x in self.position)
+        return (
+            f"{self._label}(({place}) m, P_d {self.detection_probability:g}, "
+            f"{self.false_alarm_rate:g} false alarms per scan)"
+        )
