@@ -1,0 +1,267 @@
+"""The dual bound: multipliers of the measurements from which every solver's certificate comes.
+
+For multipliers u (u <= 0 on rows with slack) the reduced cost of a column is its weight less the u of its
+rows. When no reduced cost is negative, sum(u) bounds every solution from below: this is linear programming
+duality, and the maximum over u is the LP bound. Here u is found by coordinate ascent, row by row. With the
+hard minimum ascent stalls early; with the entropy-smoothed minimum at temperature T it does not,
+
+    u_r <- u_r - T ln( sum_{j in r} exp(-rc_j / T) + exp(u_r / T) )          (second term: rows with slack)
+
+and x_j = exp(-rc_j / T) approaches the LP's primal solution. A step multiplies the x of one row by one
+factor, so that a pass costs no exponentials but one per row. T is cooled geometrically, steps are
+over-relaxed, and one pass with the hard minimum makes the result feasible.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._compiled import njit
+from assoc.solvers.packing import Packing
+from assoc.solvers.run import Run
+
+Floats = NDArray[np.float64]
+
+# temperatures are this share of each component's spread of weights: likelihood costs spread over about 16
+START = 0.06
+COOLING = 0.5
+LEVELS = 11
+PASSES = 200
+RELAXATION = 1.5
+
+
+def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
+    """Return feasible multipliers of nearly the LP bound.
+
+    Parameters
+    ----------
+    packing : Packing
+        The problem.
+    levels : int
+        Temperatures, each half the one before.
+    passes : int
+        Passes over the rows at one temperature at the most.
+    run : Run, optional
+        Its time limit is kept: the multipliers are feasible whenever they are returned.
+
+    Returns
+    -------
+    float array, shape (R,)
+        Multipliers u; ``certified_bound(packing, u)`` is the bound.
+    """
+    duals = np.zeros(packing.num_rows)
+    temperature = START * spread(packing)
+    reduced, primal, slack_primal = work_arrays(packing)
+    hard_pass(packing, duals, reduced, 1)
+    for _ in range(levels):
+        if run is not None and run.should_stop():
+            break
+        smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, passes)
+        temperature *= COOLING
+    hard_pass(packing, duals, reduced, 2)
+    return duals
+
+
+def work_arrays(packing: Packing) -> tuple[Floats, Floats, Floats]:
+    """Return room for reduced costs, smoothed primal values of the columns, and those of the rows' slack."""
+    return np.empty(packing.num_columns), np.empty(packing.num_columns), np.empty(packing.num_rows)
+
+
+def spread(packing: Packing) -> Floats:
+    """Return for each component the spread of its weights (with 0, where rows have slack); never 0."""
+    return _spread(packing.weights, packing.slack, packing.col_start, packing.row_start)  # type: ignore[no-any-return]
+
+
+def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
+    """Fill ``reduced`` from ``duals``, then raise ``duals`` by passes with the hard minimum (eq. above, T -> 0)."""
+    _reduced_costs(packing.cols, packing.weights, duals, reduced)
+    _hard_sweeps(packing.slack, packing.row_ptr, packing.row_cols, duals, reduced, sweeps)
+
+
+def smooth_pass(
+    packing: Packing,
+    duals: Floats,
+    reduced: Floats,
+    primal: Floats,
+    slack_primal: Floats,
+    temperature: Floats,
+    passes: int,
+) -> int:
+    """Move ``duals`` by smoothed passes at one temperature per component; return the column visits made."""
+    return int(
+        _smooth_passes(
+            packing.cols,
+            packing.weights,
+            packing.slack,
+            packing.row_start,
+            packing.col_start,
+            packing.row_ptr,
+            packing.row_cols,
+            duals,
+            reduced,
+            primal,
+            slack_primal,
+            temperature,
+            passes,
+            RELAXATION,
+        )
+    )
+
+
+def reduced_costs(packing: Packing, duals: Floats) -> Floats:
+    """Return the weight of each column less the multipliers of its rows, shape (N,)."""
+    reduced = np.empty(packing.num_columns)
+    _reduced_costs(packing.cols, packing.weights, duals, reduced)
+    return reduced
+
+
+def component_bounds(packing: Packing, duals: Floats) -> Floats:
+    """Return a valid lower bound for each component, shape (C,), from any multipliers.
+
+    Positive multipliers of rows with slack are taken as 0. A negative reduced cost (rounding) is charged
+    for as many columns as a solution can have, so that the bound holds whatever ``duals`` are.
+    ``inf`` means that a row without slack has no column: there is no solution.
+    """
+    return _component_bounds(  # type: ignore[no-any-return]
+        packing.cols,
+        packing.weights,
+        packing.slack,
+        packing.col_start,
+        packing.row_start,
+        packing.row_ptr,
+        duals,
+    )
+
+
+def certified_bound(packing: Packing, duals: Floats) -> float:
+    """Return a valid lower bound on the packing's weight; see ``component_bounds``."""
+    return math.fsum(component_bounds(packing, duals)) if packing.num_components else 0.0
+
+
+@njit
+def _spread(weights: Floats, slack: Any, col_start: Any, row_start: Any) -> Floats:
+    result = np.ones(col_start.size - 1)
+    for c in range(result.size):
+        low, high = np.inf, -np.inf
+        for j in range(col_start[c], col_start[c + 1]):
+            low = min(low, weights[j])
+            high = max(high, weights[j])
+        for r in range(row_start[c], row_start[c + 1]):
+            if slack[r]:
+                low = min(low, 0.0)
+                high = max(high, 0.0)
+                break
+        if high > low:
+            result[c] = high - low
+    return result
+
+
+@njit
+def _reduced_costs(cols: Any, weights: Floats, duals: Floats, reduced: Floats) -> None:
+    num, num_sensors = cols.shape
+    for j in range(num):
+        value = weights[j]
+        for s in range(num_sensors):
+            r = cols[j, s]
+            if r >= 0:
+                value -= duals[r]
+        reduced[j] = value
+
+
+@njit
+def _hard_sweeps(slack: Any, row_ptr: Any, row_cols: Any, duals: Floats, reduced: Floats, sweeps: int) -> None:
+    for _ in range(sweeps):
+        for r in range(slack.size):
+            least = -duals[r] if slack[r] else np.inf
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                least = min(least, reduced[row_cols[k]])
+            if least != 0.0 and least < np.inf:
+                duals[r] += least
+                for k in range(row_ptr[r], row_ptr[r + 1]):
+                    reduced[row_cols[k]] -= least
+
+
+@njit
+def _smooth_passes(
+    cols: Any,
+    weights: Floats,
+    slack: Any,
+    row_start: Any,
+    col_start: Any,
+    row_ptr: Any,
+    row_cols: Any,
+    duals: Floats,
+    reduced: Floats,
+    primal: Floats,
+    slack_primal: Floats,
+    temperature: Floats,
+    passes: int,
+    relaxation: float,
+) -> int:
+    _reduced_costs(cols, weights, duals, reduced)
+    visits = 0
+    for c in range(row_start.size - 1):
+        t = temperature[c]
+        top, end = row_start[c], row_start[c + 1]
+        for j in range(col_start[c], col_start[c + 1]):
+            primal[j] = math.exp(min(-reduced[j] / t, 500.0))
+        for r in range(top, end):
+            slack_primal[r] = math.exp(min(duals[r] / t, 500.0)) if slack[r] else 0.0
+        for sweep in range(passes):
+            # the first passes at a new temperature are plain: over-relaxing far from the fixed point can diverge
+            omega = relaxation if sweep >= 5 else 1.0
+            worst = 0.0
+            for r in range(top, end):
+                total = slack_primal[r]
+                for k in range(row_ptr[r], row_ptr[r + 1]):
+                    total += primal[row_cols[k]]
+                if not 1e-200 < total < 1e200:
+                    continue
+                worst = max(worst, abs(total - 1.0))
+                if omega == 1.0:
+                    step = math.log(total)
+                    factor = 1.0 / total
+                else:
+                    step = omega * math.log(total)
+                    factor = math.exp(-step)
+                duals[r] -= t * step
+                slack_primal[r] *= factor
+                for k in range(row_ptr[r], row_ptr[r + 1]):
+                    primal[row_cols[k]] *= factor
+            visits += row_ptr[end] - row_ptr[top]
+            if worst < 0.01:
+                break
+    return visits
+
+
+@njit
+def _component_bounds(
+    cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, duals: Floats
+) -> Floats:
+    num_sensors = cols.shape[1]
+    bounds = np.zeros(col_start.size - 1)
+    for c in range(bounds.size):
+        total = 0.0
+        size = 0.0
+        for r in range(row_start[c], row_start[c + 1]):
+            u = min(duals[r], 0.0) if slack[r] else duals[r]
+            total += u
+            size += abs(u)
+            if not slack[r] and row_ptr[r] == row_ptr[r + 1]:
+                total = np.inf
+                break
+        least = 0.0
+        for j in range(col_start[c], col_start[c + 1]):
+            value = weights[j]
+            for s in range(num_sensors):
+                r = cols[j, s]
+                if r >= 0:
+                    value -= min(duals[r], 0.0) if slack[r] else duals[r]
+            least = min(least, value)
+        # what summing can have lost, and the columns that a solution can have
+        bounds[c] = total + least * (row_start[c + 1] - row_start[c]) - 1e-15 * size
+    return bounds

@@ -1,0 +1,43 @@
+"""Greedy: take the tuple of least cost that is still free, again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from assoc.solvers.run import Outcome, Parameters, Run
+
+if TYPE_CHECKING:
+    from assoc.solvers.packing import Packing
+
+
+@dataclass(frozen=True)
+class GreedyParameters(Parameters):
+    """Greedy has no parameters."""
+
+
+def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
+    """Choose columns in order of weight; one iteration is one column looked at.
+
+    Without dummies the greedy choice can run into a dead end; it is then completed by ejections
+    (``local_search.complete``).
+
+    Raises
+    ------
+    InfeasibleError
+        No complete choice was found.
+    """
+    import numpy as np
+
+    from assoc.solvers.front import infeasible
+    from assoc.solvers.local_search import Cover
+
+    cover = Cover.empty(packing)
+    cover.add_greedily(np.argsort(packing.weights, kind="stable"))
+    if not cover.complete(run):
+        raise infeasible(packing)
+    run.record(packing.num_columns, cover.weight, -np.inf)
+    return Outcome(cover.columns(), packing.num_columns)
+
+
+parameters = GreedyParameters

@@ -1,0 +1,100 @@
+"""What a solver is given besides the problem, and what it gives back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InvalidInputError
+from assoc.solution import TracePoint
+
+if TYPE_CHECKING:
+    from assoc.solvers.packing import Packing
+
+Callback = Callable[[TracePoint], object]
+
+
+@dataclass(slots=True)
+class Run:
+    """One call of a solver: its random generator, its clock, and its trace.
+
+    Attributes
+    ----------
+    rng : numpy.random.Generator
+        The only source of randomness.
+    offset : float
+        Added to packing weights gives costs of the problem (the cost of all singletons).
+    time_limit : float or None
+        Seconds from ``started``.
+    callback : callable or None
+        Called with each TracePoint; a true answer stops the solver.
+    """
+
+    rng: np.random.Generator
+    offset: float = 0.0
+    time_limit: float | None = None
+    callback: Callback | None = None
+    started: float = field(default_factory=time.perf_counter)
+    trace: list[TracePoint] = field(default_factory=list)
+    stopped_by: str = ""
+
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self.started
+
+    def remaining(self) -> float:
+        """Seconds left; infinite without a time limit."""
+        return np.inf if self.time_limit is None else self.time_limit - self.elapsed()
+
+    def should_stop(self) -> bool:
+        """Whether the time is over or the callback asked to stop; ``stopped_by`` says which."""
+        if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:
+            self.stopped_by = "time_limit"
+        return bool(self.stopped_by)
+
+    def record(self, iteration: int, weight: float, bound: float) -> None:
+        """Add a point to the trace; weight and bound are those of the packing, without the offset."""
+        point = TracePoint(iteration, self.elapsed(), weight + self.offset, bound + self.offset)
+        self.trace.append(point)
+        if self.callback is not None and self.callback(point):
+            self.stopped_by = self.stopped_by or "callback"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a solver found.
+
+    Attributes
+    ----------
+    columns : int array
+        Chosen columns of the packing.
+    iterations : int
+        Iterations used.
+    lower_bound : float
+        A valid lower bound on the packing's optimum; -inf leaves the bound to the caller.
+    duals : float array or None
+        Multipliers of the packing's rows that prove the bound, where they do.
+    """
+
+    columns: NDArray[np.integer]
+    iterations: int
+    lower_bound: float = -np.inf
+    duals: NDArray[np.float64] | None = None
+
+
+class Parameters:
+    """Base of the parameter dataclasses; gives them one way to check and to complain."""
+
+    __slots__ = ()
+
+    def _require(self, condition: bool, name: str, expected: str) -> None:
+        if not condition:
+            raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+
+
+SolveFunction = Callable[["Packing", "Parameters", Run], Outcome]
