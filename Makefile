@@ -1,0 +1,52 @@
+# make demo   simulate the three-radar scene, associate it with the ant colony, print the result
+# make test   install what the tests need and run them
+# make lint   ruff, mypy and import-linter
+# make bench  benchmarks at full size (bench-quick: a minute's worth)
+
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
+	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test lint bench bench-quick clean
+
+demo: $(VENV)/.installed
+	@mkdir -p demo
+	$(PY) -m assoc.simulate three-radar -o demo/scene.npz
+	$(PY) -m assoc.solve demo/scene.npz --solver aco --json demo/result.json
+
+test: $(VENV)/.installed-test
+	$(PY) -m pytest -n 2 -q
+
+lint: $(VENV)/.installed-lint
+	$(PY) -m ruff check .
+	$(PY) -m mypy
+	$(VENV)/bin/lint-imports
+
+bench: $(VENV)/.installed-test
+	$(PY) -m experiments.benchmarks
+
+bench-quick: $(VENV)/.installed-test
+	$(PY) -m experiments.benchmarks --quick
+
+clean:
+	rm -rf $(VENV) demo
+
+# the stamps make a changed pyproject.toml (a new dependency, say) reach an environment that exists already
+$(VENV)/.created:
+	@test -n "$(PYTHON)" || { echo "assoc needs Python 3.11 or newer: make PYTHON=/path/to/python" >&2; exit 1; }
+	"$(PYTHON)" -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.created pyproject.toml
+	$(PIP) -e .
+	@touch $@
+
+$(VENV)/.installed-test: $(VENV)/.installed
+	$(PIP) -e ".[test]"
+	@touch $@
+
+$(VENV)/.installed-lint: $(VENV)/.installed
+	$(PIP) -e ".[test,lint]"
+	@touch $@

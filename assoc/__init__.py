@@ -1,0 +1,64 @@
+"""Which measurements, from several sensors, came from the same target, and which are false alarms?
+
+The public names below are loaded on first use, so that ``import assoc`` stays quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
+
+if TYPE_CHECKING:
+    from assoc import solvers
+    from assoc.association import Association, associate
+    from assoc.costs import build_problem
+    from assoc.problem import AssignmentProblem
+    from assoc.scene import Scene
+    from assoc.solution import Solution
+    from assoc.solvers import assign
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AssignmentProblem",
+    "AssocError",
+    "Association",
+    "InfeasibleError",
+    "InvalidInputError",
+    "LimitExceededError",
+    "Scene",
+    "Solution",
+    "assign",
+    "associate",
+    "build_problem",
+    "solvers",
+]
+
+_HOME = {
+    "AssignmentProblem": "assoc.problem",
+    "Association": "assoc.association",
+    "Scene": "assoc.scene",
+    "Solution": "assoc.solution",
+    "assign": "assoc.solvers",
+    "associate": "assoc.association",
+    "build_problem": "assoc.costs",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use (PEP 562)."""
+    if name in _HOME:
+        value = getattr(importlib.import_module(_HOME[name]), name)
+    elif name == "solvers":
+        value = importlib.import_module("assoc.solvers")
+    else:
+        raise AttributeError(f"module 'assoc' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,21 @@
+"""``python -m assoc`` lists the programs."""
+
+from __future__ import annotations
+
+_PROGRAMS = {
+    "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
+    "assoc.solve": "associate its measurements: python -m assoc.solve scene.npz --solver aco",
+}
+
+
+def main() -> int:
+    """Print the programs and what each is for."""
+    print("assoc: which measurements, from several sensors, came from the same target?")
+    print("\nPrograms (each has --help):")
+    for name, purpose in _PROGRAMS.items():
+        print(f"  python -m {name:<16} {purpose}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
