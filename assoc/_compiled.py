@@ -1,28 +1,64 @@
-"""The one way to numba: lazy signatures, cached on disk, without the GIL, also where no cache can be written."""
+"""The one way to numba: lazy signatures, cached on disk, without the GIL, and never stale.
+
+numba keeps a compiled kernel as long as the kernel's own file is unchanged, so an edited helper in another
+file, or an upgrade that leaves one file as it was, would leave stale code. Here the stamp of every kernel
+is that of all files with kernels that it could call. Where no cache folder can be written (a read-only installation
+and home), numba would fail at import; the cache then goes to a temporary folder.
+"""
 
 from __future__ import annotations
 
-import os
+import hashlib
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
+from numba.core import caching
 
-def _cache_is_writable() -> bool:
-    """Whether numba can keep its cache beside this package (its first choice) or where the user told it to."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return True
-    folder = Path(__file__).parent
-    probe = folder / "__pycache__" if (folder / "__pycache__").is_dir() else folder
-    return os.access(probe, os.W_OK)
+_PACKAGE = Path(__file__).resolve().parent
 
 
-if not _cache_is_writable():
-    # numba would fail at import ("no locator available") where neither the package nor the home can be written
-    os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="assoc-numba-")
+@cache
+def _source_stamp(solvers: bool) -> str:
+    """Digest of names, sizes and times of all files with kernels, of the solvers or of the other rooms.
 
-import numba  # noqa: E402  (the environment above must be set first)
+    The solvers know no other room, so that a change elsewhere leaves their kernels as they are.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        if (path.parent.name == "solvers") == solvers and b"njit" in path.read_bytes():
+            status = path.stat()
+            digest.update(f"{path.relative_to(_PACKAGE)} {status.st_size} {status.st_mtime_ns}\n".encode())
+    return digest.hexdigest()
+
+
+_STANDARD_LOCATORS = tuple(caching.CacheImpl._locator_classes)
+
+
+class _PackageCacheLocator:
+    """Finds numba's usual cache place for kernels of this package, with the package's stamp."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        path = Path(py_file).resolve()
+        if not path.is_relative_to(_PACKAGE):
+            return None
+        for standard in _STANDARD_LOCATORS:
+            locator = standard.from_function(py_func, py_file)
+            if locator is not None:
+                break
+        else:
+            numba.config.CACHE_DIR = tempfile.mkdtemp(prefix="assoc-numba-")
+            locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
+        stamp = _source_stamp(path.parent.name == "solvers")
+        locator.get_source_stamp = lambda: stamp
+        return locator
+
+
+caching.CacheImpl._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
 
 
 def njit(function: Callable[..., Any]) -> Any:
