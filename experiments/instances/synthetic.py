@@ -71,11 +71,11 @@ def axial_known_optimum(n: int, seed: int) -> tuple[AssignmentProblem, float]:
 def _least_compatible(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return for every (j, k) the smallest value outside row j and column k."""
     n = len(values)
-    rows, columns = np.indices(values.shape)
+    index = np.arange(n)
     # Row j and column k hold 2 n - 1 values, so one of the 2 n smallest is outside both.
-    order = np.argsort(values, axis=None, kind="stable")[: 2 * n]
+    order: NDArray[np.intp] = np.argsort(values.ravel(), kind="stable")[: 2 * n]
     order_rows, order_columns = order // n, order % n
-    outside = (rows[..., None] != order_rows) & (columns[..., None] != order_columns)
+    outside = (index[:, None, None] != order_rows) & (index[None, :, None] != order_columns)
     first = np.argmax(outside, axis=-1)
     least: NDArray[np.float64] = values[order_rows[first], order_columns[first]]
     return least

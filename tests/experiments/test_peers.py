@@ -1,0 +1,72 @@
+"""Peers answer the same problems, feasibly, and the exact ones with the optimum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assoc.problem import AssignmentProblem
+from experiments import peers
+from experiments.instances import synthetic
+from tests import oracles
+
+EXACT = ["cp_sat", "scip", "scip_1", "highs"]
+
+
+def problems() -> list[AssignmentProblem]:
+    rng = np.random.default_rng(0)
+    return [
+        oracles.gated_problem(rng, (4, 4, 3), 0.6, "mixed", listed_singletons=0.3),
+        oracles.gated_problem(rng, (3, 2, 3, 2), 0.4, "negative", duplicates=0.2),
+        oracles.axial_problem(rng, (3, 5, 4), 1.0, "positive"),
+        synthetic.planted(3, 0, targets=6)[0],
+    ]
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_exact_peers_find_the_optimum(name: str) -> None:
+    for problem in problems():
+        best = oracles.brute_force(problem)
+        answer = peers.PEERS[name](problem, 20.0)
+        assert answer.proven
+        assert answer.cost == pytest.approx(best, abs=2e-5)
+        assert answer.bound is not None
+        assert best - 1e-3 <= answer.bound <= best + 1e-6
+        assert oracles.check_answer(problem, answer.tuples) == answer.cost
+
+
+@pytest.mark.parametrize("name", ["sequential", "nrl_tracker"])
+def test_heuristic_peers_are_feasible_and_not_better(name: str) -> None:
+    if name == "nrl_tracker":
+        pytest.importorskip("pytcl")
+    found = 0
+    for problem in problems():
+        if not peers.available(name, problem):
+            continue
+        answer = peers.PEERS[name](problem, 20.0)
+        best = oracles.brute_force(problem)
+        assert answer.cost >= best - 1e-9
+        assert answer.bound is None or answer.bound <= best + 1e-6
+        found += np.isfinite(answer.cost)
+    assert found >= 3
+
+
+def test_two_sensors_sequential_is_exact() -> None:
+    for problem in oracles.small_problems(60, seed=3, dummy=True):
+        if (
+            problem.num_sensors == 2
+            and (problem.costs[np.count_nonzero(problem.tuples, axis=1) == 1] == 0).all()
+        ):
+            answer = peers.sequential(problem, 1.0)
+            assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)
+
+
+def test_limits() -> None:
+    large = synthetic.axial_random(26, 0)
+    assert peers.available("cp_sat", large)
+    assert not peers.available("nobody", large)
+    dense = AssignmentProblem([[1, 1, 1]], [-1.0], [100, 100, 100])
+    assert peers.dense_elements(dense) == 300**3
+    assert not peers.available("nrl_tracker", dense)
+    with pytest.raises(MemoryError):
+        peers.nrl_tracker(dense, 1.0)
