@@ -1,0 +1,9 @@
+"""Simulated scenes: trajectories, sensors that observe them, and named scenarios."""
+
+from __future__ import annotations
+
+from assoc.simulation.observation import observe
+from assoc.simulation.scenarios import names, parameters, simulate
+from assoc.simulation.trajectories import Trajectory
+
+__all__ = ["Trajectory", "names", "observe", "parameters", "simulate"]

@@ -1,0 +1,71 @@
+"""What sensors report of targets: detections with noise, misses, and false alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc.scene import Scene, Truth
+from assoc.sensors.base import Array, Sensor, wrap_angle
+
+
+def observe(
+    sensors: Sequence[Sensor],
+    times: Array,
+    target_ids: Sequence[Array],
+    positions: Sequence[Array],
+    rng: np.random.Generator,
+    *,
+    region: Array | None = None,
+    name: str = "",
+) -> Scene:
+    """Let sensors observe targets.
+
+    A target in a sensor's field of view is detected with probability P_d and measured with Gaussian noise.
+    The number of false alarms is Poisson; they are uniform over the field of view in measurement space,
+    which is the clutter density r / V of the costs. The order within a scan is random and tells nothing.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    times : array (K,)
+        Time stamps, seconds.
+    target_ids : sequence over scans of int arrays (T_k,)
+    positions : sequence over scans of arrays (T_k, 3)
+        Where the targets are, metres.
+    rng : numpy.random.Generator
+        The only source of randomness.
+    region, name
+        As in `assoc.Scene`.
+
+    Returns
+    -------
+    Scene
+        With truth: ids, positions, and the source of each measurement.
+    """
+    measurements: list[list[Array]] = []
+    sources: list[list[Array]] = []
+    for ids, places in zip(target_ids, positions, strict=True):
+        scan = [_report(sensor, np.asarray(ids), np.asarray(places), rng) for sensor in sensors]
+        measurements.append([values for values, _ in scan])
+        sources.append([source for _, source in scan])
+    truth = Truth(target_ids, positions, sources)
+    return Scene(sensors, times, measurements, region, truth, name)  # type: ignore[arg-type]
+
+
+def _report(sensor: Sensor, ids: Array, positions: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Measurements (n, d) of one sensor in one scan, and the source (n,) of each."""
+    exact = sensor.measure(positions.reshape(-1, 3))
+    detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.in_view(exact)
+    factor = np.linalg.cholesky(sensor.covariance)
+    hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T
+    low, high = sensor.field_of_view[:, 0], sensor.field_of_view[:, 1]
+    clutter = rng.uniform(low, high, size=(int(rng.poisson(sensor.false_alarm_rate)), sensor.dim))
+    values = np.concatenate([hits, clutter])
+    for axis in range(sensor.dim):
+        if sensor.angular[axis]:
+            values[:, axis] = wrap_angle(values[:, axis])
+    source = np.concatenate([ids[detected], np.full(len(clutter), -1)]).astype(np.int64)
+    order = rng.permutation(len(values))
+    return values[order], source[order]

@@ -1,0 +1,111 @@
+"""Where simulated sensors stand and what they see: fields of view that just cover a region."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assoc.sensors.base import Array, Sensor, wrap_angle
+from assoc.sensors.radar import Radar3D
+
+# noise may carry a measurement this many standard deviations past the region and still be in view
+MARGIN = 5.0
+
+
+def on_circle(center: Array, radius: float, count: int, height: float = 0.0) -> Array:
+    """Places (count, 3), metres, at equal angles on a horizontal circle, the first north (+y) of its center."""
+    angle = math.pi / 2 + 2 * math.pi * np.arange(count) / count
+    x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
+    return np.stack([x, y, np.full(count, height)], axis=1) + 0.0
+
+
+def azimuth_interval(position: Array, region: Array) -> tuple[float, float]:
+    """Smallest interval of azimuths (rad) under which a box is seen; its end may lie beyond pi.
+
+    Parameters
+    ----------
+    position : array (3,)
+        Place of the sensor, metres.
+    region : array (3, 2)
+        Lower and upper bounds of x, y, z, metres.
+    """
+    low, high = region[:2, 0], region[:2, 1]
+    place = position[:2]
+    if ((low < place) & (place < high)).all():
+        return -math.pi, math.pi
+    corners = np.array([[x, y] for x in region[0] for y in region[1]]) - place
+    corners = corners[(corners != 0).any(axis=1)]
+    middle = (low + high) / 2 - place
+    if not len(corners) or not middle.any():
+        return -math.pi, math.pi
+    center = math.atan2(middle[1], middle[0])
+    # seen from outside a convex box spans at most a half circle, so offsets from its middle do not wrap
+    offset = wrap_angle(np.arctan2(corners[:, 1], corners[:, 0]) - center)
+    return center + float(offset.min()), center + float(offset.max())
+
+
+def range_interval(position: Array, region: Array) -> tuple[float, float]:
+    """Smallest and largest distance (m) from a place to a box."""
+    nearest = np.clip(position, region[:, 0], region[:, 1])
+    farthest = np.maximum(np.abs(region[:, 0] - position), np.abs(region[:, 1] - position))
+    return float(np.linalg.norm(nearest - position)), float(np.linalg.norm(farthest))
+
+
+def elevation_interval(position: Array, region: Array) -> tuple[float, float]:
+    """Smallest and largest elevation (rad) under which a box is seen."""
+    near, far = range_interval(position[:2], region[:2])
+    bottom, top = float(region[2, 0] - position[2]), float(region[2, 1] - position[2])
+    return (
+        math.atan2(bottom, near if bottom < 0 else far),
+        math.atan2(top, near if top > 0 else far),
+    )
+
+
+def padded(interval: tuple[float, float], noise: float, least: float, most: float) -> tuple[float, float]:
+    """Widen an interval by the margin for noise, within [least, most]."""
+    return max(least, interval[0] - MARGIN * noise), min(most, interval[1] + MARGIN * noise)
+
+
+def padded_azimuth(interval: tuple[float, float], noise: float) -> tuple[float, float]:
+    """Widen an interval of azimuths by the margin for noise, to a full circle at most."""
+    low, high = interval[0] - MARGIN * noise, interval[1] + MARGIN * noise
+    return (low, high) if high - low < 2 * math.pi else (-math.pi, math.pi)
+
+
+def radar_over(
+    region: Array,
+    position: Array,
+    *,
+    range_noise: float,
+    angle_noise: float,
+    detection_probability: float,
+    false_alarm_rate: float,
+    name: str,
+) -> Sensor:
+    """Make a radar (range, azimuth, elevation) whose field of view is the smallest box that covers a region.
+
+    Parameters
+    ----------
+    region : array (3, 2)
+        Lower and upper bounds of x, y, z, metres.
+    position : array (3,)
+        Place of the radar, metres.
+    range_noise, angle_noise : float
+        Standard deviations in metres, and in radians for azimuth and elevation alike.
+    detection_probability, false_alarm_rate, name
+        As in `assoc.sensors.Sensor`.
+    """
+    view = [
+        padded(range_interval(position, region), range_noise, 0.0, math.inf),
+        padded_azimuth(azimuth_interval(position, region), angle_noise),
+        padded(elevation_interval(position, region), angle_noise, -math.pi / 2, math.pi / 2),
+    ]
+    return Radar3D(
+        position=position,
+        noise=np.array([range_noise, angle_noise, angle_noise]),
+        detection_probability=detection_probability,
+        false_alarm_rate=false_alarm_rate,
+        field_of_view=np.array(view),
+        name=name,
+    )

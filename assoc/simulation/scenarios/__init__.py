@@ -1,0 +1,89 @@
+"""Named scenarios, one a file; ``simulate`` is their front door."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from importlib import import_module
+from typing import Any, cast
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.scene import Scene
+from assoc.simulation.scenarios.base import ScenarioParameters
+
+# name -> module with a class `parameters` and a function `simulate`
+_MODULES = {
+    "three-radar": "assoc.simulation.scenarios.three_radar",
+    "crowd": "assoc.simulation.scenarios.crowd",
+    "bearing-only": "assoc.simulation.scenarios.bearing_only",
+    "from-tracks": "assoc.simulation.scenarios.from_tracks",
+}
+
+
+def names() -> list[str]:
+    """Names of all scenarios."""
+    return list(_MODULES)
+
+
+def parameters(name: str) -> type[ScenarioParameters]:
+    """Return the parameter dataclass of a scenario; its fields' metadata have a "help" text.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no scenario of that name.
+    """
+    if name not in _MODULES:
+        raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(_MODULES)}")
+    return cast("type[ScenarioParameters]", import_module(_MODULES[name]).parameters)
+
+
+def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
+    """Simulate a scene.
+
+    Parameters
+    ----------
+    name : str
+        One of ``names()``.
+    seed : int, default 0
+        Seed of the one random generator: the same seed gives the same scene.
+    **values
+        Parameters of the scenario (``parameters(name)``).
+
+    Returns
+    -------
+    Scene
+        With truth; its name tells the scenario, the seed and what differs from the defaults.
+
+    Raises
+    ------
+    InvalidInputError
+        Unknown scenario or parameter, or a value out of range.
+    """
+    kind = parameters(name)
+    known = [field.name for field in fields(cast(Any, kind))]
+    for key in values:
+        if key not in known:
+            raise InvalidInputError(f"{key}: no parameter of scenario {name!r}; known: {', '.join(known)}")
+    missing = [f.name for f in fields(cast(Any, kind)) if f.default is MISSING and f.name not in values]
+    if missing:
+        raise InvalidInputError(f"{missing[0]}: scenario {name!r} needs a value")
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
+    chosen = kind(**values)
+    scene = import_module(_MODULES[name]).simulate(
+        chosen, np.random.default_rng(int(seed)), _title(name, seed, chosen)
+    )
+    return cast(Scene, scene)
+
+
+def _title(name: str, seed: int, chosen: ScenarioParameters) -> str:
+    """What the scene is called: the scenario, the seed, and the parameters that are not the defaults."""
+    parts = [f"seed {seed}"]
+    for field in fields(cast(Any, chosen)):
+        value = getattr(chosen, field.name)
+        # a file's name may be private and differs from machine to machine
+        if value != field.default and field.metadata.get("in_title", True):
+            parts.append(f"{field.name.replace('_', ' ')} {value}")
+    return f"{name} ({', '.join(parts)})"

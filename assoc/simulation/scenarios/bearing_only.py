@@ -1,0 +1,84 @@
+"""Bearing-only sensors over a field of targets: lines of sight that cross where nobody is (ghosts)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from assoc.scene import Scene
+from assoc.sensors.base import Array
+from assoc.sensors.bearing import BearingSensor
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import azimuth_interval, padded_azimuth
+from assoc.simulation.scenarios.base import ScenarioParameters
+from assoc.simulation.scenarios.crowd import horizontal_velocities
+
+HEIGHT = 10_000.0
+"""Targets fly up to here (m); a bearing says nothing about it."""
+
+
+@dataclass(frozen=True)
+class BearingOnlyParameters(ScenarioParameters):
+    """Parameters of the bearing-only scene."""
+
+    targets: int = field(default=20, metadata={"help": "number of targets"})
+    sensors: int = field(default=3, metadata={"help": "number of sensors, 2 or more"})
+    scans: int = field(default=10, metadata={"help": "number of scans"})
+    interval: float = field(default=10.0, metadata={"help": "seconds from scan to scan"})
+    width: float = field(default=100_000.0, metadata={"help": "side of the square field, metres"})
+    depth: float = field(
+        default=10_000.0, metadata={"help": "how far every second sensor stands behind the edge, metres"}
+    )
+    speed: float = field(
+        default=200.0, metadata={"help": "largest horizontal speed, m/s; speeds are uniform from half of it"}
+    )
+    noise: float = field(default=0.005, metadata={"help": "standard deviation of a bearing, radians"})
+    detection_probability: float = field(default=0.95, metadata={"help": "P_d of each sensor"})
+    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per sensor and scan"})
+
+    def __post_init__(self) -> None:
+        self._whole("targets", "scans")
+        self._whole("sensors", least=2)
+        self._number("interval", "width", "noise", "false_alarms", above=0.0)
+        self._number("depth", "speed", least=0.0)
+        self._probability("detection_probability")
+
+
+def places(parameters: BearingOnlyParameters) -> Array:
+    """Places of the sensors (n, 3), metres: along the southern edge, every second one set back.
+
+    With the default parameters they are (0, 0), (50, -10) and (100, 0) km.
+    """
+    number = np.arange(parameters.sensors)
+    along = parameters.width * number / (parameters.sensors - 1)
+    return np.stack([along, 0.0 - parameters.depth * (number % 2), np.zeros(parameters.sensors)], axis=1)
+
+
+def simulate(parameters: BearingOnlyParameters, rng: np.random.Generator, name: str) -> Scene:
+    """Simulate the scene; see `assoc.simulation.simulate`."""
+    p = parameters
+    region = np.array([[0.0, p.width], [0.0, p.width], [0.0, HEIGHT]])
+    start = rng.uniform(region[:, 0], region[:, 1], size=(p.targets, 3))
+    velocity = horizontal_velocities(p.targets, p.speed, rng)
+    times = p.interval * np.arange(p.scans)
+    paths = [start + t * velocity for t in times]
+    # who has left the field is gone: the fields of view end with it
+    inside = [((path >= region[:, 0]) & (path <= region[:, 1])).all(axis=1) for path in paths]
+    sensors = [
+        BearingSensor(
+            position=place,
+            noise=np.array([p.noise]),
+            detection_probability=p.detection_probability,
+            false_alarm_rate=p.false_alarms,
+            field_of_view=np.array([padded_azimuth(azimuth_interval(place, region), p.noise)]),
+            name=f"bearing sensor {number}",
+        )
+        for number, place in enumerate(places(p), start=1)
+    ]
+    ids = [np.flatnonzero(here) for here in inside]
+    present = [path[here] for path, here in zip(paths, inside, strict=True)]
+    return observe(sensors, times, ids, present, rng, region=region, name=name)
+
+
+parameters = BearingOnlyParameters

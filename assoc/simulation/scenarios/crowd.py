@@ -1,0 +1,117 @@
+"""A crowd: many targets at random places in a box, seen by position sensors or radars around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.scene import Scene
+from assoc.sensors.base import Array, Sensor
+from assoc.sensors.position import PositionSensor
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import MARGIN, on_circle, radar_over
+from assoc.simulation.scenarios.base import ScenarioParameters
+
+REFERENCE_TARGETS = 100
+"""With constant density the box is as given for this many targets."""
+
+
+@dataclass(frozen=True)
+class CrowdParameters(ScenarioParameters):
+    """Parameters of the crowd."""
+
+    targets: int = field(default=100, metadata={"help": "number of targets"})
+    scans: int = field(default=1, metadata={"help": "number of scans"})
+    interval: float = field(default=1.0, metadata={"help": "seconds from scan to scan"})
+    sensors: int = field(default=3, metadata={"help": "number of sensors"})
+    sensor: Literal["position", "radar"] = field(
+        default="position",
+        metadata={"help": "x, y, z at once, or radars (range, azimuth, elevation) around the box"},
+    )
+    width: float = field(default=5_000.0, metadata={"help": "side of the square box, metres"})
+    height: float = field(default=2_000.0, metadata={"help": "height of the box, metres"})
+    constant_density: bool = field(
+        default=False,
+        metadata={"help": f"grow the ground area with the targets; as given for {REFERENCE_TARGETS}"},
+    )
+    speed: float = field(
+        default=200.0, metadata={"help": "largest horizontal speed, m/s; speeds are uniform from half of it"}
+    )
+    noise: float = field(
+        default=100.0,
+        metadata={
+            "help": "standard deviation of a position (radar: of range, and across at the box), metres"
+        },
+    )
+    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each sensor"})
+    false_alarms_per_target: float = field(
+        default=0.1, metadata={"help": "mean false alarms per sensor and scan, for each target"}
+    )
+
+    def __post_init__(self) -> None:
+        self._whole("targets", "scans", "sensors")
+        self._number("interval", "width", "height", "noise", "false_alarms_per_target", above=0.0)
+        self._number("speed", least=0.0)
+        self._probability("detection_probability")
+        if self.sensor not in ("position", "radar"):
+            raise InvalidInputError(f"sensor: expected 'position' or 'radar', got {self.sensor!r}")
+
+
+def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
+    """Simulate the scene; see `assoc.simulation.simulate`."""
+    p = parameters
+    width = p.width * (np.sqrt(p.targets / REFERENCE_TARGETS) if p.constant_density else 1.0)
+    box = np.array([[0.0, width], [0.0, width], [0.0, p.height]])
+    start = rng.uniform(box[:, 0], box[:, 1], size=(p.targets, 3))
+    velocity = horizontal_velocities(p.targets, p.speed, rng)
+    times = p.interval * np.arange(p.scans)
+    paths = [start + t * velocity for t in times]
+    # nobody leaves the region, however long the scene lasts
+    region = box + p.speed * times[-1] * np.array([[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
+    ids = [np.arange(p.targets)] * p.scans
+    return observe(_sensors(p, region), times, ids, paths, rng, region=region, name=name)
+
+
+def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
+    rate = p.false_alarms_per_target * p.targets
+    center = region.mean(axis=1)
+    distance = float(np.hypot(*(region[:2, 1] - region[:2, 0])))
+    places = on_circle(center, distance, p.sensors)
+    if p.sensor == "radar":
+        return [
+            radar_over(
+                region,
+                place,
+                range_noise=p.noise,
+                angle_noise=p.noise / distance,
+                detection_probability=p.detection_probability,
+                false_alarm_rate=rate,
+                name=f"radar {number}",
+            )
+            for number, place in enumerate(places, start=1)
+        ]
+    view = region + MARGIN * p.noise * np.array([-1.0, 1.0])
+    return [
+        PositionSensor(
+            position=place,
+            noise=np.full(3, p.noise),
+            detection_probability=p.detection_probability,
+            false_alarm_rate=rate,
+            field_of_view=view,
+            name=f"sensor {number}",
+        )
+        for number, place in enumerate(places, start=1)
+    ]
+
+
+def horizontal_velocities(count: int, speed: float, rng: np.random.Generator) -> Array:
+    """Random horizontal velocities (count, 3): any heading, speeds uniform from half of the largest, m/s."""
+    heading = rng.uniform(-np.pi, np.pi, count)
+    size = rng.uniform(0.5 * speed, speed, count)
+    return np.stack([size * np.cos(heading), size * np.sin(heading), np.zeros(count)], axis=1)
+
+
+parameters = CrowdParameters

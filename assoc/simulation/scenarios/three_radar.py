@@ -1,0 +1,102 @@
+"""Three targets, three radars, a hundred scans: the scene of the ant colony paper.
+
+The trajectories, P_d, the false alarm rate and the number of scans are the paper's. It gives neither noise nor
+region nor the places of the radars. Chosen here: the region is the bounding box of the three trajectories and
+10 % more on each side; the radars stand on the ground, at equal angles around its middle, far enough out to see
+every target from a different side and never to have one straight above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from assoc.scene import Scene
+from assoc.sensors.base import Array
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.scenarios.base import ScenarioParameters
+from assoc.simulation.trajectories import Manoeuvre, Trajectory
+
+TRAJECTORIES = (
+    Trajectory(np.array([30_000.0, 20_000.0, 2_000.0]), np.array([-450.0, -250.0, 100.0])),
+    Trajectory(
+        np.array([20_450.0, 11_250.0, 2_000.0]),
+        np.array([-450.0, -250.0, 10.0]),
+        (
+            Manoeuvre(12.0, 23.0, (0.0, 50.0, 0.0)),
+            Manoeuvre(23.0, float("inf"), (-20.0, -20.0, 0.0)),
+        ),
+    ),
+    Trajectory(np.array([50_000.0, 20_000.0, 2_000.0]), np.array([-600.0, -250.0, 300.0])),
+)
+"""The paper's three targets: metres and m/s; target 2 turns at 12 s and again at 23 s."""
+
+
+@dataclass(frozen=True)
+class ThreeRadarParameters(ScenarioParameters):
+    """Parameters of the three-radar scene."""
+
+    scans: int = field(default=100, metadata={"help": "number of scans"})
+    interval: float = field(default=1.0, metadata={"help": "seconds from scan to scan"})
+    radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
+    radar_distance: float = field(
+        default=60_000.0, metadata={"help": "metres from the middle of the region to each radar"}
+    )
+    noise: float = field(
+        default=50.0,
+        metadata={"help": "standard deviation of range, and across the line of sight at 50 km, metres"},
+    )
+    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
+    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
+    margin: float = field(
+        default=0.1, metadata={"help": "how far the region reaches past the trajectories, as a share of them"}
+    )
+
+    def __post_init__(self) -> None:
+        self._whole("scans", "radars")
+        self._number("interval", "noise", "false_alarms", above=0.0)
+        self._number("radar_distance", "margin", least=0.0)
+        self._probability("detection_probability")
+
+
+REFERENCE_RANGE = 50_000.0
+"""Range (m) at which the angles' noise across the line of sight equals the range's noise."""
+
+
+def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
+    """Simulate the scene; see `assoc.simulation.simulate`."""
+    times = parameters.interval * np.arange(parameters.scans)
+    paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
+    region = around(paths, parameters.margin)
+    places = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
+    sensors = [
+        radar_over(
+            region,
+            place,
+            range_noise=parameters.noise,
+            angle_noise=parameters.noise / REFERENCE_RANGE,
+            detection_probability=parameters.detection_probability,
+            false_alarm_rate=parameters.false_alarms,
+            name=f"radar {number}",
+        )
+        for number, place in enumerate(places, start=1)
+    ]
+    ids = [np.arange(len(TRAJECTORIES))] * parameters.scans
+    return observe(sensors, times, ids, list(paths), rng, region=region, name=name)
+
+
+def around(positions: Array, margin: float) -> Array:
+    """Bounding box (3, 2) of positions (..., 3), widened on each side by a share of its extent, metres.
+
+    A direction without extent is widened by 1 km, so that the box always has a volume.
+    """
+    flat = positions.reshape(-1, 3)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    pad = margin * (high - low)
+    pad[high - low == 0] = 1_000.0
+    return np.stack([low - pad, high + pad], axis=1)
+
+
+parameters = ThreeRadarParameters
