@@ -1,0 +1,7 @@
+"""Likelihood-ratio costs: from the measurements of a scan to a sparse assignment problem."""
+
+from __future__ import annotations
+
+from assoc.costs.build import build_problem, positions_and_covariances, tuple_costs
+
+__all__ = ["build_problem", "positions_and_covariances", "tuple_costs"]

@@ -1,0 +1,171 @@
+"""From a scan of a scene to the assignment problem, and the costs and positions of single tuples."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc.costs.arrays import scan_arrays, sensor_arrays
+from assoc.costs.estimation import fit
+from assoc.costs.gating import chi_square_quantiles, make_gates
+from assoc.costs.growth import grow
+from assoc.costs.guard import MAX_TUPLES
+from assoc.costs.pairs import compatible_pairs
+from assoc.errors import InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scan, Scene
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+GATE_PROBABILITY = 0.999
+"""Default share of true tuples that each chi-square gate lets through."""
+
+
+def build_problem(
+    scene: Scene,
+    scan: int | Scan,
+    *,
+    gate_probability: float = GATE_PROBABILITY,
+    max_tuples: int = MAX_TUPLES,
+) -> AssignmentProblem:
+    """Write down which measurements of a scan may be one target, and at what cost.
+
+    A tuple of two or more measurements is a candidate if
+
+    * each pair of its measurements passes the chi-square gate of that pair,
+    * all of them together pass the gate of their degrees of freedom,
+    * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
+
+    Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that measures
+    full positions, else two), at least one.
+
+    Parameters
+    ----------
+    scene : Scene
+    scan : int or Scan
+        Number of the scan, or a scan of that scene.
+    gate_probability : float
+        Probability with which measurements of one target pass a gate, in (0, 1]; 1 leaves only the sign
+        of the cost.
+    max_tuples : int
+        The most candidate tuples that may be made.
+
+    Returns
+    -------
+    AssignmentProblem
+
+    Raises
+    ------
+    LimitExceededError
+        There are more candidates than `max_tuples`; the message estimates how many.
+    InvalidInputError
+        An argument is out of range.
+
+    References
+    ----------
+    The ant colony paper, equations 1-5; with clutter density r / V in the place of 1 / V.
+    """
+    if isinstance(max_tuples, bool) or not isinstance(max_tuples, (int, np.integer)) or max_tuples < 1:
+        raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
+    try:
+        probability = float(gate_probability)
+    except (TypeError, ValueError):
+        probability = math.nan
+    if not 0.0 < probability <= 1.0:
+        raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
+    one = _scan(scene, scan)
+    sensors = sensor_arrays(scene)
+    gates = make_gates(sensors, probability)
+    reach = float(gates.pair.max(initial=1.0)) if len(scene.sensors) > 1 else 1.0
+    measured, index = scan_arrays(sensors, one, reach)
+    limits = {"number": one.index, "max_tuples": int(max_tuples)}
+    pairs = compatible_pairs(sensors, measured, gates, **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, **limits)
+    padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
+    return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
+    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+
+    Parameters
+    ----------
+    scene, scan
+        See `build_problem`.
+    tuples : array_like of int (K, S)
+        1-based measurement of each sensor, 0 where it missed the target.
+
+    Returns
+    -------
+    ndarray (K,)
+
+    Raises
+    ------
+    InvalidInputError
+        The tuples have the wrong shape, an index out of range, or no measurement.
+    """
+    sensors = sensor_arrays(scene)
+    rows, chi, _, _ = _fit_tuples(scene, scan, tuples, False)
+    detected = rows >= 0
+    costs = 0.5 * chi - detected @ sensors.gain + sensors.base
+    return np.where(detected.sum(axis=1) == 1, 0.0, costs)
+
+
+def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:
+    """Maximum-likelihood positions of tuples (equation 4) and their covariances.
+
+    What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    deviation half its width. So a position always exists.
+
+    Parameters
+    ----------
+    scene, scan, tuples
+        See `tuple_costs`.
+
+    Returns
+    -------
+    positions (K, 3), covariances (K, 3, 3)
+        Metres; the covariance is the inverse information at the position.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`.
+    """
+    _, _, positions, covariances = _fit_tuples(scene, scan, tuples, True)
+    return positions, covariances
+
+
+def _scan(scene: Scene, scan: int | Scan) -> Scan:
+    return scan if isinstance(scan, Scan) else scene.scan(scan)
+
+
+def _fit_tuples(
+    scene: Scene, scan: int | Scan, tuples: Array, positions: bool
+) -> tuple[Array, Array, Array, Array]:
+    one = _scan(scene, scan)
+    sensors = sensor_arrays(scene)
+    measured, index = scan_arrays(sensors, one, float(chi_square_quantiles(GATE_PROBABILITY, 3)[3]))
+    count, sizes = len(scene.sensors), one.sizes
+    wanted = np.asarray(tuples)
+    if wanted.size == 0:
+        wanted = np.zeros((0, count), dtype=np.int64)
+    if wanted.ndim != 2 or wanted.shape[1] != count or wanted.dtype.kind not in "iu":
+        raise InvalidInputError(
+            f"tuples must be integers of shape (K, {count}), got {wanted.dtype} of shape {wanted.shape}"
+        )
+    wrong = (wanted < 0) | (wanted > sizes)
+    if wrong.any():
+        k, s = np.argwhere(wrong)[0]
+        raise InvalidInputError(
+            f"tuples: row {k} has index {wanted[k, s]} for sensor {s}, expected 0 to {sizes[s]}"
+        )
+    if len(wanted) and not wanted.any(axis=1).all():
+        raise InvalidInputError(f"tuples: row {int(np.argmin(wanted.any(axis=1)))} has no measurement")
+    # bearings were sorted: from 1-based index to row
+    row_of = np.empty(len(index) + 1, dtype=np.int32)
+    row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
+    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
+    return (rows, *fit(sensors, measured, rows, positions))

@@ -1,0 +1,388 @@
+"""Maximum-likelihood positions of tuples (equation 4 of the ant colony paper), compiled.
+
+Levenberg-Marquardt on the residuals of the members, started from their converted measurements or from the
+crossing of their bearings. With linear sensors the first step is the closed form.
+
+The region's prior enters only where the measurements leave a position open, so that one always exists. A tuple
+with a sensor that measures full positions never sees it. For other tuples it acts along those directions only in
+which the measurements tell less than the prior does (standard deviation: half the region's width); it is not part
+of the chi-square value, so it moves the position of an undetermined tuple but is never charged to it.
+
+Kernels that call one another live in one file: numba's cache does not notice an edited callee in another.
+Symmetric 3 x 3 matrices are passed as (xx, xy, xz, yy, yz, zz).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc._compiled import njit
+from assoc.costs.arrays import ScanArrays, SensorArrays
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Six = tuple[float, float, float, float, float, float]
+
+_TURN = 2.0 * math.pi
+# a position is undetermined along a direction if the measurements tell less of it than this times the prior
+_WEAK = 1.0
+_MAX_STEPS = 100
+# residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
+_POOR_FIT = 10.0
+
+
+@njit
+def _normal(
+    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int, x: float, y: float, z: float
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members at a position."""
+    chi = g0 = g1 = g2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
+    for k in range(count):
+        n = members[k]
+        s = scan.owner[n]
+        code = sensors.code[s]
+        W = sensors.weight[s]
+        if code == 0:
+            v0, v1 = scan.z[n, 0] - x, scan.z[n, 1] - y
+            v2 = scan.z[n, 2] - z if sensors.dim[s] == 3 else 0.0
+            w0 = W[0, 0] * v0 + W[0, 1] * v1 + W[0, 2] * v2
+            w1 = W[0, 1] * v0 + W[1, 1] * v1 + W[1, 2] * v2
+            w2 = W[0, 2] * v0 + W[1, 2] * v1 + W[2, 2] * v2
+            chi += v0 * w0 + v1 * w1 + v2 * w2
+            g0, g1, g2 = g0 + w0, g1 + w1, g2 + w2
+            a0, a1, a2 = a0 + W[0, 0], a1 + W[0, 1], a2 + W[0, 2]
+            a3, a4, a5 = a3 + W[1, 1], a4 + W[1, 2], a5 + W[2, 2]
+            continue
+        dx, dy, dz = x - sensors.place[s, 0], y - sensors.place[s, 1], z - sensors.place[s, 2]
+        flat2 = dx * dx + dy * dy
+        turn = math.atan2(dy, dx)
+        if code == 3:
+            flat2 = max(flat2, 1e-12)
+            v0 = scan.z[n, 0] - turn
+            v0 -= _TURN * round(v0 / _TURN)
+            h0, h1 = -dy / flat2, dx / flat2
+            chi += W[0, 0] * v0 * v0
+            g0, g1 = g0 + W[0, 0] * v0 * h0, g1 + W[0, 0] * v0 * h1
+            a0, a1, a3 = a0 + W[0, 0] * h0 * h0, a1 + W[0, 0] * h0 * h1, a3 + W[0, 0] * h1 * h1
+            continue
+        flat = math.sqrt(flat2)
+        slant2 = flat2 + dz * dz
+        slant = math.sqrt(slant2)
+        v0 = scan.z[n, 0] - slant
+        v1 = scan.z[n, 1] - turn
+        v1 -= _TURN * round(v1 / _TURN)
+        # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
+        # taken if they help
+        slant = max(slant, 1e-6)
+        flat = max(flat, 1e-5 * slant)
+        r0, r1, r2 = dx / slant, dy / slant, dz / slant
+        t0, t1 = -dy / (flat * flat), dx / (flat * flat)
+        if code == 2:
+            w0, w1 = W[0, 0] * v0 + W[0, 1] * v1, W[0, 1] * v0 + W[1, 1] * v1
+            chi += v0 * w0 + v1 * w1
+            g0, g1, g2 = g0 + r0 * w0 + t0 * w1, g1 + r1 * w0 + t1 * w1, g2 + r2 * w0
+            p0, p1, p2 = W[0, 0] * r0 + W[0, 1] * t0, W[0, 0] * r1 + W[0, 1] * t1, W[0, 0] * r2
+            q0, q1, q2 = W[0, 1] * r0 + W[1, 1] * t0, W[0, 1] * r1 + W[1, 1] * t1, W[0, 1] * r2
+            a0, a1, a2 = a0 + r0 * p0 + t0 * q0, a1 + r0 * p1 + t0 * q1, a2 + r0 * p2 + t0 * q2
+            a3, a4, a5 = a3 + r1 * p1 + t1 * q1, a4 + r1 * p2 + t1 * q2, a5 + r2 * p2
+            continue
+        v2 = scan.z[n, 2] - math.atan2(dz, math.sqrt(flat2))
+        e0 = -dx * dz / (flat * slant * slant)
+        e1 = -dy * dz / (flat * slant * slant)
+        e2 = flat / (slant * slant)
+        w0 = W[0, 0] * v0 + W[0, 1] * v1 + W[0, 2] * v2
+        w1 = W[0, 1] * v0 + W[1, 1] * v1 + W[1, 2] * v2
+        w2 = W[0, 2] * v0 + W[1, 2] * v1 + W[2, 2] * v2
+        chi += v0 * w0 + v1 * w1 + v2 * w2
+        g0, g1 = g0 + r0 * w0 + t0 * w1 + e0 * w2, g1 + r1 * w0 + t1 * w1 + e1 * w2
+        g2 += r2 * w0 + e2 * w2
+        p0 = W[0, 0] * r0 + W[0, 1] * t0 + W[0, 2] * e0
+        p1 = W[0, 0] * r1 + W[0, 1] * t1 + W[0, 2] * e1
+        p2 = W[0, 0] * r2 + W[0, 2] * e2
+        q0 = W[0, 1] * r0 + W[1, 1] * t0 + W[1, 2] * e0
+        q1 = W[0, 1] * r1 + W[1, 1] * t1 + W[1, 2] * e1
+        q2 = W[0, 1] * r2 + W[1, 2] * e2
+        u0 = W[0, 2] * r0 + W[1, 2] * t0 + W[2, 2] * e0
+        u1 = W[0, 2] * r1 + W[1, 2] * t1 + W[2, 2] * e1
+        u2 = W[0, 2] * r2 + W[2, 2] * e2
+        a0 += r0 * p0 + t0 * q0 + e0 * u0
+        a1 += r0 * p1 + t0 * q1 + e0 * u1
+        a2 += r0 * p2 + t0 * q2 + e0 * u2
+        a3 += r1 * p1 + t1 * q1 + e1 * u1
+        a4 += r1 * p2 + t1 * q2 + e1 * u2
+        a5 += r2 * p2 + e2 * u2
+    return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
+
+
+@njit
+def _solve(A: Six, b0: float, b1: float, b2: float) -> tuple[bool, float, float, float]:
+    """Solve a positive definite system, scaled by its diagonal; False where it is not positive definite."""
+    if not (A[0] > 0.0 and A[3] > 0.0 and A[5] > 0.0):
+        return False, 0.0, 0.0, 0.0
+    p, q, r = 1.0 / math.sqrt(A[0]), 1.0 / math.sqrt(A[3]), 1.0 / math.sqrt(A[5])
+    c10, c20, c21 = A[1] * p * q, A[2] * p * r, A[4] * q * r
+    d1 = 1.0 - c10 * c10
+    if not d1 > 1e-15:
+        return False, 0.0, 0.0, 0.0
+    l11 = math.sqrt(d1)
+    l21 = (c21 - c20 * c10) / l11
+    d2 = 1.0 - c20 * c20 - l21 * l21
+    if not d2 > 1e-15:
+        return False, 0.0, 0.0, 0.0
+    l22 = math.sqrt(d2)
+    y0 = b0 * p
+    y1 = (b1 * q - c10 * y0) / l11
+    y2 = (b2 * r - c20 * y0 - l21 * y1) / l22
+    x2 = y2 / l22
+    x1 = (y1 - l21 * x2) / l11
+    x0 = y0 - c10 * x1 - c20 * x2
+    return True, x0 * p, x1 * q, x2 * r
+
+
+@njit
+def _inverse(A: Six) -> tuple[bool, float, float, float, float, float, float]:
+    """Inverse of a positive definite matrix."""
+    ok, c0, c1, c2 = _solve(A, 1.0, 0.0, 0.0)
+    ok1, _, c3, c4 = _solve(A, 0.0, 1.0, 0.0)
+    ok2, _, _, c5 = _solve(A, 0.0, 0.0, 1.0)
+    return ok and ok1 and ok2, c0, c1, c2, c3, c4, c5
+
+
+@njit
+def _descend(
+    sensors: SensorArrays,
+    scan: ScanArrays,
+    members: Array,
+    count: int,
+    at: tuple[float, float, float],
+    prior: Six,
+) -> tuple[float, float, float, float, Six]:
+    """Levenberg-Marquardt from `at`: chi-square, position and information, all without the prior's share."""
+    x, y, z = at
+    m0, m1, m2 = sensors.middle[0], sensors.middle[1], sensors.middle[2]
+    damping = 0.0
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, count, x, y, z)
+    q0, q1, q2 = m0 - x, m1 - y, m2 - z
+    w0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
+    w1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
+    w2 = prior[2] * q0 + prior[4] * q1 + prior[5] * q2
+    goal = chi + q0 * w0 + q1 * w1 + q2 * w2
+    for _ in range(_MAX_STEPS):
+        f = 1.0 + damping
+        A = (
+            (a0 + prior[0]) * f, a1 + prior[1], a2 + prior[2],
+            (a3 + prior[3]) * f, a4 + prior[4], (a5 + prior[5]) * f,
+        )  # fmt: skip
+        ok, s0, s1, s2 = _solve(A, g0 + w0, g1 + w1, g2 + w2)
+        if not ok:
+            if damping > 1e8:
+                break
+            damping = max(10.0 * damping, 1e-8)
+            continue
+        promise = s0 * (g0 + w0) + s1 * (g1 + w1) + s2 * (g2 + w2)
+        if promise <= 1e-13 * goal + 1e-20:
+            break
+        trial = _normal(sensors, scan, members, count, x + s0, y + s1, z + s2)
+        q0, q1, q2 = m0 - x - s0, m1 - y - s1, m2 - z - s2
+        v0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
+        v1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
+        v2 = prior[2] * q0 + prior[4] * q1 + prior[5] * q2
+        reached = trial[0] + q0 * v0 + q1 * v1 + q2 * v2
+        if reached <= goal:
+            # a step that keeps what it promised leaves an error far below the promise
+            done = promise < 1e-9 and goal - reached > 0.5 * promise
+            x, y, z, goal = x + s0, y + s1, z + s2, reached
+            chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = trial
+            w0, w1, w2 = v0, v1, v2
+            damping = 0.1 * damping if damping > 1e-6 else 0.0
+            if done:
+                break
+        else:
+            if promise < 1e-11 * (1.0 + goal) or damping > 1e12:
+                break
+            damping = max(10.0 * damping, 1e-3)
+    return chi, x, y, z, (a0, a1, a2, a3, a4, a5)
+
+
+@njit
+def _start(
+    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int, second: bool
+) -> tuple[float, float, float]:
+    """Where to begin: converted measurements weighted by their information, or the crossing of the bearings."""
+    full = planar = False
+    for k in range(count):
+        s = scan.owner[members[k]]
+        full = full or sensors.full[s]
+        planar = planar or sensors.code[s] != 3
+    if full or planar:
+        b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
+        for k in range(count):
+            n = members[k]
+            s = scan.owner[n]
+            if sensors.code[s] == 3 or (full and not sensors.full[s]):
+                continue
+            i, c = scan.information[n], scan.centre[n]
+            a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
+            b0 += i[0] * c[0] + i[1] * c[1] + i[2] * c[2]
+            b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
+            b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
+            last = n
+        ok, x, y, z = _solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
+        if not ok:
+            x, y, z = scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
+        return x, y, z
+    n00 = n01 = n11 = c0 = c1 = u = v = px = py = 0.0
+    for k in range(count):
+        s = scan.owner[members[k]]
+        cos, sin = math.cos(scan.z[members[k], 0]), math.sin(scan.z[members[k], 0])
+        x, y = sensors.place[s, 0], sensors.place[s, 1]
+        n00, n01, n11 = n00 + sin * sin, n01 - sin * cos, n11 + cos * cos
+        c0, c1 = c0 + sin * (sin * x - cos * y), c1 - cos * (sin * x - cos * y)
+        u, v, px, py = u + cos, v + sin, px + x / count, py + y / count
+    det = n00 * n11 - n01 * n01
+    if det > 1e-9 * count * count and not second:
+        return (n11 * c0 - n01 * c1) / det, (n00 * c1 - n01 * c0) / det, sensors.middle[2]
+    # no crossing: go from between the sensors along the mean bearing, as far as the region's middle lies
+    size = math.hypot(u, v)
+    if size < 1e-3:
+        return sensors.middle[0], sensors.middle[1], sensors.middle[2]
+    far = (u * (sensors.middle[0] - px) + v * (sensors.middle[1] - py)) / size
+    far = max(far, 0.3 * math.hypot(sensors.half[0], sensors.half[1]))
+    return px + far * u / size, py + far * v / size, sensors.middle[2]
+
+
+@njit
+def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
+    """Whether the information is above the prior's in every direction (judged by the inverse's trace)."""
+    h = sensors.half
+    height = A[5] * h[2] * h[2] if not flat else 100.0 * _WEAK
+    scaled = (
+        A[0] * h[0] * h[0],
+        A[1] * h[0] * h[1],
+        A[2] * h[0] * h[2],
+        A[3] * h[1] * h[1],
+        A[4] * h[1] * h[2],
+        height,
+    )
+    ok, c0, _, _, c3, _, c5 = _inverse(scaled)
+    return ok and c0 + c3 + c5 <= 1.0 / _WEAK
+
+
+@njit
+def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
+    """The region's prior along those directions only which the information `A` leaves open."""
+    h = sensors.half
+    M = np.empty((3, 3))
+    M[0, 0], M[1, 1], M[2, 2] = A[0] * h[0] * h[0], A[3] * h[1] * h[1], A[5] * h[2] * h[2]
+    M[0, 1] = M[1, 0] = A[1] * h[0] * h[1]
+    M[0, 2] = M[2, 0] = A[2] * h[0] * h[2]
+    M[1, 2] = M[2, 1] = A[4] * h[1] * h[2]
+    values, vectors = np.linalg.eigh(M)
+    P = np.zeros((3, 3))
+    for k in range(3):
+        if values[k] < _WEAK:
+            for i in range(3):
+                for j in range(3):
+                    P[i, j] += vectors[i, k] * vectors[j, k] / (h[i] * h[j])
+    return P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2]
+
+
+@njit
+def _settle(
+    sensors: SensorArrays,
+    scan: ScanArrays,
+    members: Array,
+    count: int,
+    at: tuple[float, float, float],
+    flat: bool,
+) -> tuple[float, float, float, float, Six, Six]:
+    """Descend without prior if the members determine the position, else with it where they do not."""
+    h = sensors.half
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / (h[2] * h[2]) if flat else 0.0)
+    every = (1.0 / (h[0] * h[0]), 0.0, 0.0, 1.0 / (h[1] * h[1]), 0.0, 1.0 / (h[2] * h[2]))
+    _, _, _, _, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, count, at[0], at[1], at[2])
+    pure = _determined(sensors, (a0, a1, a2, a3, a4, a5), flat)
+    if pure:
+        chi, x, y, z, A = _descend(sensors, scan, members, count, at, none)
+        if _determined(sensors, A, flat):
+            return chi, x, y, z, A, none
+    chi, x, y, z, A = _descend(sensors, scan, members, count, at, every)
+    prior = none if _determined(sensors, A, flat) else _weak_prior(sensors, A)
+    chi, x, y, z, A = _descend(sensors, scan, members, count, (x, y, z), prior)
+    if not _determined(sensors, A, flat):
+        # the final step may have moved where directions open up: keep the covariance finite
+        prior = _weak_prior(sensors, A)
+    return chi, x, y, z, A, prior
+
+
+@njit
+def _locate(
+    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int
+) -> tuple[float, float, float, float, Six, Six]:
+    """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed."""
+    full, flat, bearings = False, True, True
+    for k in range(count):
+        s = scan.owner[members[k]]
+        full = full or sensors.full[s]
+        bearings = bearings and sensors.code[s] == 3
+        flat = flat and (sensors.code[s] == 3 or (sensors.code[s] == 0 and sensors.dim[s] == 2))
+    at = _start(sensors, scan, members, count, False)
+    if full:
+        none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        chi, x, y, z, A = _descend(sensors, scan, members, count, at, none)
+        return chi, x, y, z, A, none
+    best = _settle(sensors, scan, members, count, at, flat)
+    if bearings and not best[0] <= _POOR_FIT:
+        other = _settle(sensors, scan, members, count, _start(sensors, scan, members, count, True), flat)
+        if other[0] < best[0] or not math.isfinite(best[0]):
+            best = other
+    return best
+
+
+@njit
+def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, positions: bool) -> tuple[Array, Array, Array]:
+    """Fit a position to each tuple.
+
+    Parameters
+    ----------
+    rows : int32 (K, S)
+        Measurement (row of `scan`) of each sensor, or -1.
+    positions : bool
+        Whether positions and covariances are wanted; else those arrays come back empty.
+
+    Returns
+    -------
+    chi-square (K,), position (K, 3), covariance (K, 3, 3)
+    """
+    total = len(rows)
+    kept = total if positions else 0
+    chis, places, covariances = np.zeros(total), np.zeros((kept, 3)), np.zeros((kept, 3, 3))
+    members = np.zeros(len(sensors.dim), np.int64)
+    for t in range(total):
+        count = 0
+        for s in range(rows.shape[1]):
+            if rows[t, s] >= 0:
+                members[count] = rows[t, s]
+                count += 1
+        chi, x, y, z, A, prior = _locate(sensors, scan, members, count)
+        chis[t] = chi
+        if not positions:
+            continue
+        places[t, 0], places[t, 1], places[t, 2] = x, y, z
+        B = (
+            A[0] + prior[0], A[1] + prior[1], A[2] + prior[2],
+            A[3] + prior[3], A[4] + prior[4], A[5] + prior[5],
+        )  # fmt: skip
+        ok, c0, c1, c2, c3, c4, c5 = _inverse(B)
+        if not ok:
+            # numerically singular: the region's width is all that can be said
+            c0, c3, c5 = sensors.half[0] ** 2, sensors.half[1] ** 2, sensors.half[2] ** 2
+            c1 = c2 = c4 = 0.0
+        C = covariances[t]
+        C[0, 0], C[1, 1], C[2, 2] = c0, c3, c5
+        C[0, 1] = C[1, 0] = c1
+        C[0, 2] = C[2, 0] = c2
+        C[1, 2] = C[2, 1] = c4
+    return chis, places, covariances

@@ -1,0 +1,75 @@
+"""Chi-square gates: how far measurements of one target may lie apart."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc.costs.arrays import SensorArrays
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+# room for the prior's small influence on chi-square values that otherwise could only grow with a tuple
+SLACK = 0.5
+
+
+class Gates(NamedTuple):
+    """Limits on chi-square values."""
+
+    joint: Array
+    """By degrees of freedom."""
+    pair: Array
+    """For each pair of sensors, (S, S); also below what any tuple with a negative cost can have."""
+    future: Array
+    """What detections by sensors t, t + 1, ... can still take off the cost, (S + 1,)."""
+
+
+@lru_cache(maxsize=64)
+def chi_square_quantiles(probability: float, largest: int) -> Array:
+    """Quantiles of the chi-square distribution for 0 .. `largest` degrees of freedom; 0 counts as 1."""
+    if not (isinstance(probability, float) and 0.0 < probability <= 1.0):
+        raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {probability!r}")
+    from scipy.special import gammaincinv
+
+    freedom = np.maximum(np.arange(largest + 1), 1)
+    quantiles = (
+        np.full(largest + 1, np.inf) if probability == 1.0 else 2.0 * gammaincinv(freedom / 2.0, probability)
+    )
+    quantiles.setflags(write=False)
+    return quantiles
+
+
+def degrees_of_freedom(sensors: SensorArrays, detected: Array) -> Array:
+    """Degrees of freedom of the residuals of tuples.
+
+    Components measured, less the coordinates found from them: three if a sensor of the tuple measures full
+    positions, else two (a height found from the differences of slant ranges is not counted, which widens the gate).
+
+    Parameters
+    ----------
+    detected : bool ndarray (K, S)
+
+    Returns
+    -------
+    int ndarray (K,)
+    """
+    coordinates = np.where(detected @ sensors.full.astype(np.int64) > 0, 3, 2)
+    return np.maximum(detected @ sensors.dim - coordinates, 0)
+
+
+def make_gates(sensors: SensorArrays, probability: float) -> Gates:
+    """Gates for a scene's sensors; with probability 1 only the sign of the cost limits the tuples."""
+    joint = chi_square_quantiles(float(probability), int(sensors.dim.sum()))
+    count = len(sensors.dim)
+    gain = np.maximum(sensors.gain, 0.0)
+    future = np.zeros(count + 1)
+    future[:count] = np.cumsum(gain[::-1])[::-1]
+    eye = np.eye(count, dtype=np.bool_)
+    both = eye[:, None, :] | eye[None, :, :]
+    freedom = degrees_of_freedom(sensors, both.reshape(-1, count)).reshape(count, count)
+    # a tuple with these two costs at least chi / 2 + base - all gains that it can have
+    most = gain.sum() - (gain - sensors.gain)[:, None] - (gain - sensors.gain)[None, :] - sensors.base
+    return Gates(joint, np.minimum(joint[freedom], 2.0 * np.maximum(most, 0.0) + SLACK), future)

@@ -1,0 +1,176 @@
+"""Candidate tuples grown sensor by sensor from the compatible pairs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc._compiled import njit
+from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
+from assoc.costs.estimation import fit
+from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
+from assoc.costs.guard import refuse
+from assoc.costs.pairs import Pairs
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+# an azimuth predicted with a larger standard deviation (rad) is not trusted to rule measurements out
+_TRUSTED = 0.2
+# grown tuples are fitted in blocks of about this size
+_BLOCK = 500_000
+
+
+@njit
+def _extend(
+    rows: Array, t: int, second: Array, start: Array, azimuth: Array, middle: Array, half: Array, limit: int
+) -> tuple[Array, Array, int]:
+    """Grow each tuple by each measurement of sensor t that pairs with all its members.
+
+    With `middle` and `half` only azimuths in that interval are taken. Stops once `limit` are exceeded.
+
+    Returns
+    -------
+    parent (K,), measurement (K,) and the number of rows that were grown
+    """
+    parent, added = np.empty(1024, np.int64), np.empty(1024, np.int32)
+    count = 0
+    for k in range(len(rows)):
+        if count > limit:
+            return parent[:count], added[:count], k
+        lead = 0
+        while rows[k, lead] < 0:
+            lead += 1
+        a = rows[k, lead]
+        for e in range(start[a, t], start[a, t + 1]):
+            b = second[e]
+            if len(half) and half[k] < math.pi:
+                off = azimuth[b] - middle[k]
+                off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+                if abs(off) > half[k]:
+                    continue
+            fits = True
+            for s in range(lead + 1, t):
+                c = rows[k, s]
+                if c < 0:
+                    continue
+                low, high = start[c, t], start[c, t + 1]
+                while low < high:
+                    mid = (low + high) // 2
+                    if second[mid] < b:
+                        low = mid + 1
+                    else:
+                        high = mid
+                if low == start[c, t + 1] or second[low] != b:
+                    fits = False
+                    break
+            if not fits:
+                continue
+            if count == len(parent):
+                longer, more = np.empty(2 * count, np.int64), np.empty(2 * count, np.int32)
+                longer[:count], more[:count] = parent, added
+                parent, added = longer, more
+            parent[count], added[count] = k, b
+            count += 1
+    return parent[:count], added[:count], len(rows)
+
+
+def _windows(
+    sensors: SensorArrays, scan: ScanArrays, rows: Array, chi: Array, t: int, limit: float
+) -> tuple[Array, Array]:
+    """Azimuths at bearing sensor t for each tuple: middle and half width; pi where all must be tried."""
+    _, position, covariance = fit(sensors, scan, rows, True)
+    dx, dy = position[:, 0] - sensors.place[t, 0], position[:, 1] - sensors.place[t, 1]
+    away = np.maximum(dx * dx + dy * dy, 1e-12)
+    u, v = -dy / away, dx / away
+    variance = u * u * covariance[:, 0, 0] + 2 * u * v * covariance[:, 0, 1] + v * v * covariance[:, 1, 1]
+    # the chi-square value of the grown tuple may be at most `limit`; half as much again for bent models
+    room = np.maximum(limit - chi, 1.0) if math.isfinite(limit) else np.full(len(rows), np.inf)
+    half = 1.5 * np.sqrt(room * (variance + sensors.covariance[t, 0, 0]))
+    return np.arctan2(dy, dx), np.where(variance < _TRUSTED**2, half, math.pi)
+
+
+def grow(
+    sensors: SensorArrays, scan: ScanArrays, pairs: Pairs, gates: Gates, *, number: int, max_tuples: int
+) -> tuple[Array, Array]:
+    """Candidate tuples of two or more measurements.
+
+    A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint gate of
+    its degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms. On the way, a
+    tuple is given up only if no tuple that contains it can be a candidate: chi-square values only grow with a
+    tuple, so one above the largest gate ahead, or above all that further detections can take off the cost, is of
+    no use.
+
+    Returns
+    -------
+    rows (K, S) : int32
+        Row of `scan` for each sensor, or -1.
+    costs (K,)
+
+    Raises
+    ------
+    LimitExceededError
+        More than `max_tuples` tuples; `number` is the scan to name.
+    """
+    count = len(sensors.dim)
+    second_owner = scan.owner[pairs.second]
+    rows, chi, worth = np.empty((0, count), np.int32), np.empty(0), np.empty(0)
+    for t in range(1, count):
+        grown_rows, grown_chi = _grown(sensors, scan, pairs, gates, rows, chi, t, number, max_tuples)
+        chosen = np.flatnonzero(second_owner == t) if count > 2 else slice(None)
+        new = np.full((len(pairs.first[chosen]), count), -1, dtype=np.int32)
+        new[np.arange(len(new)), scan.owner[pairs.first[chosen]]] = pairs.first[chosen]
+        new[:, t] = pairs.second[chosen]
+        rows = np.concatenate([rows, new, grown_rows])
+        chi = np.concatenate([chi, pairs.chi[chosen], grown_chi])
+        worth = (rows >= 0) @ sensors.gain - sensors.base
+        hopeful = 0.5 * chi < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
+        if not hopeful.all():
+            rows, chi, worth = rows[hopeful], chi[hopeful], worth[hopeful]
+        if len(rows) > max_tuples:
+            raise refuse(number, len(rows), max_tuples)
+    costs = 0.5 * chi - worth
+    good = (chi <= gates.joint[degrees_of_freedom(sensors, rows >= 0)]) & (costs < 0.0)
+    return rows[good], costs[good]
+
+
+def _grown(
+    sensors: SensorArrays,
+    scan: ScanArrays,
+    pairs: Pairs,
+    gates: Gates,
+    rows: Array,
+    chi: Array,
+    t: int,
+    number: int,
+    max_tuples: int,
+) -> tuple[Array, Array]:
+    """The tuples grown by sensor t that may still become candidates, and their chi-square values."""
+    count = rows.shape[1]
+    later = int(sensors.dim[t + 1 :].sum())
+    largest = float(gates.joint[-1])
+    kept_rows, kept_chi, so_far = [np.empty((0, count), np.int32)], [np.empty(0)], len(rows)
+    low = 0
+    while low < len(rows):
+        part = slice(low, low + _BLOCK)
+        middle = half = np.empty(0)
+        if sensors.code[t] == BEARING:
+            middle, half = _windows(sensors, scan, rows[part], chi[part], t, largest)
+        parent, added, done = _extend(
+            rows[part], t, pairs.second, pairs.start, scan.z[:, 0].copy(), middle, half, _BLOCK
+        )
+        low += done
+        grown = rows[part][parent]
+        grown[:, t] = added
+        value = fit(sensors, scan, grown, False)[0]
+        detected = grown >= 0
+        freedom = np.minimum(degrees_of_freedom(sensors, detected) + later + 1, len(gates.joint) - 1)
+        hopeful: Array = value <= gates.joint[freedom] + SLACK
+        hopeful &= 0.5 * value < detected @ sensors.gain - sensors.base + gates.future[t + 1] + SLACK
+        kept_rows.append(grown[hopeful])
+        kept_chi.append(value[hopeful])
+        so_far += len(kept_chi[-1])
+        if so_far > max_tuples:
+            raise refuse(number, len(rows) + (so_far - len(rows)) * len(rows) / low, max_tuples)
+    return np.concatenate(kept_rows), np.concatenate(kept_chi)

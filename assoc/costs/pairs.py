@@ -1,0 +1,269 @@
+"""Pairs of measurements of two sensors that may be one target: coarse search, then the chi-square gate."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._compiled import njit
+from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
+from assoc.costs.estimation import fit
+from assoc.costs.gating import Gates
+from assoc.costs.guard import refuse
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+# up to so many combinations looking at each is quicker than a tree
+_BRUTE = 2_000_000
+# coarse pairs are fitted in blocks of about this size, so that memory grows with the pairs kept
+_BLOCK = 500_000
+
+
+class Pairs(NamedTuple):
+    """Compatible pairs of measurements, ordered by first, then second."""
+
+    first: Array
+    second: Array
+    """Rows of the scan's arrays; the second always belongs to a later sensor."""
+    chi: Array
+    """Chi-square value of each pair."""
+    start: Array
+    """(N, S + 1): partners of measurement n in sensor t are rows start[n, t] to start[n, t + 1]."""
+
+
+@njit
+def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
+    """Whether two measurements may pass a gate of `limit`; errs only towards True."""
+    s, t = scan.owner[n], scan.owner[m]
+    if sensors.code[s] == 3 or sensors.code[t] == 3:
+        if sensors.code[s] == sensors.code[t]:
+            return True
+        if sensors.code[s] == 3:
+            n, m, t = m, n, s
+        dx, dy = scan.centre[n, 0] - sensors.place[t, 0], scan.centre[n, 1] - sensors.place[t, 1]
+        ball = 2.0 * limit * (scan.spread[n, 0] + scan.spread[n, 3])
+        away = dx * dx + dy * dy
+        if ball >= away:
+            return True
+        off = scan.z[m, 0] - math.atan2(dy, dx)
+        off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+        return abs(off) <= math.asin(math.sqrt(ball / away)) + math.sqrt(
+            2.0 * limit * sensors.covariance[t, 0, 0]
+        )
+    # for bent measurement models the two ellipsoids are added up, not their covariances
+    if sensors.code[s] != 0 or sensors.code[t] != 0:
+        limit *= 2.0
+    a, b = scan.spread[n], scan.spread[m]
+    dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
+    c0, c1, c3 = a[0] + b[0], a[1] + b[1], a[3] + b[3]
+    if dx * dx + dy * dy > limit * (c0 + c3):
+        return False
+    det = c0 * c3 - c1 * c1
+    if det > 1e-12 * c0 * c3 and dx * dx * c3 - 2.0 * dx * dy * c1 + dy * dy * c0 > limit * det:
+        return False
+    if not (sensors.full[s] and sensors.full[t]):
+        return True
+    dz = scan.centre[n, 2] - scan.centre[m, 2]
+    c2, c4, c5 = a[2] + b[2], a[4] + b[4], a[5] + b[5]
+    if dz * dz > limit * c5:
+        return False
+    if not det > 1e-12 * c0 * c3:
+        return True
+    # condition z on x and y: the Mahalanobis distance is the sum of the two parts
+    k0, k1 = (c2 * c3 - c4 * c1) / det, (c4 * c0 - c2 * c1) / det
+    rest = c5 - k0 * c2 - k1 * c4
+    if not rest > 1e-12 * c5:
+        return True
+    off = dz - k0 * dx - k1 * dy
+    plane = (dx * dx * c3 - 2.0 * dx * dy * c1 + dy * dy * c0) / det
+    return plane + off * off / rest <= limit * (1.0 + 1e-9)
+
+
+@njit
+def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, high: int) -> Array:
+    """All near pairs whose first is in low .. high, int32 (K, 2), by looking at every combination."""
+    found = np.empty((1024, 2), np.int32)
+    count = 0
+    total = len(scan.z)
+    for n in range(low, high):
+        s = scan.owner[n]
+        for m in range(scan.start[s + 1], total):
+            if _near(sensors, scan, n, m, limits[s, scan.owner[m]]):
+                if count == len(found):
+                    wider = np.empty((2 * count, 2), np.int32)
+                    wider[:count] = found
+                    found = wider
+                found[count, 0], found[count, 1] = n, m
+                count += 1
+    return found[:count]
+
+
+@njit
+def _keep_near(sensors: SensorArrays, scan: ScanArrays, pairs: Array, limit: float) -> Array:
+    """The near ones among given pairs."""
+    count = 0
+    for k in range(len(pairs)):
+        if _near(sensors, scan, pairs[k, 0], pairs[k, 1], limit):
+            pairs[count] = pairs[k]
+            count += 1
+    return pairs[:count]
+
+
+def _expand(rows: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Rows repeated with each index from low to high."""
+    counts = high - low
+    offsets = np.repeat(low - (np.cumsum(counts) - counts), counts)
+    return np.repeat(rows, counts), np.arange(counts.sum()) + offsets
+
+
+def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[tuple[Array, float]]:
+    """Blocks of coarse pairs, each with the share of the search that is done after it."""
+    total = len(scan.z)
+    later = total - scan.start[scan.owner + 1]
+    work = np.concatenate([[0], np.cumsum(later)])
+    if work[-1] <= _BRUTE or (sensors.code == BEARING).all():
+        low = 0
+        while low < total and work[low] < work[-1]:
+            high = max(low + 1, int(np.searchsorted(work, work[low] + _BRUTE, side="right")) - 1)
+            yield _near_all(sensors, scan, limits, low, high), float(work[high] / work[-1])
+            low = high
+        return
+    done = 0.0
+    for s, t in itertools.combinations(range(len(sensors.dim)), 2):
+        size = float(np.diff(scan.start)[[s, t]].prod())
+        for pairs, share in _between(sensors, scan, s, t, float(limits[s, t])):
+            yield _keep_near(sensors, scan, pairs, limits[s, t]), (done + share * size) / work[-1]
+        done += size
+
+
+def _between(
+    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
+) -> Iterator[tuple[Array, float]]:
+    """Blocks of pairs of sensors s and t that hold all near ones, found by k-d tree or by sorted azimuths."""
+    if sensors.code[s] == BEARING and sensors.code[t] == BEARING:
+        yield from _everything(scan, s, t)
+    elif sensors.code[s] == BEARING or sensors.code[t] == BEARING:
+        yield from _by_azimuth(sensors, scan, s, t, limit)
+    else:
+        yield from _by_tree(sensors, scan, s, t, limit)
+
+
+def _everything(scan: ScanArrays, s: int, t: int) -> Iterator[tuple[Array, float]]:
+    rows = np.arange(scan.start[s], scan.start[s + 1])
+    width = int(scan.start[t + 1] - scan.start[t])
+    step = max(1, _BLOCK // max(width, 1))
+    for k in range(0, len(rows), step):
+        part = rows[k : k + step]
+        low = np.full(len(part), scan.start[t])
+        yield (
+            np.stack(_expand(part, low, low + width), axis=1).astype(np.int32),
+            min(1.0, (k + step) / len(rows)),
+        )
+
+
+def _by_azimuth(
+    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
+) -> Iterator[tuple[Array, float]]:
+    swap = sensors.code[s] == BEARING
+    located, bearing = (t, s) if swap else (s, t)
+    rows = np.arange(scan.start[located], scan.start[located + 1])
+    low, high = int(scan.start[bearing]), int(scan.start[bearing + 1])
+    azimuths = scan.z[low:high, 0]
+    d = scan.centre[rows, :2] - sensors.place[bearing, :2]
+    ball = 2.0 * limit * (scan.spread[rows, 0] + scan.spread[rows, 3])
+    ratio = np.sqrt(ball / np.maximum((d**2).sum(axis=1), 1e-300))
+    half = np.where(ratio < 1.0, np.arcsin(np.minimum(ratio, 1.0)), math.pi)
+    half = np.minimum(half + math.sqrt(2.0 * limit * sensors.covariance[bearing, 0, 0]) + 1e-12, math.pi)
+    middle = np.arctan2(d[:, 1], d[:, 0])
+    # the circle unrolled twice, so that an interval through +-pi is one run
+    unrolled = np.concatenate([azimuths - 2 * math.pi, azimuths, azimuths + 2 * math.pi])
+    first = np.searchsorted(unrolled, middle - half, side="left")
+    last = np.minimum(np.searchsorted(unrolled, middle + half, side="right"), first + (high - low))
+    counts = np.cumsum(last - first)
+    k = 0
+    while k < len(rows):
+        so_far = counts[k - 1] if k else 0
+        stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
+        located_rows, where = _expand(rows[k:stop], first[k:stop], last[k:stop])
+        bearing_rows = low + where % (high - low) if high > low else where
+        columns = (bearing_rows, located_rows) if swap else (located_rows, bearing_rows)
+        yield np.stack(columns, axis=1).astype(np.int32), stop / len(rows)
+        k = stop
+
+
+def _by_tree(
+    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
+) -> Iterator[tuple[Array, float]]:
+    from scipy.spatial import cKDTree
+
+    axes = 3 if sensors.full[s] and sensors.full[t] else 2
+    a, b = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
+    if a.start == a.stop or b.start == b.stop:
+        return
+    if sensors.code[s] != 0 or sensors.code[t] != 0:
+        limit *= 2.0
+    radius = np.sqrt(limit * (_widest(scan.spread[a], axes) + _widest(scan.spread[b], axes).max())) * (
+        1 + 1e-9
+    )
+    tree = cKDTree(scan.centre[b, :axes])
+    points = scan.centre[a, :axes]
+    counts = np.cumsum(tree.query_ball_point(points, radius, return_length=True))
+    k = 0
+    while k < len(points):
+        so_far = counts[k - 1] if k else 0
+        stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
+        lists = tree.query_ball_point(points[k:stop], radius[k:stop])
+        lengths = np.diff(counts[k:stop], prepend=so_far)
+        pairs = np.empty((int(lengths.sum()), 2), dtype=np.int32)
+        pairs[:, 0] = np.repeat(np.arange(a.start + k, a.start + stop), lengths)
+        pairs[:, 1] = np.fromiter(itertools.chain.from_iterable(lists), dtype=np.int64, count=len(pairs))
+        pairs[:, 1] += b.start
+        yield pairs, stop / len(points)
+        k = stop
+
+
+def _widest(spread: Array, axes: int) -> Array:
+    """Largest variance in any direction, of x, y or of x, y, z."""
+    full = spread[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    return np.asarray(np.linalg.eigvalsh(full[:, :axes, :axes])[:, -1])
+
+
+def compatible_pairs(
+    sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int
+) -> Pairs:
+    """All pairs of measurements of different sensors that pass the pair gate.
+
+    Raises
+    ------
+    LimitExceededError
+        More than `max_tuples` pairs pass; `number` is the scan to name.
+    """
+    count = len(sensors.dim)
+    kept, values, so_far = [np.empty((0, 2), np.int32)], [np.empty(0)], 0
+    for pairs, share in _coarse(sensors, scan, gates.pair):
+        for k in range(0, len(pairs), _BLOCK):
+            block = pairs[k : k + _BLOCK]
+            rows = np.full((len(block), count), -1, dtype=np.int32)
+            owners = scan.owner[block]
+            np.put_along_axis(rows, owners, block, axis=1)
+            chi = fit(sensors, scan, rows, False)[0]
+            passed = chi <= gates.pair[owners[:, 0], owners[:, 1]]
+            kept.append(block[passed])
+            values.append(chi[passed])
+            so_far += len(kept[-1])
+            if so_far > max_tuples:
+                raise refuse(number, so_far / max(share, 1e-9), max_tuples)
+    pairs, chi = np.concatenate(kept), np.concatenate(values)
+    total = len(scan.z)
+    keys = pairs[:, 0].astype(np.int64) * total + pairs[:, 1]
+    if (np.diff(keys) < 0).any():
+        order = np.argsort(keys, kind="stable")
+        keys, pairs, chi = keys[order], pairs[order], chi[order]
+    start = np.searchsorted(keys, np.arange(total)[:, None] * total + scan.start[None, :])
+    return Pairs(
+        np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1]), chi, start.astype(np.int64)
+    )
