@@ -133,3 +133,16 @@ def radar_field(targets: int, seed: int) -> Scene:
     ]
     positions = region[:, 0] + (region[:, 1] - region[:, 0]) * rng.random((targets, 3))
     return _single_scan(sensors, positions, region, rng, f"radar field {targets}")
+
+
+def three_radar(seed: int) -> Scene:
+    """Return the scene of the ant colony paper: three targets, three radars, 100 scans.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same scene.
+    """
+    from assoc.simulation import simulate
+
+    return simulate("three-radar", seed=seed)

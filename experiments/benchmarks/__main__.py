@@ -1,0 +1,108 @@
+"""The program: ``python -m experiments.benchmarks [--quick] [--families ...] [--seeds N] [--csv FILE]``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.benchmarks.families import Case
+    from experiments.benchmarks.rows import Row
+
+# One thread for numerical libraries, before they are loaded: our solvers are measured on one.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+FAMILIES = ("paper", "gated", "ghost", "known optimum", "random axial", "planted", "scale", "kbest")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.benchmarks",
+        description="Run our solvers and their peers on the benchmark families and write the report.",
+    )
+    parser.add_argument("--quick", action="store_true", help="small instances and few seeds, under 3 minutes")
+    parser.add_argument("--families", nargs="+", metavar="NAME", help=f"only these: {', '.join(FAMILIES)}")
+    parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
+    parser.add_argument("--seeds", type=int, metavar="N", help="seeds per size instead of each family's own")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="rows (default docs/benchmarks.csv)")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="report (default: beside the rows)")
+    parser.add_argument("--update", action="store_true", help="keep the rows of what is not run from the CSV")
+    parser.add_argument(
+        "--report-only", action="store_true", help="run nothing, write the report from the CSV"
+    )
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the benchmark; returns the exit code."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    families = [name.replace("_", " ") for name in options.families or FAMILIES]
+    for name in families:
+        if name not in FAMILIES:
+            parser.error(f"--families: unknown {name!r}; known: {', '.join(FAMILIES)}")
+    if options.seeds is not None and options.seeds < 1:
+        parser.error(f"--seeds: expected at least 1, got {options.seeds}")
+    table: Path = options.csv or Path("docs/benchmarks-quick.csv" if options.quick else "docs/benchmarks.csv")
+    report: Path = options.markdown or table.with_suffix(".md")
+    if options.report_only and not table.exists():
+        parser.error(f"--report-only: {table} does not exist")
+
+    from experiments.benchmarks import report as reporting
+    from experiments.benchmarks import rows as storage
+
+    def write(minutes: float | None) -> None:
+        command = "make bench-quick" if options.quick else "make bench"
+        storage.save(table, rows)
+        report.write_text(reporting.render(rows, minutes, command), encoding="utf-8")
+
+    rows: list[Row] = []
+    if options.report_only:
+        rows = storage.load(table)
+        write(None)
+        return 0
+    start = time.perf_counter()
+    if options.update and table.exists():
+        rows = [r for r in storage.load(table) if not _to_run(r, families, options.sizes)]
+    for found in _measure(families, options):
+        rows += found
+        rows.sort(key=lambda row: FAMILIES.index(row.family))
+        # After every case, so that an interrupted run keeps what it has measured.
+        write((time.perf_counter() - start) / 60 if not options.update else None)
+    print(f"{len(rows)} rows in {table}, report in {report}")
+    return 0
+
+
+def _to_run(what: Row | Case, families: list[str], sizes: list[str] | None) -> bool:
+    return what.family in families and (sizes is None or what.size in sizes)
+
+
+def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[Row]]:
+    """Yield the rows of each case as it is done."""
+    from experiments.benchmarks import ranking, run, scale
+    from experiments.benchmarks.families import cases
+
+    def log(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    chosen = [case for case in cases(options.quick) if _to_run(case, families, options.sizes)]
+    run.warm_up(
+        {entry.solver for case in chosen for entry in case.ours},
+        {entry.solver for case in chosen for entry in case.peers},
+    )
+    for case in chosen:
+        yield run.run_case(case, options.seeds, log)
+    if "scale" in families:
+        yield scale.run(options.quick, options.seeds, log)
+    if "kbest" in families:
+        yield ranking.run(options.quick, options.seeds, log)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

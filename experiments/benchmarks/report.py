@@ -1,0 +1,156 @@
+"""The Markdown report: goals first, then one table for each family."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from statistics import median
+
+from experiments.benchmarks.goals import Results, judge
+from experiments.benchmarks.rows import Row
+
+ABOUT = {
+    "paper": "The 100 scans of the ant colony paper's scene: three targets, three radars, P_d 0.9.",
+    "gated": "Position sensors (0.1 km, P_d 0.9) over a box, 10 % false alarms; sensors x targets.",
+    "ghost": "Three bearing-only sensors (5 mrad, P_d 0.95) over 100 x 100 km, whose lines cross in many "
+    "places where nothing is; number of targets.",
+    "known optimum": "Axial n x n x n with a known unique optimum (Grundel & Pardalos).",
+    "random axial": "Axial n x n x n, integer costs uniform in 0..99.",
+    "planted": "With dummies and a planted optimum, by number of sensors.",
+    "scale": "Three radars, 0.1 targets per square kilometre, from the scene to the Solution, each run in a "
+    "process of its own; number of targets.",
+    "kbest": "The k best solutions; the time for one optimum (exact) beside it.",
+}
+
+HOW = """\
+Instances are code and seed (`experiments/instances`); the seeds here, from 1000 on, tuned nothing. Our
+solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers get the same tuples in
+the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both cores, `scip_1` and HiGHS (scipy, gap
+1e-9) on one; `sequential` assigns sensor after sensor with scipy, as most trackers do; `nrl_tracker` needs a
+dense tensor and takes part where that has at most 8 million elements. Every answer's feasibility and cost
+are checked by code that no solver shares.
+
+*Found*: runs whose cost is the reference: the optimum (by construction, or proven by anyone) or else,
+marked ~, the best cost anyone has. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
+known optimum, so their time is the time to it; `lagrangian@0.1%` stops at that gap. *Speed* is the median
+over instances of the fastest peer's time to a proven optimum divided by this solver's time."""
+
+
+def render(rows: Sequence[Row], minutes: float | None, command: str) -> str:
+    """Return the report.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        What was measured.
+    minutes : float or None
+        How long the run took.
+    command : str
+        How to repeat it.
+    """
+    parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW, "", "## Goals", "", _goals(rows)]
+    results = Results(rows)
+    for family in dict.fromkeys(row.family for row in rows):
+        parts += ["", f"## {family}", "", ABOUT.get(family, ""), "", _table(results, family)]
+    return "\n".join(parts) + "\n"
+
+
+def _preface(minutes: float | None, command: str) -> str:
+    versions = ", ".join(
+        f"{name} {version}"
+        for name in ("numpy", "scipy", "numba", "ortools", "nrl-tracker")
+        if (version := _version(name))
+    )
+    took = "" if minutes is None else f", {minutes:.0f} minutes"
+    return (
+        f"Written by `{command}`{took}, on {os.cpu_count()} cores of {_processor()}, "
+        f"Python {platform.python_version()}, {versions}. Do not edit; raw numbers in the CSV beside it."
+    )
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _goals(rows: Sequence[Row]) -> str:
+    verdicts = judge(rows)
+    firm = [v for v in verdicts if not v.stretch]
+    stretch = [v for v in verdicts if v.stretch]
+    lines = [
+        f"{sum(v.met for v in firm)} of {len(firm)} goals met, "
+        f"and {sum(v.met for v in stretch)} of {len(stretch)} stretch goals (marked *).",
+        "",
+        "| family | size | goal | measured | met |",
+        "|---|---|---|---|---|",
+    ]
+    for v in verdicts:
+        star = "* " if v.stretch else ""
+        lines.append(
+            f"| {v.family} | {v.size} | {star}{v.goal} | {v.measured} | {'yes' if v.met else '**no**'} |"
+        )
+    return "\n".join(lines)
+
+
+def _table(results: Results, family: str) -> str:
+    extra = {"scale": "peak MB", "kbest": "ranked"}.get(family)
+    head = ["size", "tuples", "solver", "limit s", "runs", "found", "excess median %", "excess worst %",
+            "gap median %", "median time", "speed"]  # fmt: skip
+    if extra:
+        head.append(extra)
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for size in results.sizes(family):
+        rows = results.of(family, size)
+        tuples = median(row.tuples for row in rows)
+        for solver, limit in dict.fromkeys((row.solver, row.limit) for row in _ours_first(rows)):
+            mine = [row for row in rows if (row.solver, row.limit) == (solver, limit)]
+            cells = [size, f"{tuples:,.0f}", solver, f"{limit:g}" if limit else "", str(len(mine))]
+            cells += _figures(results, mine)
+            if extra:
+                cells.append(f"{median(row.extra for row in mine):.0f}")
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _ours_first(rows: Sequence[Row]) -> list[Row]:
+    return sorted(rows, key=lambda row: row.peer)
+
+
+def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
+    excess = [row.excess if math.isfinite(row.cost) else math.inf for row in rows]
+    found = f"{sum(row.hit for row in rows)}" + ("" if all(row.proven for row in rows) else "~")
+    speeds = [results.fastest_peer(row) / row.seconds for row in rows]
+    speed = median(speeds)
+    return [
+        found,
+        _percent(median(excess)),
+        _percent(max(excess)),
+        _percent(median(row.gap for row in rows)),
+        _time(median(row.seconds for row in rows)),
+        f"{speed:.3g}" if math.isfinite(speed) and speed > 0 else "-",
+    ]
+
+
+def _percent(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return "0" if abs(value) < 1e-9 else f"{100 * value:.3g}"
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"

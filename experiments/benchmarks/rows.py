@@ -1,0 +1,106 @@
+"""One measurement is one row; rows go to CSV and come back."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+HIT = 1e-6
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one solver did on one instance.
+
+    Attributes
+    ----------
+    family, size : str
+        The instance family and its size, as in ``gated``, ``3x300``.
+    seed, item : int
+        Seed of the instance, and its number where a seed gives several (scans).
+    tuples : int
+        M of the problem.
+    solver : str
+        Name; variants carry a suffix, as in ``lagrangian@0.1%``.
+    peer : bool
+        Whether it is somebody else's.
+    limit : float
+        Time limit it was given, seconds.
+    cost, bound : float
+        Cost as our checker reads it (``inf``: no solution in time), and the solver's lower bound
+        (``-inf``: none).
+    seconds : float
+        Wall time from the tuples to the answer.
+    status : str
+        "optimal" where the solver itself proves it, "feasible", or "none".
+    reference : float
+        The optimum where it is known by construction or was proven, else the best cost anyone found.
+    proven : bool
+        Whether the reference is the optimum.
+    extra : float
+        Peak memory in MB (family scale), solutions ranked (family kbest); 0 elsewhere.
+    """
+
+    family: str
+    size: str
+    seed: int
+    item: int
+    tuples: int
+    solver: str
+    peer: bool
+    limit: float
+    cost: float
+    bound: float
+    seconds: float
+    status: str
+    reference: float = math.nan
+    proven: bool = False
+    extra: float = 0.0
+
+    @property
+    def gap(self) -> float:
+        """Cost less bound, relative to max(1, abs(cost))."""
+        return (self.cost - self.bound) / max(1.0, abs(self.cost)) if math.isfinite(self.cost) else math.inf
+
+    @property
+    def excess(self) -> float:
+        """Cost above the reference, relative to max(1, abs(reference))."""
+        return (self.cost - self.reference) / max(1.0, abs(self.reference))
+
+    @property
+    def hit(self) -> bool:
+        """Whether the cost is the reference, to 1e-6 relative."""
+        return self.excess <= HIT
+
+
+_DERIVED = ("gap", "excess")
+
+
+def save(path: Path, rows: Iterable[Row]) -> None:
+    """Write rows as CSV, with gap and excess as columns for readers."""
+    names = [field.name for field in fields(Row)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*names, *_DERIVED])
+        for row in rows:
+            values = [*asdict(row).values(), *(getattr(row, name) for name in _DERIVED)]
+            writer.writerow([f"{value:.10g}" if isinstance(value, float) else value for value in values])
+
+
+def load(path: Path) -> list[Row]:
+    """Read rows written by `save`."""
+    rows = []
+    with path.open(newline="", encoding="utf-8") as file:
+        for record in csv.DictReader(file):
+            values: dict[str, object] = {}
+            for field in fields(Row):
+                text = record[field.name]
+                if field.type == "bool":
+                    values[field.name] = text == "True"
+                else:
+                    values[field.name] = {"int": int, "float": float, "str": str}[str(field.type)](text)
+            rows.append(Row(**values))  # type: ignore[arg-type]
+    return rows

@@ -1,0 +1,150 @@
+"""Run one case: peers and exact methods first (they give the reference), then the rest."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import assoc
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+from assoc.solution import TracePoint
+from experiments import peers
+from experiments.benchmarks import FIRST_SEED
+from experiments.benchmarks.families import Case, Entry, Instance
+from experiments.benchmarks.rows import Row
+from experiments.checking import check_answer
+from experiments.instances import synthetic
+
+PROVING = ("exact", "milp")
+
+
+@contextlib.contextmanager
+def one_core() -> Iterator[None]:
+    """Pin this thread, and the threads it starts, to one core (where the system can)."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def warm_up(ours: set[str], others: set[str]) -> None:
+    """Compile the kernels and import the packages of all solvers on small problems."""
+    small = [synthetic.planted(s, 0, targets=6)[0] for s in (2, 3, 4)]
+    small += [synthetic.axial_random(5, 0), synthetic.planar_random(6, 0)]
+    for name in sorted(ours):
+        for problem in small:
+            with contextlib.suppress(InfeasibleError):
+                assoc.assign(problem, name, time_limit=1.0)
+    peers.warm_up(sorted(others))
+
+
+def run_case(
+    case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None
+) -> list[Row]:
+    """Run everybody on every instance of a case.
+
+    Parameters
+    ----------
+    case : Case
+        What to run.
+    seeds : int, optional
+        Number of seeds instead of the case's own.
+    log : callable
+        Told what was done, line by line.
+    """
+    rows: list[Row] = []
+    for seed in range(FIRST_SEED, FIRST_SEED + (seeds or case.seeds)):
+        for item, instance in enumerate(case.make(seed)):
+            found = _run_instance(case, instance, seed, item)
+            rows += found
+            if item == 0:
+                log(f"{case.family} {case.size} seed {seed}: " + ", ".join(_brief(row) for row in found))
+    return rows
+
+
+def _brief(row: Row) -> str:
+    return f"{row.solver} {row.cost:.7g} {row.seconds:.3g}s"
+
+
+def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[Row]:
+    problem = instance.problem
+    blank = Row(
+        case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, ""
+    )
+    rows = [
+        _run_peer(entry, problem, blank) for entry in case.peers if peers.available(entry.solver, problem)
+    ]
+    first = [entry for entry in case.ours if entry.solver in PROVING]
+    rows += [_run_ours(entry, problem, blank, None) for entry in first]
+    optimum = instance.optimum
+    if optimum is None:
+        optimum = _proven_optimum(rows)
+    rows += [_run_ours(entry, problem, blank, optimum) for entry in case.ours if entry not in first]
+    reference = optimum if optimum is not None else min(row.cost for row in rows)
+    return [replace(row, reference=reference, proven=optimum is not None) for row in rows]
+
+
+def _proven_optimum(rows: list[Row]) -> float | None:
+    """Return the least cost that any method says is proven."""
+    proven = [row for row in rows if row.status == "optimal"]
+    return min((row.cost for row in proven), default=None)
+
+
+def _run_peer(entry: Entry, problem: AssignmentProblem, blank: Row) -> Row:
+    answer = peers.PEERS[entry.solver](problem, entry.limit)
+    status = "optimal" if answer.proven else "feasible" if math.isfinite(answer.cost) else "none"
+    return replace(
+        blank,
+        solver=entry.label,
+        peer=True,
+        limit=entry.limit,
+        cost=answer.cost,
+        bound=-math.inf if answer.bound is None else answer.bound,
+        seconds=answer.seconds,
+        status=status,
+    )
+
+
+def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: float | None) -> Row:
+    def stop(point: TracePoint) -> bool:
+        """Whether the entry's gap, or else the known optimum, is reached."""
+        if entry.stop_gap is not None:
+            return point.cost - point.lower_bound <= entry.stop_gap * max(1.0, abs(point.cost))
+        return optimum is not None and point.cost <= optimum + 1e-9 * max(1.0, abs(optimum))
+
+    watched = entry.solver not in PROVING and entry.solver != "lagrangian"
+    callback = stop if watched or entry.stop_gap is not None else None
+    with one_core():
+        start = time.perf_counter()
+        try:
+            # A new problem each time: nothing that an earlier solver prepared may be left in it.
+            fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
+            solution = assoc.assign(fresh, entry.solver, time_limit=entry.limit, callback=callback)
+        except InfeasibleError:
+            seconds = time.perf_counter() - start
+            return replace(blank, solver=entry.label, limit=entry.limit, seconds=seconds, status="none")
+        seconds = time.perf_counter() - start
+    cost = check_answer(problem, solution.tuples)
+    if abs(cost - solution.cost) > 1e-7 * max(1.0, abs(cost)):
+        raise AssertionError(f"{entry.solver}: says {solution.cost}, its tuples cost {cost}")
+    if optimum is not None and solution.lower_bound > optimum + 1e-6 * max(1.0, abs(optimum)):
+        raise AssertionError(f"{entry.solver}: bound {solution.lower_bound} above the optimum {optimum}")
+    return replace(
+        blank,
+        solver=entry.label,
+        limit=entry.limit,
+        cost=cost,
+        bound=solution.lower_bound,
+        seconds=seconds,
+        status=solution.status,
+    )

@@ -1,0 +1,89 @@
+"""How time and memory grow: one process per size, so that peak memory is that size's own.
+
+``python -m experiments.benchmarks.scale TARGETS SEED`` prints one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+from experiments.benchmarks import FIRST_SEED
+from experiments.benchmarks.rows import Row
+
+SIZES = (1_000, 3_000, 10_000)
+LIMIT = 120.0
+
+
+def measure(targets: int, seed: int) -> dict[str, float | str]:
+    """Associate one scan of the radar field, from the scene to the Solution.
+
+    Returns
+    -------
+    dict
+        ``seconds`` in all, of which ``building``; ``tuples``, ``cost``, ``bound``, ``status``, ``peak_mb``.
+    """
+    import resource
+
+    import assoc
+    from experiments.benchmarks.run import one_core
+    from experiments.instances import scenes
+
+    with one_core():
+        for warm in (0, 1):
+            assoc.assign(assoc.build_problem(scenes.radar_field(50, warm), 0), time_limit=LIMIT)
+        scene = scenes.radar_field(targets, seed)
+        start = time.perf_counter()
+        problem = assoc.build_problem(scene, 0)
+        built = time.perf_counter()
+        solution = assoc.assign(problem, time_limit=LIMIT)
+        end = time.perf_counter()
+    # kilobytes on Linux, bytes on macOS
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+    return {
+        "seconds": end - start,
+        "building": built - start,
+        "tuples": problem.num_tuples,
+        "cost": solution.cost,
+        "bound": solution.lower_bound,
+        "status": solution.status,
+        "peak_mb": peak,
+    }
+
+
+def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]:
+    """Measure every size, each run in a process of its own."""
+    rows = []
+    for targets in SIZES[:2] if quick else SIZES:
+        for seed in range(FIRST_SEED, FIRST_SEED + (seeds or (1 if quick else 5))):
+            command = [sys.executable, "-m", "experiments.benchmarks.scale", str(targets), str(seed)]
+            done = subprocess.run(command, check=True, capture_output=True, text=True)
+            found = json.loads(done.stdout)
+            log(f"scale {targets} seed {seed}: {done.stdout.strip()}")
+            rows.append(
+                Row(
+                    "scale",
+                    str(targets),
+                    seed,
+                    0,
+                    found["tuples"],
+                    "exact",
+                    False,
+                    LIMIT,
+                    found["cost"],
+                    found["bound"],
+                    found["seconds"],
+                    found["status"],
+                    found["cost"],
+                    found["status"] == "optimal",
+                    found["peak_mb"],
+                )
+            )
+    return rows
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure(int(sys.argv[1]), int(sys.argv[2]))))

@@ -1,0 +1,136 @@
+"""The benchmark's machinery: rows, goals and report on numbers made for the purpose."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments.benchmarks import FIRST_SEED, goals, report, rows
+from experiments.benchmarks.__main__ import FAMILIES, main
+from experiments.benchmarks.families import Case, Entry, Instance, cases
+from experiments.benchmarks.rows import Row
+from experiments.benchmarks.run import run_case
+from experiments.instances import synthetic
+
+ROW = Row(
+    "gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True
+)
+PEER = replace(ROW, solver="highs", peer=True, seconds=0.3)
+
+
+def verdict(found: list[goals.Verdict], start: str) -> goals.Verdict:
+    return next(v for v in found if v.goal.startswith(start))
+
+
+def test_rows_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    some = [ROW, replace(PEER, cost=math.inf, bound=-math.inf, status="none", proven=False)]
+    rows.save(path, some)
+    assert rows.load(path) == some
+    assert path.read_text().splitlines()[0].endswith(",gap,excess")
+
+
+def test_gap_excess_and_hit() -> None:
+    row = replace(ROW, cost=-99.0, bound=-101.0)
+    assert row.gap == pytest.approx(2 / 99)
+    assert row.excess == pytest.approx(0.01)
+    assert not row.hit
+    assert ROW.hit
+
+
+def test_speed_goal_needs_median_and_never_slower() -> None:
+    other = [replace(ROW, seed=1001, seconds=0.01), replace(PEER, seed=1001, seconds=0.5)]
+    found = goals.judge([ROW, PEER, *other])
+    speed = verdict(found, "exact: 20 times")
+    assert speed.met
+    assert "median 40 times, least 30" in speed.measured
+    slow = goals.judge([ROW, PEER, *other, replace(PEER, seed=1001, solver="cp_sat", seconds=0.005)])
+    assert not verdict(slow, "exact: 20 times").met
+    # a peer that did not prove its answer is not in the race
+    unproven = replace(PEER, seed=1001, solver="cp_sat", seconds=0.005, status="feasible")
+    assert verdict(goals.judge([ROW, PEER, *other, unproven]), "exact: 20 times").met
+
+
+def test_lagrangian_goal() -> None:
+    row = replace(ROW, solver="lagrangian@0.1%", cost=-99.95, seconds=0.01, status="feasible")
+    peer = replace(PEER, solver="cp_sat", seconds=0.6)
+    assert verdict(goals.judge([row, peer]), "lagrangian").met
+    assert not verdict(goals.judge([replace(row, bound=-101.0), peer]), "lagrangian").met
+    assert not verdict(goals.judge([row, replace(peer, seconds=0.4)]), "lagrangian").met
+
+
+def test_ghost_goals_compare_at_equal_and_at_long_time() -> None:
+    base = replace(ROW, family="ghost", size="60", proven=False)
+    ours = replace(base, solver="tabu", cost=-99.97, limit=5.0, seconds=5.0)
+    early = replace(base, solver="cp_sat", peer=True, cost=-99.0, limit=5.0, seconds=5.0, status="feasible")
+    late = replace(early, cost=-100.0, limit=60.0, seconds=60.0)
+    found = goals.judge([ours, early, late])
+    assert verdict(found, "tabu: in 5 s at or below any peer after 5 s").met
+    assert verdict(found, "tabu: in 5 s within 0.05 %").met
+    assert not verdict(found, "tabu: in 5 s at or below any peer after 60 s").met
+    # a peer that was given 60 s but ended within 5 counts as one after 5 s
+    quick = goals.judge([ours, replace(late, seconds=3.0)])
+    assert not verdict(quick, "tabu: in 5 s at or below any peer after 5 s").met
+
+
+def test_shares_and_scale_and_kbest() -> None:
+    base = replace(ROW, family="known optimum", size="n=20", solver="aco", cost=1.0, bound=1.0, reference=1.0)
+    tenth = [replace(base, seed=1000 + i, cost=1.0 if i else 1.1) for i in range(10)]
+    assert verdict(goals.judge(tenth), "aco").met
+    assert not verdict(goals.judge(tenth[:9]), "aco").met
+    small = replace(ROW, family="scale", size="1000", seconds=0.1, extra=200.0)
+    large = replace(small, size="10000", seconds=1.4, extra=1900.0)
+    assert all(v.met for v in goals.judge([small, large]))
+    found = goals.judge([small, replace(large, seconds=1.6, extra=2100.0)])
+    assert [v.met for v in found] == [True, False, False]
+
+
+def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
+    text = report.render(
+        [ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], 1.0, "make bench"
+    )
+    assert "## gated" in text
+    assert "## planted" in text
+    assert "| 3x300 | 9,000 | exact | 60 | 1 | 1 | 0 | 0 | 0 | 10 ms | 30 |" in text
+
+
+def test_run_case_checks_and_compares() -> None:
+    def make(seed: int):  # type: ignore[no-untyped-def]
+        yield Instance(*synthetic.planted(3, seed, targets=6))
+
+    case = Case(
+        "planted", "S=3", make, (Entry("greedy", 5.0),), (Entry("highs", 5.0), Entry("sequential", 5.0)), 2
+    )
+    found = run_case(case)
+    assert {row.seed for row in found} == {FIRST_SEED, FIRST_SEED + 1}
+    assert [row.solver for row in found[:3]] == ["highs", "sequential", "greedy"]
+    for row in found:
+        assert row.proven
+        assert row.reference == pytest.approx(synthetic.planted(3, row.seed, targets=6)[1])
+        assert row.cost >= row.reference - 1e-9
+        assert row.bound <= row.reference + 1e-6
+    assert all(row.hit for row in found if row.solver == "highs")
+
+
+def test_cases_cover_the_families() -> None:
+    full = cases()
+    assert {case.family for case in full} == set(FAMILIES) - {"scale", "kbest"}
+    assert {c.size for c in full if c.family == "gated"} == {"3x100", "3x300", "3x1000", "4x300", "5x200"}
+    assert all(case.seeds >= 5 for case in full if (case.family, case.size) != ("ghost", "100"))
+    assert {case.family for case in cases(quick=True)} == {case.family for case in full}
+
+
+def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["--families", "gatd"])
+    assert stop.value.code == 2
+    assert "gatd" in capsys.readouterr().err
+    path = tmp_path / "b.csv"
+    with pytest.raises(SystemExit):
+        main(["--report-only", "--csv", str(path)])
+    rows.save(path, [ROW, PEER])
+    assert main(["--report-only", "--csv", str(path)]) == 0
+    assert "## gated" in (tmp_path / "b.md").read_text()
