@@ -29,6 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="small instances and few seeds, under 3 minutes")
     parser.add_argument("--families", nargs="+", metavar="NAME", help=f"only these: {', '.join(FAMILIES)}")
     parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
+    parser.add_argument("--solvers", nargs="+", metavar="NAME", help="only these of ours and of the peers")
     parser.add_argument("--seeds", type=int, metavar="N", help="seeds per size instead of each family's own")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="rows (default docs/benchmarks.csv)")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="report (default: beside the rows)")
@@ -92,6 +93,8 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
         print(text, file=sys.stderr, flush=True)
 
     chosen = [case for case in cases(options.quick) if _to_run(case, families, options.sizes)]
+    if options.solvers:
+        chosen = [case.restricted_to(options.solvers) for case in chosen]
     run.warm_up(
         {entry.solver for case in chosen for entry in case.ours},
         {entry.solver for case in chosen for entry in case.peers},

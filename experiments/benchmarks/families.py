@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field, replace
 
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
@@ -55,6 +55,11 @@ class Case:
     peers: tuple[Entry, ...]
     seeds: int = 5
     quick: bool = field(default=False, kw_only=True)
+
+    def restricted_to(self, solvers: Collection[str]) -> Case:
+        """Return the same case with only these solvers and peers."""
+        ours = tuple(entry for entry in self.ours if entry.solver in solvers)
+        return replace(self, ours=ours, peers=tuple(entry for entry in self.peers if entry.solver in solvers))
 
 
 def _from_scene(scene: Scene) -> Iterator[Instance]:

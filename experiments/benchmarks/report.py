@@ -37,7 +37,8 @@ are checked by code that no solver shares.
 *Found*: runs whose cost is the reference: the optimum (by construction, or proven by anyone) or else,
 marked ~, the best cost anyone has. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
 known optimum, so their time is the time to it; `lagrangian@0.1%` stops at that gap. *Speed* is the median
-over instances of the fastest peer's time to a proven optimum divided by this solver's time."""
+over instances of the fastest peer's time to a proven optimum divided by this solver's time, where that found
+the reference in every run."""
 
 
 def render(rows: Sequence[Row], minutes: float | None, command: str) -> str:
@@ -65,7 +66,7 @@ def _preface(minutes: float | None, command: str) -> str:
         for name in ("numpy", "scipy", "numba", "ortools", "nrl-tracker")
         if (version := _version(name))
     )
-    took = "" if minutes is None else f", {minutes:.0f} minutes"
+    took = "" if minutes is None else f" in {minutes:.1f} minutes"
     return (
         f"Written by `{command}`{took}, on {os.cpu_count()} cores of {_processor()}, "
         f"Python {platform.python_version()}, {versions}. Do not edit; raw numbers in the CSV beside it."
@@ -142,7 +143,7 @@ def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
         _percent(max(excess)),
         _percent(median(row.gap for row in rows)),
         _time(median(row.seconds for row in rows)),
-        f"{speed:.3g}" if math.isfinite(speed) and speed > 0 else "-",
+        f"{speed:.3g}" if math.isfinite(speed) and all(row.hit for row in rows) else "-",
     ]
 
 
