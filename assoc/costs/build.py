@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import weakref
 from typing import Any
 
 import numpy as np
 
-from assoc.costs.arrays import scan_arrays, sensor_arrays
+from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
-from assoc.costs.gating import chi_square_quantiles, make_gates
+from assoc.costs.gating import Gates, chi_square_quantiles, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
@@ -38,8 +39,8 @@ def build_problem(
     * all of them together pass the gate of their degrees of freedom,
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
 
-    Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that measures
-    full positions, else two), at least one.
+    Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
+    measures full positions, else two), at least one.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def build_problem(
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = _scan(scene, scan)
     sensors = sensor_arrays(scene)
-    gates = make_gates(sensors, probability)
+    gates = _gates(scene, sensors, probability)
     reach = float(gates.pair.max(initial=1.0)) if len(scene.sensors) > 1 else 1.0
     measured, index = scan_arrays(sensors, one, reach)
     limits = {"number": one.index, "max_tuples": int(max_tuples)}
@@ -136,6 +137,16 @@ def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> 
     """
     _, _, positions, covariances = _fit_tuples(scene, scan, tuples, True)
     return positions, covariances
+
+
+_known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()
+
+
+def _gates(scene: Scene, sensors: SensorArrays, probability: float) -> Gates:
+    known = _known_gates.setdefault(scene, {})
+    if probability not in known:
+        known[probability] = make_gates(sensors, probability)
+    return known[probability]
 
 
 def _scan(scene: Scene, scan: int | Scan) -> Scan:

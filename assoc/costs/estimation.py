@@ -1,12 +1,13 @@
 """Maximum-likelihood positions of tuples (equation 4 of the ant colony paper), compiled.
 
-Levenberg-Marquardt on the residuals of the members, started from their converted measurements or from the
-crossing of their bearings. With linear sensors the first step is the closed form.
+Levenberg-Marquardt on the residuals of the members, started from their converted measurements or from
+the crossing of their bearings. With linear sensors the first step is the closed form.
 
-The region's prior enters only where the measurements leave a position open, so that one always exists. A tuple
-with a sensor that measures full positions never sees it. For other tuples it acts along those directions only in
-which the measurements tell less than the prior does (standard deviation: half the region's width); it is not part
-of the chi-square value, so it moves the position of an undetermined tuple but is never charged to it.
+The region's prior enters only where the measurements leave a position open, so that one always exists. A
+tuple with a sensor that measures full positions never sees it. For other tuples it acts along those
+directions only in which the measurements tell less than the prior does (standard deviation: half the
+region's width); it is not part of the chi-square value, so it moves the position of an undetermined tuple
+but is never charged to it.
 
 Kernels that call one another live in one file: numba's cache does not notice an edited callee in another.
 Symmetric 3 x 3 matrices are passed as (xx, xy, xz, yy, yz, zz).
@@ -35,12 +36,11 @@ _POOR_FIT = 10.0
 
 @njit
 def _normal(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int, x: float, y: float, z: float
+    sensors: SensorArrays, scan: ScanArrays, members: Array, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members at a position."""
     chi = g0 = g1 = g2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
-    for k in range(count):
-        n = members[k]
+    for n in members:
         s = scan.owner[n]
         code = sensors.code[s]
         W = sensors.weight[s]
@@ -155,7 +155,6 @@ def _descend(
     sensors: SensorArrays,
     scan: ScanArrays,
     members: Array,
-    count: int,
     at: tuple[float, float, float],
     prior: Six,
 ) -> tuple[float, float, float, float, Six]:
@@ -163,7 +162,7 @@ def _descend(
     x, y, z = at
     m0, m1, m2 = sensors.middle[0], sensors.middle[1], sensors.middle[2]
     damping = 0.0
-    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, count, x, y, z)
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, x, y, z)
     q0, q1, q2 = m0 - x, m1 - y, m2 - z
     w0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
     w1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -184,7 +183,7 @@ def _descend(
         promise = s0 * (g0 + w0) + s1 * (g1 + w1) + s2 * (g2 + w2)
         if promise <= 1e-13 * goal + 1e-20:
             break
-        trial = _normal(sensors, scan, members, count, x + s0, y + s1, z + s2)
+        trial = _normal(sensors, scan, members, x + s0, y + s1, z + s2)
         q0, q1, q2 = m0 - x - s0, m1 - y - s1, m2 - z - s2
         v0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
         v1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -207,50 +206,52 @@ def _descend(
 
 
 @njit
-def _start(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int, second: bool
-) -> tuple[float, float, float]:
-    """Where to begin: converted measurements weighted by their information, or the crossing of the bearings."""
-    full = planar = False
-    for k in range(count):
-        s = scan.owner[members[k]]
-        full = full or sensors.full[s]
-        planar = planar or sensors.code[s] != 3
-    if full or planar:
-        b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
-        for k in range(count):
-            n = members[k]
-            s = scan.owner[n]
-            if sensors.code[s] == 3 or (full and not sensors.full[s]):
-                continue
-            i, c = scan.information[n], scan.centre[n]
-            a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
-            b0 += i[0] * c[0] + i[1] * c[1] + i[2] * c[2]
-            b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
-            b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
-            last = n
-        ok, x, y, z = _solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
-        if not ok:
-            x, y, z = scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
-        return x, y, z
+def _start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) -> tuple[float, float, float]:
+    """Where to begin: the mean of the converted measurements, weighted by their information."""
+    b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
+    last = members[0]
+    for n in members:
+        s = scan.owner[n]
+        if sensors.code[s] == 3 or (full and not sensors.full[s]):
+            continue
+        i, c = scan.information[n], scan.centre[n]
+        a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
+        b0 += i[0] * c[0] + i[1] * c[1] + i[2] * c[2]
+        b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
+        b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
+        last = n
+    ok, x, y, z = _solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
+    if not ok:
+        return scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
+    return x, y, z
+
+
+@njit
+def _bearing_starts(
+    sensors: SensorArrays, scan: ScanArrays, members: Array
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Two places to begin with bearings: where the lines cross, and ahead along the mean bearing."""
     n00 = n01 = n11 = c0 = c1 = u = v = px = py = 0.0
-    for k in range(count):
-        s = scan.owner[members[k]]
-        cos, sin = math.cos(scan.z[members[k], 0]), math.sin(scan.z[members[k], 0])
+    count = len(members)
+    for n in members:
+        s = scan.owner[n]
+        cos, sin = math.cos(scan.z[n, 0]), math.sin(scan.z[n, 0])
         x, y = sensors.place[s, 0], sensors.place[s, 1]
         n00, n01, n11 = n00 + sin * sin, n01 - sin * cos, n11 + cos * cos
         c0, c1 = c0 + sin * (sin * x - cos * y), c1 - cos * (sin * x - cos * y)
         u, v, px, py = u + cos, v + sin, px + x / count, py + y / count
-    det = n00 * n11 - n01 * n01
-    if det > 1e-9 * count * count and not second:
-        return (n11 * c0 - n01 * c1) / det, (n00 * c1 - n01 * c0) / det, sensors.middle[2]
-    # no crossing: go from between the sensors along the mean bearing, as far as the region's middle lies
+    m = sensors.middle
+    ahead = (m[0], m[1], m[2])
     size = math.hypot(u, v)
-    if size < 1e-3:
-        return sensors.middle[0], sensors.middle[1], sensors.middle[2]
-    far = (u * (sensors.middle[0] - px) + v * (sensors.middle[1] - py)) / size
-    far = max(far, 0.3 * math.hypot(sensors.half[0], sensors.half[1]))
-    return px + far * u / size, py + far * v / size, sensors.middle[2]
+    if size > 1e-3:
+        # from between the sensors as far as the region's middle lies
+        far = (u * (m[0] - px) + v * (m[1] - py)) / size
+        far = max(far, 0.3 * math.hypot(sensors.half[0], sensors.half[1]))
+        ahead = (px + far * u / size, py + far * v / size, m[2])
+    det = n00 * n11 - n01 * n01
+    if det > 1e-9 * count * count:
+        return ((n11 * c0 - n01 * c1) / det, (n00 * c1 - n01 * c0) / det, m[2]), ahead
+    return ahead, (m[0], m[1], m[2])
 
 
 @njit
@@ -274,18 +275,35 @@ def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
 def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
     """The region's prior along those directions only which the information `A` leaves open."""
     h = sensors.half
-    M = np.empty((3, 3))
+    M, V = np.zeros((3, 3)), np.zeros((3, 3))
     M[0, 0], M[1, 1], M[2, 2] = A[0] * h[0] * h[0], A[3] * h[1] * h[1], A[5] * h[2] * h[2]
     M[0, 1] = M[1, 0] = A[1] * h[0] * h[1]
     M[0, 2] = M[2, 0] = A[2] * h[0] * h[2]
     M[1, 2] = M[2, 1] = A[4] * h[1] * h[2]
-    values, vectors = np.linalg.eigh(M)
+    V[0, 0] = V[1, 1] = V[2, 2] = 1.0
+    # Jacobi's rotations: eigenvalues end on the diagonal of M, eigenvectors in the columns of V
+    for _ in range(12):
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if M[p, q] * M[p, q] <= 1e-30 * abs(M[p, p] * M[q, q]):
+                    continue
+                theta = 0.5 * (M[q, q] - M[p, p]) / M[p, q]
+                t = math.copysign(1.0, theta) / (abs(theta) + math.sqrt(theta * theta + 1.0))
+                c = 1.0 / math.sqrt(t * t + 1.0)
+                for k in range(3):
+                    a, b = M[k, p], M[k, q]
+                    M[k, p], M[k, q] = c * (a - t * b), c * (t * a + b)
+                for k in range(3):
+                    a, b = M[p, k], M[q, k]
+                    M[p, k], M[q, k] = c * (a - t * b), c * (t * a + b)
+                    a, b = V[k, p], V[k, q]
+                    V[k, p], V[k, q] = c * (a - t * b), c * (t * a + b)
     P = np.zeros((3, 3))
     for k in range(3):
-        if values[k] < _WEAK:
+        if M[k, k] < _WEAK:
             for i in range(3):
                 for j in range(3):
-                    P[i, j] += vectors[i, k] * vectors[j, k] / (h[i] * h[j])
+                    P[i, j] += V[i, k] * V[j, k] / (h[i] * h[j])
     return P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2]
 
 
@@ -294,7 +312,6 @@ def _settle(
     sensors: SensorArrays,
     scan: ScanArrays,
     members: Array,
-    count: int,
     at: tuple[float, float, float],
     flat: bool,
 ) -> tuple[float, float, float, float, Six, Six]:
@@ -302,15 +319,15 @@ def _settle(
     h = sensors.half
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / (h[2] * h[2]) if flat else 0.0)
     every = (1.0 / (h[0] * h[0]), 0.0, 0.0, 1.0 / (h[1] * h[1]), 0.0, 1.0 / (h[2] * h[2]))
-    _, _, _, _, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, count, at[0], at[1], at[2])
+    _, _, _, _, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, at[0], at[1], at[2])
     pure = _determined(sensors, (a0, a1, a2, a3, a4, a5), flat)
     if pure:
-        chi, x, y, z, A = _descend(sensors, scan, members, count, at, none)
+        chi, x, y, z, A = _descend(sensors, scan, members, at, none)
         if _determined(sensors, A, flat):
             return chi, x, y, z, A, none
-    chi, x, y, z, A = _descend(sensors, scan, members, count, at, every)
+    chi, x, y, z, A = _descend(sensors, scan, members, at, every)
     prior = none if _determined(sensors, A, flat) else _weak_prior(sensors, A)
-    chi, x, y, z, A = _descend(sensors, scan, members, count, (x, y, z), prior)
+    chi, x, y, z, A = _descend(sensors, scan, members, (x, y, z), prior)
     if not _determined(sensors, A, flat):
         # the final step may have moved where directions open up: keep the covariance finite
         prior = _weak_prior(sensors, A)
@@ -319,26 +336,31 @@ def _settle(
 
 @njit
 def _locate(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, count: int
+    sensors: SensorArrays, scan: ScanArrays, members: Array
 ) -> tuple[float, float, float, float, Six, Six]:
     """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed."""
-    full, flat, bearings = False, True, True
-    for k in range(count):
-        s = scan.owner[members[k]]
-        full = full or sensors.full[s]
-        bearings = bearings and sensors.code[s] == 3
-        flat = flat and (sensors.code[s] == 3 or (sensors.code[s] == 0 and sensors.dim[s] == 2))
-    at = _start(sensors, scan, members, count, False)
+    # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
+    full_ones = tall_ones = located_ones = 0
+    for n in members:
+        s = scan.owner[n]
+        full_ones += 1 if sensors.full[s] else 0
+        tall_ones += 1 if sensors.full[s] or sensors.code[s] == 2 else 0
+        located_ones += 1 if sensors.code[s] != 3 else 0
+    full, flat = full_ones > 0, tall_ones == 0
+    if located_ones == 0:
+        crossing, ahead = _bearing_starts(sensors, scan, members)
+        best = _settle(sensors, scan, members, crossing, flat)
+        if not best[0] <= _POOR_FIT:
+            other = _settle(sensors, scan, members, ahead, flat)
+            if other[0] < best[0] or not math.isfinite(best[0]):
+                best = other
+        return best
+    at = _start(sensors, scan, members, full)
     if full:
         none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        chi, x, y, z, A = _descend(sensors, scan, members, count, at, none)
+        chi, x, y, z, A = _descend(sensors, scan, members, at, none)
         return chi, x, y, z, A, none
-    best = _settle(sensors, scan, members, count, at, flat)
-    if bearings and not best[0] <= _POOR_FIT:
-        other = _settle(sensors, scan, members, count, _start(sensors, scan, members, count, True), flat)
-        if other[0] < best[0] or not math.isfinite(best[0]):
-            best = other
-    return best
+    return _settle(sensors, scan, members, at, flat)
 
 
 @njit
@@ -366,7 +388,7 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, positions: bool) -
             if rows[t, s] >= 0:
                 members[count] = rows[t, s]
                 count += 1
-        chi, x, y, z, A, prior = _locate(sensors, scan, members, count)
+        chi, x, y, z, A, prior = _locate(sensors, scan, members[:count])
         chis[t] = chi
         if not positions:
             continue

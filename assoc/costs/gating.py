@@ -46,7 +46,7 @@ def degrees_of_freedom(sensors: SensorArrays, detected: Array) -> Array:
     """Degrees of freedom of the residuals of tuples.
 
     Components measured, less the coordinates found from them: three if a sensor of the tuple measures full
-    positions, else two (a height found from the differences of slant ranges is not counted, which widens the gate).
+    positions, else two (a height found from slant ranges alone is not counted, which widens the gate).
 
     Parameters
     ----------

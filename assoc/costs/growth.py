@@ -69,7 +69,8 @@ def _extend(
                 continue
             if count == len(parent):
                 longer, more = np.empty(2 * count, np.int64), np.empty(2 * count, np.int32)
-                longer[:count], more[:count] = parent, added
+                for i in range(count):
+                    longer[i], more[i] = parent[i], added[i]
                 parent, added = longer, more
             parent[count], added[count] = k, b
             count += 1
@@ -96,11 +97,11 @@ def grow(
 ) -> tuple[Array, Array]:
     """Candidate tuples of two or more measurements.
 
-    A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint gate of
-    its degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms. On the way, a
-    tuple is given up only if no tuple that contains it can be a candidate: chi-square values only grow with a
-    tuple, so one above the largest gate ahead, or above all that further detections can take off the cost, is of
-    no use.
+    A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint
+    gate of its degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms.
+    On the way, a tuple is given up only if no tuple that contains it can be a candidate: chi-square values
+    only grow with a tuple, so one above the largest gate ahead, or above all that further detections can take
+    off the cost, is of no use.
 
     Returns
     -------
@@ -115,7 +116,9 @@ def grow(
     """
     count = len(sensors.dim)
     second_owner = scan.owner[pairs.second]
-    rows, chi, worth = np.empty((0, count), np.int32), np.empty(0), np.empty(0)
+    rows: Array = np.empty((0, count), np.int32)
+    chi: Array = np.empty(0)
+    worth: Array = np.empty(0)
     for t in range(1, count):
         grown_rows, grown_chi = _grown(sensors, scan, pairs, gates, rows, chi, t, number, max_tuples)
         chosen = np.flatnonzero(second_owner == t) if count > 2 else slice(None)
@@ -125,7 +128,7 @@ def grow(
         rows = np.concatenate([rows, new, grown_rows])
         chi = np.concatenate([chi, pairs.chi[chosen], grown_chi])
         worth = (rows >= 0) @ sensors.gain - sensors.base
-        hopeful = 0.5 * chi < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
+        hopeful: Array = 0.5 * chi < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
         if not hopeful.all():
             rows, chi, worth = rows[hopeful], chi[hopeful], worth[hopeful]
         if len(rows) > max_tuples:
@@ -148,6 +151,8 @@ def _grown(
 ) -> tuple[Array, Array]:
     """The tuples grown by sensor t that may still become candidates, and their chi-square values."""
     count = rows.shape[1]
+    if not len(rows):
+        return rows, chi
     later = int(sensors.dim[t + 1 :].sum())
     largest = float(gates.joint[-1])
     kept_rows, kept_chi, so_far = [np.empty((0, count), np.int32)], [np.empty(0)], len(rows)
@@ -166,7 +171,7 @@ def _grown(
         value = fit(sensors, scan, grown, False)[0]
         detected = grown >= 0
         freedom = np.minimum(degrees_of_freedom(sensors, detected) + later + 1, len(gates.joint) - 1)
-        hopeful: Array = value <= gates.joint[freedom] + SLACK
+        hopeful = value <= gates.joint[freedom] + SLACK
         hopeful &= 0.5 * value < detected @ sensors.gain - sensors.base + gates.future[t + 1] + SLACK
         kept_rows.append(grown[hopeful])
         kept_chi.append(value[hopeful])

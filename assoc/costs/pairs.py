@@ -18,7 +18,7 @@ from assoc.costs.guard import refuse
 Array = np.ndarray[Any, np.dtype[Any]]
 
 # up to so many combinations looking at each is quicker than a tree
-_BRUTE = 2_000_000
+_BRUTE = 100_000
 # coarse pairs are fitted in blocks of about this size, so that memory grows with the pairs kept
 _BLOCK = 500_000
 
@@ -36,12 +36,34 @@ class Pairs(NamedTuple):
 
 
 @njit
+def _may_cross(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
+    """Whether two bearings may meet ahead of both sensors once they are moved within the gate."""
+    s, t = scan.owner[n], scan.owner[m]
+    dx, dy = sensors.place[t, 0] - sensors.place[s, 0], sensors.place[t, 1] - sensors.place[s, 1]
+    if dx * dx + dy * dy < 1e-12:
+        return True
+    turn = 2.0 * math.pi
+    line = math.atan2(dy, dx)
+    a, b = scan.z[n, 0] - line, scan.z[m, 0] - line
+    a, b = a - turn * round(a / turn), b - turn * round(b / turn)
+    if 0.0 <= a <= b or b <= a <= 0.0:
+        return True
+    # the bearings that meet form two triangles in (a, b) with edges a = 0, b = pi and a = b: to reach them is
+    # at least as far as to the nearest of these lines
+    between = a - b
+    between -= turn * round(between / turn)
+    p, q = sensors.covariance[s, 0, 0], sensors.covariance[t, 0, 0]
+    least = min(a * a / p, min((math.pi - abs(b)) ** 2 / q, between * between / (p + q)))
+    return least <= limit * (1.0 + 1e-9)
+
+
+@njit
 def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
     """Whether two measurements may pass a gate of `limit`; errs only towards True."""
     s, t = scan.owner[n], scan.owner[m]
     if sensors.code[s] == 3 or sensors.code[t] == 3:
         if sensors.code[s] == sensors.code[t]:
-            return True
+            return _may_cross(sensors, scan, n, m, limit)
         if sensors.code[s] == 3:
             n, m, t = m, n, s
         dx, dy = scan.centre[n, 0] - sensors.place[t, 0], scan.centre[n, 1] - sensors.place[t, 1]
@@ -57,9 +79,12 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
     # for bent measurement models the two ellipsoids are added up, not their covariances
     if sensors.code[s] != 0 or sensors.code[t] != 0:
         limit *= 2.0
-    a, b = scan.spread[n], scan.spread[m]
     dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
-    c0, c1, c3 = a[0] + b[0], a[1] + b[1], a[3] + b[3]
+    c0, c1, c3 = (
+        scan.spread[n, 0] + scan.spread[m, 0],
+        scan.spread[n, 1] + scan.spread[m, 1],
+        scan.spread[n, 3] + scan.spread[m, 3],
+    )
     if dx * dx + dy * dy > limit * (c0 + c3):
         return False
     det = c0 * c3 - c1 * c1
@@ -68,7 +93,11 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
     if not (sensors.full[s] and sensors.full[t]):
         return True
     dz = scan.centre[n, 2] - scan.centre[m, 2]
-    c2, c4, c5 = a[2] + b[2], a[4] + b[4], a[5] + b[5]
+    c2, c4, c5 = (
+        scan.spread[n, 2] + scan.spread[m, 2],
+        scan.spread[n, 4] + scan.spread[m, 4],
+        scan.spread[n, 5] + scan.spread[m, 5],
+    )
     if dz * dz > limit * c5:
         return False
     if not det > 1e-12 * c0 * c3:
@@ -89,13 +118,22 @@ def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, 
     found = np.empty((1024, 2), np.int32)
     count = 0
     total = len(scan.z)
+    # out of the tuple first: a field read in the loop costs a reference count each time
+    centre, spread, owner, code = scan.centre, scan.spread, scan.owner, sensors.code
     for n in range(low, high):
-        s = scan.owner[n]
+        s = owner[n]
+        x, y, size = centre[n, 0], centre[n, 1], spread[n, 0] + spread[n, 3]
         for m in range(scan.start[s + 1], total):
-            if _near(sensors, scan, n, m, limits[s, scan.owner[m]]):
+            t = owner[m]
+            if code[s] != 3 and code[t] != 3:
+                dx, dy = centre[m, 0] - x, centre[m, 1] - y
+                if dx * dx + dy * dy > 2.0 * limits[s, t] * (size + spread[m, 0] + spread[m, 3]):
+                    continue
+            if _near(sensors, scan, n, m, limits[s, t]):
                 if count == len(found):
                     wider = np.empty((2 * count, 2), np.int32)
-                    wider[:count] = found
+                    for k in range(count):
+                        wider[k, 0], wider[k, 1] = found[k, 0], found[k, 1]
                     found = wider
                 found[count, 0], found[count, 1] = n, m
                 count += 1
@@ -108,7 +146,7 @@ def _keep_near(sensors: SensorArrays, scan: ScanArrays, pairs: Array, limit: flo
     count = 0
     for k in range(len(pairs)):
         if _near(sensors, scan, pairs[k, 0], pairs[k, 1], limit):
-            pairs[count] = pairs[k]
+            pairs[count, 0], pairs[count, 1] = pairs[k, 0], pairs[k, 1]
             count += 1
     return pairs[:count]
 
