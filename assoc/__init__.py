@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from assoc.problem import AssignmentProblem
     from assoc.scene import Scene
     from assoc.solution import Solution
-    from assoc.solvers import assign
+    from assoc.solvers.front import assign
 
 __version__ = "0.1.0"
 
@@ -41,7 +41,7 @@ _HOME = {
     "Association": "assoc.association",
     "Scene": "assoc.scene",
     "Solution": "assoc.solution",
-    "assign": "assoc.solvers",
+    "assign": "assoc.solvers.front",
     "associate": "assoc.association",
     "build_problem": "assoc.costs",
 }

@@ -14,7 +14,7 @@ MARGIN = 5.0
 
 
 def on_circle(center: Array, radius: float, count: int, height: float = 0.0) -> Array:
-    """Places (count, 3), metres, at equal angles on a horizontal circle, the first north (+y) of its center."""
+    """Places (count, 3), metres, at equal angles on a horizontal circle, the first north (+y) of it."""
     angle = math.pi / 2 + 2 * math.pi * np.arange(count) / count
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     return np.stack([x, y, np.full(count, height)], axis=1) + 0.0

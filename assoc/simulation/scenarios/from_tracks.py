@@ -1,8 +1,8 @@
 """Recorded trajectories (time, id, latitude, longitude, altitude in a CSV file), seen by simulated radars.
 
-The scene's frame is the plane that touches the WGS-84 ellipsoid in the middle of the traffic: x east, y north,
-z up. The radars stand on the ground around that middle. Terrain and the radio horizon are left out: every radar
-sees all traffic.
+The scene's frame is the plane that touches the WGS-84 ellipsoid in the middle of the traffic: x east,
+y north, z up. The radars stand on the ground around that middle. Terrain and the radio horizon are left out:
+every radar sees all traffic.
 """
 
 from __future__ import annotations
@@ -157,7 +157,8 @@ def read(parameters: FromTracksParameters) -> Recording:
         if wrong.any():
             row = int(np.argmax(wrong))
             raise InvalidInputError(
-                f"{path}: line {row + 2}, column {chosen[meaning]!r}: expected a number, got {text.iloc[row]!r}"
+                f"{path}: line {row + 2}, column {chosen[meaning]!r}: "
+                f"expected a number, got {text.iloc[row]!r}"
             )
         columns[meaning] = values
     known = table[chosen["id"]].notna().to_numpy() & ~np.isnan(np.stack(list(columns.values()))).any(axis=0)

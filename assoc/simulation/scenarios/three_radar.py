@@ -1,9 +1,9 @@
 """Three targets, three radars, a hundred scans: the scene of the ant colony paper.
 
-The trajectories, P_d, the false alarm rate and the number of scans are the paper's. It gives neither noise nor
-region nor the places of the radars. Chosen here: the region is the bounding box of the three trajectories and
-10 % more on each side; the radars stand on the ground, at equal angles around its middle, far enough out to see
-every target from a different side and never to have one straight above.
+The trajectories, P_d, the false alarm rate and the number of scans are the paper's. It gives neither noise
+nor region nor the places of the radars. Chosen here: the region is the bounding box of the three trajectories
+and 10 % more on each side; the radars stand on the ground, at equal angles around its middle, far enough out
+to see every target from a different side and never to have one straight above.
 """
 
 from __future__ import annotations

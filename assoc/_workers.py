@@ -1,0 +1,57 @@
+"""Work spread over processes: results in order, and nobody left behind when it is cut short."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from typing import Any
+
+_task: Callable[[Any], Any] | None = None
+
+
+def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[Any]:
+    """Yield ``task(item)`` for each item, in order.
+
+    Parameters
+    ----------
+    task : callable
+        Sent once to each process, so it may hold what all items share; must be picklable if jobs > 1.
+    items : sequence
+        Small and picklable.
+    jobs : int
+        Number of processes; 1 works in this one. They are spawned: forking would copy the threads' locks.
+    """
+    jobs = min(jobs, len(items))
+    if jobs <= 1:
+        for item in items:
+            yield task(item)
+        return
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(task,))
+    try:
+        waiting: list[Future[Any]] = [executor.submit(_run, item) for item in items]
+        for future in waiting:
+            yield future.result()
+    except BaseException:
+        # interrupted, or one item failed: nobody wants the rest, which may take long
+        executor.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+        raise
+    finally:
+        executor.shutdown()
+
+
+def _start(task: Callable[[Any], Any]) -> None:
+    global _task
+    # Ctrl-C reaches the whole group: let the parent speak, and die quietly
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    _task = task
+
+
+def _run(item: Any) -> Any:
+    assert _task is not None
+    return _task(item)

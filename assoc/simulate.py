@@ -1,0 +1,70 @@
+"""``python -m assoc.simulate``: simulate a scene and write it to a file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from assoc._program import Option, Parser, given, options, run, whole_number
+
+_PURPOSE = {
+    "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
+    "crowd": "many targets at random in a box",
+    "bearing-only": "bearing sensors whose lines of sight cross where nobody is",
+    "from-tracks": "recorded trajectories (CSV) seen by simulated radars",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return run(lambda: _simulate(words), "assoc.simulate")
+
+
+def _simulate(words: list[str]) -> None:
+    scenario = words[0] if words else ""
+    if scenario not in _PURPOSE:
+        # neither a scenario nor --help: let the parser of scenarios say so
+        _list_parser().parse_args(words[:1])
+        return
+    from assoc import simulation
+
+    choices = options(simulation.parameters(scenario))
+    parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
+    seed = whole_number(parsed["seed"], "--seed", 0)
+    scene = simulation.simulate(scenario, seed, **given(choices, parsed))
+    scene.save(parsed["output"])
+    print(f"{parsed['output']}: {scene!r}")
+
+
+def _list_parser() -> Parser:
+    lines = [f"  {name:<14} {purpose}" for name, purpose in _PURPOSE.items()]
+    parser = Parser(
+        prog="assoc.simulate",
+        usage="python -m assoc.simulate SCENARIO -o scene.npz [options]",
+        description="Simulate a scene and write it to a file.",
+        epilog="scenarios (each has its own --help):\n" + "\n".join(lines),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", choices=list(_PURPOSE), help="what to simulate")
+    return parser
+
+
+def _parser(scenario: str, choices: list[Option]) -> Parser:
+    parser = Parser(
+        prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".", allow_abbrev=False
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help="the scene file to write (.npz)"
+    )
+    parser.add_argument("--seed", default="0", metavar="N", help="seed of the random generator (default 0)")
+    group = parser.add_argument_group("scenario")
+    for option in choices:
+        option.add_to(parser if option.positional else group)
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,298 @@
+"""``python -m assoc.solve``: associate the measurements of scenes, or solve assignment problems, from files.
+
+This is a program: the package must not import it, or ``python -m assoc.solve`` would warn and
+``assoc.solve`` would change its meaning with the order of imports.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from assoc._program import Option, Parser, given, one_line, options, run, seconds, whole_number
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc._plan import Plan
+    from assoc.association import Association, ScanAssociation
+    from assoc.problem import AssignmentProblem
+    from assoc.scene import Scene
+
+DEFAULT_SOLVER = "exact"
+_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return run(lambda: _solve(words), "assoc.solve")
+
+
+def _solve(words: list[str]) -> None:
+    solver, explicit, config = _solver(words)
+    from assoc.solvers import registry
+
+    choices = options(registry.parameters(solver))
+    parsed = vars(_parser(solver, choices, explicit).parse_args(words))
+    settings = {**{key: config[key] for key in _SETTINGS if key in config}, **_common(parsed)}
+    parameters = {**_section(config, solver, choices), **given(choices, parsed)}
+    registry.make_parameters(solver, parameters)
+    files = parsed["files"]
+    _check_outputs([path for path in (parsed["json"], parsed["csv"]) if path], files)
+
+    sources = [_load(file) for file in files]
+    started = time.perf_counter()
+    plan, items = _plan(sources, files, solver, settings, parameters)
+    association = plan.gather(_with_progress(plan.run(items, settings.get("jobs", 1)), len(items)))
+    elapsed = time.perf_counter() - started
+    names = [files[number] for number, _ in items]
+    _write(association, names, parsed["json"], parsed["csv"])
+
+    from assoc._tables import print_table
+
+    print_table(association.scans, names)
+    print()
+    print(association.summary())
+    print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")
+
+
+def _solver(words: list[str]) -> tuple[str, bool, dict[str, Any]]:
+    """Which solver, whether it was named, and the configuration file: they decide what options there are."""
+    first = Parser(prog="assoc.solve", add_help=False, allow_abbrev=False)
+    first.add_argument("--solver")
+    first.add_argument("--config")
+    known = first.parse_known_args(words)[0]
+    config = _read_config(known.config) if known.config is not None else {}
+    name = known.solver if known.solver is not None else config.get("solver")
+    return (DEFAULT_SOLVER, False, config) if name is None else (name, True, config)
+
+
+def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
+    parser = Parser(
+        prog="assoc.solve",
+        usage="python -m assoc.solve FILE.npz [FILE.npz ...] --solver NAME [options]",
+        description="Associate the measurements of scenes (or solve assignment problems)\n"
+        "and say how far from optimal each answer can be at most.",
+        epilog=None if explicit else _other_solvers(solver),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("files", nargs="+", metavar="FILE", help="scene.npz or problem.npz")
+    add("--solver", metavar="NAME", help=f"name of the solver (default {DEFAULT_SOLVER})")
+    add("--seed", metavar="N", help="the same seed gives the same answer, whatever --jobs (default 0)")
+    add("--time-limit", metavar="S", help="seconds for each scan; then the best solution found is taken")
+    add("--jobs", metavar="N", help="number of processes (default 1)")
+    add("--scans", metavar="A:B", help="scans A to B-1, counted from 0; A alone is one scan")
+    add("--json", metavar="FILE", help="write the result as JSON")
+    add("--csv", metavar="FILE", help="write the table as CSV")
+    add(
+        "--config",
+        metavar="FILE",
+        help="TOML file of these options; parameters in a table [solver]",
+    )
+    add("--gate-probability", metavar="P", help="share of true tuples that a gate lets through, in (0, 1]")
+    add("--max-tuples", metavar="N", help="refuse scans with more candidate tuples than this")
+    if choices:
+        group = parser.add_argument_group(f"parameters of {solver}")
+        for option in choices:
+            option.add_to(group)
+    return parser
+
+
+def _other_solvers(solver: str) -> str:
+    from assoc.solvers import registry
+
+    lines = ["solvers and their parameters (--solver NAME --help describes them):"]
+    for name in registry.names():
+        flags = " ".join(option.flag for option in options(registry.parameters(name)))
+        lines.append(f"  {name:<12} {flags or '(none)'}")
+    return "\n".join(lines)
+
+
+def _common(parsed: dict[str, Any]) -> dict[str, Any]:
+    """Settings given on the command line, in their types."""
+    found: dict[str, Any] = {}
+    if parsed["seed"] is not None:
+        found["seed"] = whole_number(parsed["seed"], "--seed", 0)
+    if parsed["time_limit"] is not None:
+        found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
+    if parsed["jobs"] is not None:
+        found["jobs"] = whole_number(parsed["jobs"], "--jobs", 1)
+    if parsed["scans"] is not None:
+        found["scans"] = parsed["scans"]
+    if parsed["gate_probability"] is not None:
+        try:
+            found["gate_probability"] = float(parsed["gate_probability"])
+        except ValueError:
+            raise InvalidInputError(
+                f"--gate-probability: expected a number, got {parsed['gate_probability']!r}"
+            ) from None
+    if parsed["max_tuples"] is not None:
+        found["max_tuples"] = whole_number(parsed["max_tuples"], "--max-tuples", 1)
+    return found
+
+
+def _read_config(path: str) -> dict[str, Any]:
+    import tomllib
+
+    from assoc.solvers import registry
+
+    try:
+        with open(path, "rb") as file:
+            content = tomllib.load(file)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except ValueError as error:  # TOMLDecodeError and UnicodeDecodeError
+        raise InvalidInputError(f"{path}: is not a TOML file ({one_line(error)})") from None
+    config = {key.replace("-", "_"): value for key, value in content.items()}
+    texts = ("solver", "scans")
+    numbers = ("time_limit", "gate_probability")
+    for key, value in config.items():
+        if isinstance(value, dict):
+            if key not in registry.names():
+                raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(registry.names())}")
+            continue
+        if key not in _SETTINGS:
+            raise InvalidInputError(
+                f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]"
+            )
+        kind: Any = str if key in texts else (int, float) if key in numbers else int
+        if not isinstance(value, kind) or isinstance(value, bool):
+            expected = "text" if key in texts else "a number" if key in numbers else "a whole number"
+            raise InvalidInputError(f"{path}: {key}: expected {expected}, got {value!r}")
+    return config
+
+
+def _section(config: dict[str, Any], solver: str, choices: list[Option]) -> dict[str, Any]:
+    """Parameters of the solver from the configuration file."""
+    by_name = {option.name: option for option in choices}
+    found = {}
+    for key, value in config.get(solver, {}).items():
+        name = key.replace("-", "_")
+        # unknown names go through: the registry knows what to say about them
+        found[name] = by_name[name].check(value, f"[{solver}] {key}") if name in by_name else value
+    return found
+
+
+def _check_outputs(outputs: list[str], inputs: list[str]) -> None:
+    """Refuse before the work what could not be written after it."""
+    taken = {os.path.realpath(path): path for path in inputs}
+    for path in outputs:
+        if os.path.realpath(path) in taken:
+            raise InvalidInputError(f"{path}: is given twice, or would overwrite what is read")
+        taken[os.path.realpath(path)] = path
+        if Path(path).is_dir():
+            raise InvalidInputError(f"{path}: is a folder, expected a file name to write")
+        if not Path(path).parent.is_dir():
+            raise InvalidInputError(f"{path}: the folder {Path(path).parent} does not exist")
+
+
+def _load(path: str) -> Scene | AssignmentProblem:
+    found = _format_of(path)
+    if found == "assoc.problem":
+        from assoc.problem import AssignmentProblem
+
+        return AssignmentProblem.load(path)
+    if found is not None and found != "assoc.scene":
+        raise InvalidInputError(
+            f"{path}: has the format {found[:60]!r}, expected 'assoc.scene' or 'assoc.problem'"
+        )
+    from assoc.scene import Scene
+
+    return Scene.load(path)
+
+
+def _format_of(path: str) -> str | None:
+    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
+    import io
+    import zipfile
+
+    import numpy as np
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            member = archive.getinfo("format.npy")
+            if member.file_size > 10_000:
+                return None
+            text = np.lib.format.read_array(io.BytesIO(archive.read(member)), allow_pickle=False)
+    except Exception:  # whatever a damaged file raises here, the loader says it better
+        return None
+    return str(text) if text.dtype.kind == "U" and text.ndim == 0 else None
+
+
+def _plan(
+    sources: list[Scene | AssignmentProblem],
+    files: list[str],
+    solver: str,
+    settings: dict[str, Any],
+    parameters: dict[str, Any],
+) -> tuple[Plan, list[tuple[int, int]]]:
+    from assoc._plan import Plan
+
+    gating: dict[str, Any] = {
+        key: settings[key] for key in ("gate_probability", "max_tuples") if key in settings
+    }
+    plan = Plan(
+        tuple(sources), solver, settings.get("seed", 0), settings.get("time_limit"), parameters, gating
+    )
+    items = plan.items()
+    if "scans" in settings:
+        counts = [sum(number == n for number, _ in items) for n in range(len(files))]
+        chosen = [
+            _scan_range(settings["scans"], count, file) for count, file in zip(counts, files, strict=True)
+        ]
+        items = [(number, k) for number, k in items if k in chosen[number]]
+    return plan, items
+
+
+def _scan_range(text: str, count: int, file: str) -> range:
+    """Parse A:B or A, within the scans of a file."""
+    first, colon, last = text.partition(":")
+    try:
+        start = int(first) if first or not colon else 0
+        stop = (int(last) if last else count) if colon else start + 1
+    except ValueError:
+        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
+    if not 0 <= start < stop <= count:
+        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {file}")
+    return range(start, stop)
+
+
+def _with_progress(scans: Iterator[ScanAssociation], count: int) -> Iterator[ScanAssociation]:
+    """Show a progress bar on stderr if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield from scans
+        return
+    from rich.console import Console
+    from rich.progress import track
+
+    yield from track(
+        scans, description="associating", total=count, console=Console(stderr=True), transient=True
+    )
+
+
+def _write(association: Association, names: list[str], json_path: str | None, csv_path: str | None) -> None:
+    if json_path:
+        from assoc.association import write_json
+
+        content = association.to_dict()
+        if len(set(names)) > 1:
+            for scan, name in zip(content["scans"], names, strict=True):
+                scan["file"] = name
+        write_json(json_path, content)
+    if csv_path:
+        from assoc._files import write_atomically
+        from assoc._tables import to_csv
+
+        text = to_csv(association.scans, names)
+        write_atomically(csv_path, lambda file: file.write(text.encode()))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
