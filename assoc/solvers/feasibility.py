@@ -1,0 +1,27 @@
+"""Finding any solution of a problem without dummies, or proving that there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.solvers.bounds import dual_bound
+from assoc.solvers.branch_and_bound import Search
+from assoc.solvers.packing import Packing
+from assoc.solvers.run import Run
+
+
+def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
+    """Return the columns of some complete solution; None when none exists or time is over."""
+    if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
+        return None
+    chosen = []
+    for c in range(packing.num_components):
+        part = packing.component(c)
+        search = Search(part, dual_bound(part), np.inf, 1e-9)
+        while search.columns is None and not search.done and not run.should_stop():
+            search.run(20)
+        if search.columns is None:
+            return None
+        chosen.append(part.origin[search.columns])
+    return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)

@@ -1,0 +1,202 @@
+"""Insertion with ejection: the local search that all heuristic solvers share.
+
+A cover is held as the owner of each row: the chosen column that uses it, or -1. Inserting a column ejects
+the owners of its rows; the rows that this frees can be used by other columns. Rows that changed are looked
+at again until nothing improves.
+
+Without dummies some rows must be covered. A penalty larger than any sum of weights is then taken off each
+column for every such row, so that covering comes before cost; what the penalty adds is known and removed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._compiled import njit
+from assoc.solvers.packing import Packing
+from assoc.solvers.run import Run
+
+Floats = NDArray[np.float64]
+
+
+class Cover:
+    """A choice of columns that share no row, changed in place.
+
+    Attributes
+    ----------
+    owner : int32 array, shape (R,)
+        The chosen column that uses each row, or -1.
+    """
+
+    def __init__(self, packing: Packing, owner: NDArray[np.int32]) -> None:
+        self.packing = packing
+        self.owner = owner
+
+    @classmethod
+    def empty(cls, packing: Packing) -> Cover:
+        """Return the cover without any column."""
+        return cls(packing, np.full(packing.num_rows, -1, dtype=np.int32))
+
+    @classmethod
+    def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
+        """Return the cover of columns that share no row."""
+        cover = cls.empty(packing)
+        rows = packing.cols[columns]
+        used = rows >= 0
+        cover.owner[rows[used]] = np.repeat(columns, used.sum(axis=1))
+        return cover
+
+    def columns(self) -> NDArray[np.int32]:
+        """Return the chosen columns, ascending."""
+        return np.unique(self.owner[self.owner >= 0])
+
+    @property
+    def weight(self) -> float:
+        """Total weight of the chosen columns."""
+        return float(self.packing.weights[self.columns()].sum())
+
+    @property
+    def complete_already(self) -> bool:
+        """Whether all rows without slack are covered."""
+        return not bool((self.owner[~self.packing.slack] < 0).any())
+
+    def add_greedily(self, order: NDArray[np.integer]) -> None:
+        """Add columns in the given order while they fit; with slack only those of negative weight."""
+        packing = self.packing
+        _add_greedily(packing.cols, packing.weights, packing.slack, order, self.owner)
+
+    def improve(self) -> None:
+        """Insert with ejection until no insertion improves."""
+        packing = self.packing
+        weights = packing.weights if not packing.is_axial else penalised(packing)
+        rows = np.arange(packing.num_rows, dtype=np.int32)
+        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows)
+
+    def complete(self, run: Run) -> bool:
+        """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
+
+        Raises
+        ------
+        InfeasibleError
+            Never; the caller knows the problem's words for it.
+        """
+        if self.complete_already:
+            return True
+        self.improve()
+        if self.complete_already:
+            return True
+        from assoc.solvers.feasibility import first_solution
+
+        columns = first_solution(self.packing, run)
+        if columns is None:
+            return False
+        self.owner[:] = Cover.of(self.packing, columns).owner
+        return True
+
+
+def penalised(packing: Packing) -> Floats:
+    """Return weights with a penalty taken off for every row without slack that a column covers."""
+    penalty = 2.0 * float(np.abs(packing.weights).max(initial=0.0)) * packing.cols.shape[1] + 1.0
+    duties = np.where(packing.cols >= 0, ~packing.slack[packing.cols], False).sum(axis=1)
+    return packing.weights - penalty * duties
+
+
+@njit
+def _add_greedily(cols: Any, weights: Floats, slack: Any, order: Any, owner: Any) -> None:
+    num_sensors = cols.shape[1]
+    for j in order:
+        fits = True
+        duty = False
+        for s in range(num_sensors):
+            r = cols[j, s]
+            if r >= 0:
+                if owner[r] >= 0:
+                    fits = False
+                    break
+                duty = duty or not slack[r]
+        if fits and (weights[j] < 0.0 or duty):
+            for s in range(num_sensors):
+                if cols[j, s] >= 0:
+                    owner[cols[j, s]] = j
+
+
+@njit
+def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
+    """Weight of column j less that of the columns it would eject; negative is good."""
+    num_sensors = cols.shape[1]
+    change = weights[j]
+    for s in range(num_sensors):
+        r = cols[j, s]
+        if r >= 0 and owner[r] >= 0:
+            k = owner[r]
+            counted = False
+            for q in range(s):
+                if cols[j, q] >= 0 and owner[cols[j, q]] == k:
+                    counted = True
+                    break
+            if not counted:
+                change -= weights[k]
+    return change
+
+
+@njit
+def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int:
+    """Eject the owners of column j's rows and insert it; rows that lost their owner go to ``changed``."""
+    num_sensors = cols.shape[1]
+    for s in range(num_sensors):
+        r = cols[j, s]
+        if r >= 0:
+            k = owner[r]
+            if k >= 0 and k != j:
+                for q in range(num_sensors):
+                    if cols[k, q] >= 0:
+                        owner[cols[k, q]] = -1
+                        changed[num_changed] = cols[k, q]
+                        num_changed += 1
+    for s in range(num_sensors):
+        if cols[j, s] >= 0:
+            owner[cols[j, s]] = j
+            changed[num_changed] = cols[j, s]
+            num_changed += 1
+    return num_changed
+
+
+@njit
+def _improve(cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any, rows: Any) -> float:
+    """Insert with ejection around ``rows`` and all rows that change; the sum of the gains."""
+    num_sensors = cols.shape[1]
+    queue = np.empty(owner.size, np.int32)
+    waiting = np.zeros(owner.size, np.bool_)
+    changed = np.empty(num_sensors * (num_sensors + 1), np.int32)
+    head, count = 0, 0
+    for r in rows:
+        queue[count] = r
+        waiting[r] = True
+        count += 1
+    total = 0.0
+    while count > 0:
+        r = queue[head]
+        head = (head + 1) % owner.size
+        count -= 1
+        waiting[r] = False
+        best, chosen = -1e-12, -1
+        for k in range(row_ptr[r], row_ptr[r + 1]):
+            j = row_cols[k]
+            if owner[r] == j:
+                continue
+            gain = insertion_gain(cols, weights, owner, j)
+            if gain < best - 1e-12 * abs(weights[j]):
+                best, chosen = gain, j
+        if chosen >= 0:
+            total += best
+            num_changed = insert(cols, owner, chosen, changed, 0)
+            for i in range(num_changed):
+                q = changed[i]
+                if not waiting[q]:
+                    waiting[q] = True
+                    queue[(head + count) % owner.size] = q
+                    count += 1
+    return total

@@ -1,0 +1,268 @@
+"""What ant colony, genetic algorithm and tabu search share: parts, reduced-cost fixing, stopping, proof.
+
+The packing is taken apart into parts (first its components). A part is searched for some iterations; then
+columns whose reduced cost exceeds the part's gap are dropped, since no better solution can use them, and
+what is left is taken apart again. A part whose gap is closed is done. Parts take turns, so that a time
+limit is shared between them. At the end a short branch and bound (branch_and_bound.py) raises the bounds
+of small open parts; it never changes the solution, which is the metaheuristic's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InfeasibleError
+from assoc.solvers.bounds import component_bounds, dual_bound, hard_pass, reduced_costs
+from assoc.solvers.branch_and_bound import Search
+from assoc.solvers.local_search import Cover
+from assoc.solvers.packing import Packing
+from assoc.solvers.run import Outcome, Run
+
+Floats = NDArray[np.float64]
+Owner = NDArray[np.int32]
+
+TOLERANCE = 1e-9
+_PROOF_NODES = 2000
+
+
+@dataclass(slots=True)
+class Part:
+    """A connected piece of the problem with its multipliers and the best cover known.
+
+    Attributes
+    ----------
+    packing : Packing
+        One component.
+    duals, reduced : float arrays, shapes (R,) and (N,)
+        Feasible multipliers and reduced costs.
+    bound : float
+        Valid lower bound of the part.
+    origin : int array, shape (N,)
+        The columns' places in the packing that the solver was given.
+    best : int32 array, shape (R,), or None
+        Owner of each row in the best complete cover known.
+    weight : float
+        Its weight; ``inf`` when none is known.
+    """
+
+    packing: Packing
+    duals: Floats
+    reduced: Floats
+    bound: float
+    origin: NDArray[np.int64]
+    best: Owner | None = None
+    weight: float = np.inf
+    iterations: int = 0
+    stalled: int = 0
+
+    @property
+    def tolerance(self) -> float:
+        """Differences of weight that do not count."""
+        return TOLERANCE * max(1.0, abs(self.bound))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the best cover is optimal."""
+        return self.weight - self.bound <= self.tolerance
+
+    @property
+    def temperature(self) -> float:
+        """Scale of the reduced costs that matter: a share of the gap, at most of the weights' spread."""
+        widest = max(0.02 * float(np.ptp(self.packing.weights)), 1e-12)
+        if self.weight < np.inf:
+            return min(max((self.weight - self.bound) / 10.0, self.tolerance), widest)
+        return widest
+
+    def offer(self, owner: Owner, weight: float) -> bool:
+        """Keep a cover if it is complete and better than the best; whether it was."""
+        if weight < self.weight - self.tolerance and not bool((owner[~self.packing.slack] < 0).any()):
+            self.best, self.weight = owner.copy(), weight
+            return True
+        return False
+
+
+class Searcher(Protocol):
+    """A metaheuristic at work on one part."""
+
+    def iterate(self, part: Part, rng: np.random.Generator) -> None:
+        """Do one iteration and ``offer`` what it finds to the part."""
+
+
+def solve_by(
+    make: Callable[[Part, np.random.Generator], Searcher], packing: Packing, run: Run, iterations: int, patience: int
+) -> Outcome:
+    """Run a metaheuristic on every part of the packing.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the searcher of a part.
+    packing : Packing
+        The whole problem.
+    run : Run
+        Clock, random generator, trace.
+    iterations : int
+        Iterations on one part at the most.
+    patience : int
+        A part is left after so many iterations without improvement.
+
+    Raises
+    ------
+    InfeasibleError
+        A part has no complete cover, or none was found.
+    """
+    # without a solution at the time limit there would be nothing to return: the bound gets a share of the time
+    duals = dual_bound(packing, run=Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started))
+    columns: list[NDArray[np.int64]] = []
+    total_bound = 0.0
+    done_weight = 0.0
+    total_iterations = 0
+    queue = [
+        (part, make(part, run.rng)) for part in _parts(packing, duals, np.arange(packing.num_columns))
+    ]
+    root_bound = sum(part.bound for part, _ in queue)
+    while queue:
+        part, searcher = queue.pop(0)
+        first = part.best is None
+        turn = 0
+        while first or turn < 10:
+            before = part.weight
+            searcher.iterate(part, run.rng)
+            first = False
+            turn += 1
+            part.iterations += 1
+            part.stalled = 0 if part.weight < before else part.stalled + 1
+            if part.weight < before and len(queue) < 50:
+                known = done_weight + part.weight + sum(p.weight for p, _ in queue)
+                if known < np.inf:
+                    run.record(total_iterations + turn, known, root_bound)
+            if part.closed or part.stalled >= patience or part.iterations >= iterations or run.should_stop():
+                break
+        total_iterations += turn
+        over = part.stalled >= patience or part.iterations >= iterations or bool(run.stopped_by)
+        if part.best is None and over:
+            _complete(part, run)
+        pieces = None if part.closed or over else _split(part)
+        if pieces is not None:
+            for piece in pieces:
+                if piece.closed:
+                    columns.append(piece.origin[_columns(piece)])
+                    total_bound += piece.bound
+                    done_weight += piece.weight
+                else:
+                    queue.append((piece, make(piece, run.rng)))
+        elif part.closed or over:
+            columns.append(part.origin[_columns(part)])
+            total_bound += part.bound if part.closed else _proof(part, run)
+            done_weight += part.weight
+        else:
+            queue.append((part, searcher))
+    chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
+    run.record(total_iterations, done_weight, total_bound)
+    return Outcome(chosen, total_iterations, total_bound, duals)
+
+
+def _parts(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
+    bounds = component_bounds(packing, duals)
+    if np.isposinf(bounds).any():
+        from assoc.solvers.front import infeasible
+
+        raise infeasible(packing)
+    reduced = reduced_costs(packing, duals)
+    parts = []
+    for c in range(packing.num_components):
+        piece = packing.component(c) if packing.num_components > 1 else packing
+        top, end = packing.row_start[c], packing.row_start[c + 1]
+        first, last = packing.col_start[c], packing.col_start[c + 1]
+        parts.append(Part(piece, duals[top:end], reduced[first:last], float(bounds[c]), origin[first:last]))
+    return parts
+
+
+def _split(part: Part) -> list[Part] | None:
+    """Drop the columns that no better solution can use; None unless that shrinks the part by a third."""
+    if part.best is None:
+        return None
+    keep = part.reduced <= part.weight - part.bound
+    chosen = np.unique(part.best[part.best >= 0])
+    keep[chosen] = True
+    if np.count_nonzero(keep) > 2 * keep.size // 3:
+        return None
+    smaller = part.packing.restrict(keep)
+    duals = np.where(smaller.slack, np.minimum(part.duals[smaller.row_origin], 0.0), part.duals[smaller.row_origin])
+    # multipliers of rows that lost all their columns bound nothing any more
+    lost = np.ones(part.packing.num_rows, dtype=bool)
+    lost[smaller.row_origin] = False
+    duals = np.ascontiguousarray(duals)
+    hard_pass(smaller, duals, np.empty(smaller.num_columns), 1)
+    place = np.full(part.packing.num_columns, -1, dtype=np.int32)
+    place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
+    owner = part.best[smaller.row_origin]
+    owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
+    pieces = _parts(smaller, duals, part.origin[smaller.origin])
+    for c, piece in enumerate(pieces):
+        own = owner[smaller.row_start[c] : smaller.row_start[c + 1]]
+        piece.best = np.where(own >= 0, own - smaller.col_start[c], -1).astype(np.int32)
+        piece.weight = float(piece.packing.weights[_columns(piece)].sum())
+        piece.iterations, piece.stalled = part.iterations, part.stalled
+    return pieces
+
+
+def _columns(part: Part) -> NDArray[np.int64]:
+    assert part.best is not None
+    return np.unique(part.best[part.best >= 0]).astype(np.int64)
+
+
+def _complete(part: Part, run: Run) -> None:
+    """Last resort for a part in which no iteration covered all that must be covered."""
+    from assoc.solvers.front import infeasible
+
+    cover = Cover.empty(part.packing)
+    cover.add_greedily(np.argsort(part.reduced, kind="stable"))
+    if not cover.complete(run):
+        raise infeasible(part.packing)
+    part.offer(cover.owner, cover.weight)
+    if part.best is None:
+        raise InfeasibleError("no complete solution was found")
+
+
+def _proof(part: Part, run: Run) -> float:
+    """Raise the bound of an open part by a short branch and bound."""
+    if run.should_stop():
+        return part.bound
+    search = Search(part.packing, part.duals, part.weight, part.tolerance)
+    while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
+        search.run(50)
+    return min(max(part.bound, search.lower_bound), part.weight)
+
+
+def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:
+    """Return a valid bound, made tight enough to prove this choice of columns where it is optimal.
+
+    Parameters
+    ----------
+    packing : Packing
+        The problem.
+    columns : int array
+        A complete choice of columns.
+    run : Run
+        Clock.
+
+    Returns
+    -------
+    float, float array
+        The bound and the multipliers that give its dual part.
+    """
+    duals = dual_bound(packing, run=run)
+    owner = Cover.of(packing, columns).owner
+    total = 0.0
+    for c, part in enumerate(_parts(packing, duals, np.arange(packing.num_columns))):
+        own = owner[packing.row_start[c] : packing.row_start[c + 1]]
+        part.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
+        part.weight = float(part.packing.weights[_columns(part)].sum())
+        total += part.bound if part.closed else _proof(part, run)
+    return total, duals

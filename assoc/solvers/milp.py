@@ -1,0 +1,244 @@
+"""Mixed-integer programming by OR-Tools: the field's general exact methods behind the same door.
+
+The model is the packing itself: x_j in {0, 1} for each column, for each row sum x_j <= 1, or = 1 where the
+row has no slack. The backends are
+
+- ``scip`` and ``highs``: float costs, scaled by a power of two (exact) so that the largest is of order 100;
+  relative gap, dual feasibility and integrality tolerances 1e-9, all set explicitly. The bound reported is
+  theirs less what these tolerances can add up to.
+- ``cp_sat``: integer costs round(2^k w). k is the largest with sum |2^k w| < 2^60, but no larger than
+  needed to keep the rounding of a whole solution below 1e-7. The largest rounding that occurred, times
+  the columns a solution can have, is taken off its bound.
+
+When the time is over the better of the backend's solution and a greedy one, improved by insertion, is
+returned, with the better of the backend's bound and the dual bound.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.solvers.run import Outcome, Parameters, Run
+
+if TYPE_CHECKING:
+    from assoc.solvers.packing import Packing
+
+BACKENDS = ("scip", "cp_sat", "highs")
+
+_TOLERANCE = 1e-9
+_LARGEST_COST = 7  # costs for the float backends are below 2^7
+_ROUNDING = 1e-7
+_LARGEST_SUM = 60  # CP-SAT's sums must stay below 2^63
+
+
+@dataclass(frozen=True)
+class MilpParameters(Parameters):
+    """Parameters of ``milp``.
+
+    Attributes
+    ----------
+    backend : {"scip", "cp_sat", "highs"}
+        Which solver of OR-Tools.
+    workers : int
+        Threads; with more than one the answer may be another of the same cost.
+    """
+
+    backend: str = field(default="scip", metadata={"help": "scip, cp_sat or highs"})
+    workers: int = field(default=1, metadata={"help": "threads; with 1 the same seed gives the same tuples"})
+
+    def __post_init__(self) -> None:
+        self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
+        whole = isinstance(self.workers, (int, np.integer)) and not isinstance(self.workers, bool)
+        self._require(whole and 1 <= self.workers <= 1024, "workers", "a whole number in 1..1024")
+
+
+class _Answer(NamedTuple):
+    """A backend's answer in the packing's own units."""
+
+    columns: NDArray[np.int64] | None
+    bound: float
+    proven: bool
+    infeasible: bool
+    nodes: int
+
+
+def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
+    """Solve by branch and cut; one iteration is one node (or branch of CP-SAT).
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution, or none was found in the time.
+    """
+    from assoc.solvers.bounds import certified_bound, dual_bound
+    from assoc.solvers.front import infeasible
+
+    if packing.num_columns == 0:
+        if packing.is_axial:
+            raise infeasible(packing)
+        return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
+    bound, duals = -math.inf, None
+    if run.time_limit is not None:
+        # made first: when the time is over it would be too late
+        duals = dual_bound(packing, run=run)
+        bound = certified_bound(packing, duals)
+    backend = _cp_sat if parameters.backend == "cp_sat" else _math_opt
+    answer = backend(packing, parameters, run.remaining())
+    if answer.infeasible:
+        raise infeasible(packing)
+    columns = answer.columns
+    if not answer.proven:
+        run.should_stop()
+        columns = _better(packing, columns, run)
+    if columns is None:
+        raise infeasible(packing)
+    if answer.bound > bound:
+        bound, duals = answer.bound, None
+    run.record(answer.nodes, float(packing.weights[columns].sum()), bound)
+    return Outcome(columns, answer.nodes, bound, duals)
+
+
+def _better(packing: Packing, columns: NDArray[np.int64] | None, run: Run) -> NDArray[np.integer] | None:
+    """Return the better of these columns and a greedy solution improved by insertion."""
+    from assoc.solvers.local_search import Cover
+
+    cover = Cover.empty(packing)
+    cover.add_greedily(np.argsort(packing.weights, kind="stable"))
+    cover.improve()
+    if columns is None:
+        return cover.columns() if cover.complete(run) else None
+    if cover.complete_already and cover.weight < float(packing.weights[columns].sum()):
+        return cover.columns()
+    return columns
+
+
+def _most_columns(packing: Packing) -> int:
+    """Return how many columns a solution can have at the most."""
+    sizes = np.count_nonzero(packing.cols >= 0, axis=1)
+    return packing.num_rows // max(int(sizes.min()), 1)
+
+
+def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _Answer:
+    """Solve by SCIP or HiGHS through MathOpt."""
+    from ortools.math_opt.python import mathopt
+
+    exponent = _LARGEST_COST - math.frexp(float(np.abs(packing.weights).max()))[1]
+    model = mathopt.Model.from_model_proto(_model(packing, np.ldexp(packing.weights, exponent)))
+    kind = mathopt.SolverType.GSCIP if parameters.backend == "scip" else mathopt.SolverType.HIGHS
+    options = mathopt.SolveParameters(
+        threads=parameters.workers, relative_gap_tolerance=_TOLERANCE, absolute_gap_tolerance=_TOLERANCE
+    )
+    if math.isfinite(seconds):
+        options.time_limit = datetime.timedelta(seconds=max(seconds, 0.001))
+    if parameters.backend == "scip":
+        options.gscip.real_params["numerics/feastol"] = _TOLERANCE
+        options.gscip.real_params["numerics/dualfeastol"] = _TOLERANCE
+    else:
+        for name in ("mip_feasibility", "primal_feasibility", "dual_feasibility"):
+            options.highs.double_options[f"{name}_tolerance"] = _TOLERANCE
+    result = mathopt.solve(model, kind, params=options)
+    reason = result.termination.reason
+    columns = None
+    if result.has_primal_feasible_solution():
+        values = np.array(list(result.variable_values().values()))
+        columns = _checked(packing, np.flatnonzero(values > 0.5))
+    bound = result.best_objective_bound()
+    # reduced costs may be negative by the tolerance, in each column of a solution; nodes are cut off by gap
+    bound -= _TOLERANCE * (_most_columns(packing) + 2.0 * abs(bound)) if math.isfinite(bound) else 0.0
+    return _Answer(
+        columns,
+        -math.inf if math.isnan(bound) or bound == math.inf else math.ldexp(bound, -exponent),
+        reason == mathopt.TerminationReason.OPTIMAL and columns is not None,
+        reason == mathopt.TerminationReason.INFEASIBLE,
+        int(result.solve_stats.node_count),
+    )
+
+
+def _model(packing: Packing, weights: NDArray[np.float64]) -> Any:
+    """Return the packing as MathOpt's protocol buffer: much quicker to fill than a model by names."""
+    from ortools.math_opt import model_pb2
+
+    num, rows = packing.num_columns, packing.num_rows
+    proto = model_pb2.ModelProto()
+    proto.variables.ids.extend(range(num))
+    proto.variables.lower_bounds.extend([0.0] * num)
+    proto.variables.upper_bounds.extend([1.0] * num)
+    proto.variables.integers.extend([True] * num)
+    proto.objective.linear_coefficients.ids.extend(range(num))
+    proto.objective.linear_coefficients.values.extend(weights.tolist())
+    proto.linear_constraints.ids.extend(range(rows))
+    proto.linear_constraints.lower_bounds.extend((~packing.slack).astype(float).tolist())
+    proto.linear_constraints.upper_bounds.extend([1.0] * rows)
+    matrix = proto.linear_constraint_matrix
+    matrix.row_ids.extend(np.repeat(np.arange(rows), np.diff(packing.row_ptr)).tolist())
+    matrix.column_ids.extend(packing.row_cols.tolist())
+    matrix.coefficients.extend([1.0] * packing.row_cols.size)
+    return proto
+
+
+def _cp_sat(packing: Packing, parameters: MilpParameters, seconds: float) -> _Answer:
+    """Solve by CP-SAT on integer weights."""
+    from ortools.sat import cp_model_pb2
+    from ortools.sat.python import cp_model
+
+    exponent = _integer_exponent(packing)
+    scaled = np.ldexp(packing.weights, exponent)
+    integers = np.rint(scaled)
+    model = cp_model.CpModel()
+    take = [model.new_bool_var("") for _ in range(packing.num_columns)]
+    for r, slack in enumerate(packing.slack.tolist()):
+        members = [take[j] for j in packing.row_cols[packing.row_ptr[r] : packing.row_ptr[r + 1]].tolist()]
+        if slack:
+            model.add_at_most_one(members)
+        else:
+            model.add_exactly_one(members)
+    model.minimize(cp_model.LinearExpr.weighted_sum(take, integers.astype(np.int64).tolist()))
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = parameters.workers
+    solver.parameters.relative_gap_limit = 0.0
+    solver.parameters.absolute_gap_limit = 0.0
+    if math.isfinite(seconds):
+        solver.parameters.max_time_in_seconds = max(seconds, 0.001)
+    status = solver.solve(model)
+    states = cp_model_pb2.CpSolverStatus
+    columns = None
+    if status in (states.OPTIMAL, states.FEASIBLE):
+        chosen = np.fromiter((solver.boolean_value(x) for x in take), dtype=np.bool_, count=len(take))
+        columns = _checked(packing, np.flatnonzero(chosen))
+    rounding = float(np.abs(scaled - integers).max()) * _most_columns(packing)
+    # before CP-SAT has a bound of its own, it reports 0
+    least = float(integers[integers < 0].sum())
+    bound = solver.best_objective_bound
+    known = status == states.OPTIMAL or (columns is not None and bound < 0.0)
+    return _Answer(
+        columns,
+        math.ldexp((bound if known else least) - rounding, -exponent),
+        status == states.OPTIMAL and columns is not None,
+        status == states.INFEASIBLE,
+        int(solver.num_branches),
+    )
+
+
+def _integer_exponent(packing: Packing) -> int:
+    """Return k: weights times 2^k are rounded to integers."""
+    # frexp: x < 2^e
+    room = _LARGEST_SUM - math.frexp(float(np.abs(packing.weights).sum()))[1]
+    wanted = math.frexp(0.5 * _most_columns(packing) / _ROUNDING)[1]
+    return min(room, wanted)
+
+
+def _checked(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Return the columns if they are a solution, else None."""
+    rows = packing.cols[columns]
+    covered = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
+    wrong = (covered > 1).any() or (covered[~packing.slack] != 1).any()
+    return None if wrong else columns
+
+
+parameters = MilpParameters
