@@ -93,7 +93,7 @@ def _hits(rows: Sequence[Row]) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.3g} %"
+    return "0 %" if abs(value) < 1e-9 else f"{100 * value:.3g} %"
 
 
 def _always(results: Results, family: str, size: str, solvers: Iterable[str], goal: str) -> list[Verdict]:
