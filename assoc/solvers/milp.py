@@ -7,8 +7,8 @@ row has no slack. The backends are
   relative gap, dual feasibility and integrality tolerances 1e-9, all set explicitly. The bound reported is
   theirs less what these tolerances can add up to.
 - ``cp_sat``: integer costs round(2^k w). k is the largest with sum |2^k w| < 2^60, but no larger than
-  needed to keep the rounding of a whole solution below 1e-7. The largest rounding that occurred, times
-  the columns a solution can have, is taken off its bound.
+  needed to keep the rounding of a whole solution below 1e-7 (or 1e-7 max |w|, if smaller). The largest
+  rounding that occurred, times the columns a solution can have, is taken off its bound.
 
 When the time is over the better of the backend's solution and a greedy one, improved by insertion, is
 returned, with the better of the backend's bound and the dual bound.
@@ -46,11 +46,12 @@ class MilpParameters(Parameters):
     backend : {"scip", "cp_sat", "highs"}
         Which solver of OR-Tools.
     workers : int
-        Threads; with more than one the answer may be another of the same cost.
+        Threads of scip and cp_sat; with more than one the answer may be another of the same cost.
+        HiGHS takes no number from OR-Tools and decides for itself.
     """
 
     backend: str = field(default="scip", metadata={"help": "scip, cp_sat or highs"})
-    workers: int = field(default=1, metadata={"help": "threads; with 1 the same seed gives the same tuples"})
+    workers: int = field(default=1, metadata={"help": "threads of scip, cp_sat; with 1 runs repeat exactly"})
 
     def __post_init__(self) -> None:
         self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
@@ -92,7 +93,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     answer = backend(packing, parameters, run.remaining())
     if answer.infeasible:
         raise infeasible(packing)
-    columns = answer.columns
+    columns: NDArray[np.integer] | None = answer.columns
     if not answer.proven:
         run.should_stop()
         columns = _better(packing, columns, run)
@@ -104,7 +105,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     return Outcome(columns, answer.nodes, bound, duals)
 
 
-def _better(packing: Packing, columns: NDArray[np.int64] | None, run: Run) -> NDArray[np.integer] | None:
+def _better(packing: Packing, columns: NDArray[np.integer] | None, run: Run) -> NDArray[np.integer] | None:
     """Return the better of these columns and a greedy solution improved by insertion."""
     from assoc.solvers.local_search import Cover
 
@@ -131,12 +132,11 @@ def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _
     exponent = _LARGEST_COST - math.frexp(float(np.abs(packing.weights).max()))[1]
     model = mathopt.Model.from_model_proto(_model(packing, np.ldexp(packing.weights, exponent)))
     kind = mathopt.SolverType.GSCIP if parameters.backend == "scip" else mathopt.SolverType.HIGHS
-    options = mathopt.SolveParameters(
-        threads=parameters.workers, relative_gap_tolerance=_TOLERANCE, absolute_gap_tolerance=_TOLERANCE
-    )
+    options = mathopt.SolveParameters(relative_gap_tolerance=_TOLERANCE, absolute_gap_tolerance=_TOLERANCE)
     if math.isfinite(seconds):
         options.time_limit = datetime.timedelta(seconds=max(seconds, 0.001))
     if parameters.backend == "scip":
+        options.threads = parameters.workers
         options.gscip.real_params["numerics/feastol"] = _TOLERANCE
         options.gscip.real_params["numerics/dualfeastol"] = _TOLERANCE
     else:
@@ -215,7 +215,7 @@ def _cp_sat(packing: Packing, parameters: MilpParameters, seconds: float) -> _An
     # before CP-SAT has a bound of its own, it reports 0
     least = float(integers[integers < 0].sum())
     bound = solver.best_objective_bound
-    known = status == states.OPTIMAL or (columns is not None and bound < 0.0)
+    known = status == states.OPTIMAL or (status == states.FEASIBLE and bound != 0.0)
     return _Answer(
         columns,
         math.ldexp((bound if known else least) - rounding, -exponent),
@@ -229,7 +229,8 @@ def _integer_exponent(packing: Packing) -> int:
     """Return k: weights times 2^k are rounded to integers."""
     # frexp: x < 2^e
     room = _LARGEST_SUM - math.frexp(float(np.abs(packing.weights).sum()))[1]
-    wanted = math.frexp(0.5 * _most_columns(packing) / _ROUNDING)[1]
+    rounding = _ROUNDING * min(1.0, float(np.abs(packing.weights).max()))
+    wanted = math.frexp(0.5 * _most_columns(packing) / rounding)[1] if rounding > 0.0 else 0
     return min(room, wanted)
 
 

@@ -1,0 +1,97 @@
+"""The three backends of milp against exhaustive search, each other, and the clock."""
+
+import time
+
+import numpy as np
+import pytest
+
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.solvers.front import assign
+from experiments.instances.synthetic import axial_random, planted
+from tests.oracles import axial_problem, brute_force, check_answer, gated_problem, small_problems
+
+BACKENDS = ("scip", "cp_sat", "highs")
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_optimal_on_small_problems(backend):
+    infeasible = 0
+    for problem in small_problems(90, seed=11):
+        try:
+            expected = brute_force(problem)
+        except InfeasibleError:
+            infeasible += 1
+            with pytest.raises(InfeasibleError):
+                assign(problem, "milp", backend=backend)
+            continue
+        solution = assign(problem, "milp", backend=backend)
+        assert check_answer(problem, solution.tuples) == pytest.approx(expected, abs=1e-9)
+        assert solution.lower_bound <= expected + 1e-12
+        assert solution.status == "optimal"
+    assert infeasible > 0
+
+
+def test_backends_agree_on_fifty_random_problems():
+    rng = np.random.default_rng(5)
+    for number in range(50):
+        if number % 3:
+            sizes = tuple(rng.integers(4, 9, rng.integers(3, 5)).tolist())
+            problem = gated_problem(rng, sizes, 0.2, "mixed", listed_singletons=0.3)
+        else:
+            problem = axial_problem(rng, tuple(rng.integers(4, 7, 3).tolist()), 1.0, "mixed")
+        costs = [assign(problem, "milp", backend=backend).cost for backend in BACKENDS]
+        assert max(costs) - min(costs) <= 1e-6
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12, 1e250])
+def test_scale_of_costs_does_not_matter(backend, scale):
+    rng = np.random.default_rng(3)
+    problem = gated_problem(rng, (4, 4, 4), 0.5)
+    scaled = AssignmentProblem(problem.tuples, problem.costs * scale, problem.sizes)
+    best = brute_force(problem)
+    solution = assign(scaled, "milp", backend=backend)
+    assert solution.cost / scale == pytest.approx(best, rel=1e-9)
+    assert solution.lower_bound / scale <= best + 1e-12 * abs(best)
+    assert solution.lower_bound / scale == pytest.approx(best, rel=1e-6)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_known_optimum(backend):
+    problem, optimum = planted(4, seed=100, targets=8)
+    solution = assign(problem, "milp", backend=backend)
+    assert solution.cost == pytest.approx(optimum, abs=1e-6)
+    assert solution.status == "optimal"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_time_limit_returns_best_and_valid_bound(backend):
+    problem = axial_random(20, seed=100)
+    started = time.perf_counter()
+    solution = assign(problem, "milp", backend=backend, time_limit=0.5)
+    assert time.perf_counter() - started < 6.0
+    check_answer(problem, solution.tuples)
+    # the costs are >= 0 and an optimum of 20 tuples is far below 100 (the average of a random one is 990)
+    assert 0.0 <= solution.lower_bound <= 40.0
+    assert solution.cost < 200.0
+    if solution.status != "optimal":
+        assert solution.stopped_by == "time_limit"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_no_columns(backend):
+    empty = AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])
+    assert assign(empty, "milp", backend=backend).cost == 0.0
+    with pytest.raises(InfeasibleError):
+        axial = AssignmentProblem(np.zeros((0, 2), dtype=int), [], [1, 1], dummy=False)
+        assign(axial, "milp", backend=backend)
+
+
+def test_parameters_are_checked():
+    problem = axial_random(3, seed=100)
+    with pytest.raises(InvalidInputError, match="backend: expected one of scip, cp_sat, highs"):
+        assign(problem, "milp", backend="gurobi")
+    for workers in (0, 1.5, True):
+        with pytest.raises(InvalidInputError, match="workers: expected"):
+            assign(problem, "milp", workers=workers)
