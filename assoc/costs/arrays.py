@@ -109,10 +109,10 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     )
 
 
-def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float) -> tuple[ScanArrays, Array]:
+def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -> tuple[ScanArrays, Array]:
     """Flat arrays of one scan, and for each row its 1-based index in the scan, int32 (N,).
 
-    `reach` is the largest chi-square value that a gate will admit.
+    `reach` and `least` are the largest and the smallest gate that pairs will have to pass.
     """
     count = len(sensors.dim)
     if len(scan.measurements) != count:
@@ -144,5 +144,6 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float) -> tuple[ScanAr
         z,
         owner,
         reach,
+        least,
     )
     return ScanArrays(z, owner, start, centre, spread, information), index

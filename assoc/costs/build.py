@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
-from assoc.costs.gating import Gates, chi_square_quantiles, make_gates
+from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
@@ -40,7 +40,8 @@ def build_problem(
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
 
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
-    measures full positions, else two), at least one.
+    measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
+    heights are sought within three half heights of the middle of the scene's region.
 
     Parameters
     ----------
@@ -79,8 +80,9 @@ def build_problem(
     one = _scan(scene, scan)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
-    reach = float(gates.pair.max(initial=1.0)) if len(scene.sensors) > 1 else 1.0
-    measured, index = scan_arrays(sensors, one, reach)
+    limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
+    reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
+    measured, index = scan_arrays(sensors, one, reach, least)
     limits = {"number": one.index, "max_tuples": int(max_tuples)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
     rows, costs = grow(sensors, measured, pairs, gates, **limits)
@@ -108,7 +110,7 @@ def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
     sensors = sensor_arrays(scene)
-    rows, chi, _, _ = _fit_tuples(scene, scan, tuples, False)
+    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)
@@ -135,7 +137,7 @@ def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> 
     InvalidInputError
         As `tuple_costs`.
     """
-    _, _, positions, covariances = _fit_tuples(scene, scan, tuples, True)
+    _, _, positions, covariances = _fit_tuples(scene, scan, tuples)
     return positions, covariances
 
 
@@ -153,12 +155,10 @@ def _scan(scene: Scene, scan: int | Scan) -> Scan:
     return scan if isinstance(scan, Scan) else scene.scan(scan)
 
 
-def _fit_tuples(
-    scene: Scene, scan: int | Scan, tuples: Array, positions: bool
-) -> tuple[Array, Array, Array, Array]:
+def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
     one = _scan(scene, scan)
     sensors = sensor_arrays(scene)
-    measured, index = scan_arrays(sensors, one, float(chi_square_quantiles(GATE_PROBABILITY, 3)[3]))
+    measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
     count, sizes = len(scene.sensors), one.sizes
     wanted = np.asarray(tuples)
     if wanted.size == 0:
@@ -179,4 +179,4 @@ def _fit_tuples(
     row_of = np.empty(len(index) + 1, dtype=np.int32)
     row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
     rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
-    return (rows, *fit(sensors, measured, rows, positions))
+    return (rows, *fit(sensors, measured, rows, False))

@@ -11,6 +11,11 @@ from assoc._compiled import njit
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+HEIGHTS = 3.0
+"""Where no sensor measures full positions, heights are sought this many half heights around the middle."""
+
+_START_REACH = 10.0
+
 
 @njit
 def _invert(c: Array) -> tuple[bool, float, float, float, float, float, float]:
@@ -37,6 +42,71 @@ def _invert(c: Array) -> tuple[bool, float, float, float, float, float, float]:
 
 
 @njit
+def _radar3d(z: Array, place: Array, R: Array, reach: float, least: float, centre: Array, c: Array) -> None:
+    """Range, azimuth, elevation."""
+    slant = max(z[0], 0.0)
+    ca, sa, ce, se = math.cos(z[1]), math.sin(z[1]), math.cos(z[2]), math.sin(z[2])
+    # the target may be a sigma farther than measured; and near the zenith the azimuth opens up
+    arm = max(slant, math.sqrt(R[0, 0]))
+    tilt = arm * max(abs(ce), math.sqrt(R[2, 2]))
+    axes = (
+        (ca * ce, -tilt * sa, -arm * ca * se),
+        (sa * ce, tilt * ca, -arm * sa * se),
+        (se, 0.0, arm * ce),
+    )
+    bend = 0.5 * reach * arm * (R[1, 1] * ce * ce + R[2, 2])
+    wide = 4.0 * arm * arm if reach * max(R[1, 1], R[2, 2]) > 1.0 else 0.0
+    entry = 0
+    for i in range(3):
+        a = axes[i]
+        centre[i] = place[i] + slant * a[0]
+        for j in range(i, 3):
+            b = axes[j]
+            total = 2.0 * bend * bend / least * a[0] * b[0] + (wide if i == j else 0.0)
+            for k in range(3):
+                total += a[k] * (R[k, 0] * b[0] + R[k, 1] * b[1] + R[k, 2] * b[2])
+            c[entry] = total
+            entry += 1
+
+
+@njit
+def _radar2d(
+    z: Array,
+    place: Array,
+    R: Array,
+    middle: float,
+    half: float,
+    reach: float,
+    least: float,
+    centre: Array,
+    c: Array,
+) -> None:
+    """Range and azimuth: the ground ranges that the heights allow make it long."""
+    low, high = middle - HEIGHTS * half - place[2], middle + HEIGHTS * half - place[2]
+    lowest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    most = max(abs(low), abs(high))
+    slack = math.sqrt(_START_REACH * R[0, 0])
+    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    ground = 0.5 * (farthest + nearest)
+    slack = math.sqrt(reach * R[0, 0])
+    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    bend = 0.5 * reach * R[1, 1] * farthest
+    wide = 4.0 * farthest**2 if reach * R[1, 1] > 1.0 else 0.0
+    # a box, not an ellipse: twice, for the target may be at the end of the range and of the azimuth at once
+    along = 2.0 * (max(farthest - ground, ground - nearest, slack) + bend) ** 2 / least + wide
+    across = 2.0 * max(farthest * farthest, R[0, 0]) * R[1, 1] * reach / least + wide
+    ca, sa = math.cos(z[1]), math.sin(z[1])
+    centre[0], centre[1], centre[2] = place[0] + ground * ca, place[1] + ground * sa, middle
+    c[0], c[1], c[3] = (
+        ca * ca * along + sa * sa * across,
+        ca * sa * (along - across),
+        sa * sa * along + ca * ca * across,
+    )
+
+
+@njit
 def convert(
     code: Array,
     dim: Array,
@@ -47,84 +117,48 @@ def convert(
     z: Array,
     owner: Array,
     reach: float,
+    least: float,
 ) -> tuple[Array, Array, Array]:
     """Convert measurements (N, 3) to positions.
 
-    The covariance is the linearised one, widened where the measurement bends so much that the ellipsoid of
-    chi-square value `reach` would not hold the target: by the sagitta of the arc for radars, and for a radar
-    that leaves the height open by the ground ranges that heights within twice the region's allow.
+    The covariance is the linearised one, widened where the measurement bends so much that its ellipsoid of
+    chi-square value `least` would not hold all positions within `reach`, the largest gate: by the sagitta of
+    the arc for radars, and for a radar that leaves the height open by the ground ranges of all heights sought.
 
     Returns
     -------
     centre (N, 3), spread (N, 6), information (N, 6)
-        Position, covariance and its inverse as (xx, xy, xz, yy, yz, zz); zeros for bearings, and of x and y
-        alone for measurements that leave the height open.
+        Position, covariance as (xx, xy, xz, yy, yz, zz) for the gate, and the inverse covariance for a start,
+        which does not depend on the gate. Zeros for bearings, and of x and y alone for measurements that
+        leave the height open.
     """
     count = len(z)
     centre, spread, information = np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6))
-    axes = np.zeros((3, 3))
     for n in range(count):
         s = owner[n]
-        c = spread[n]
+        if code[s] == 3:
+            continue
         R = covariance[s]
-        if code[s] == 0:
-            centre[n, 0], centre[n, 1] = z[n, 0], z[n, 1]
-            centre[n, 2] = z[n, 2] if dim[s] == 3 else middle[2]
-            c[0], c[1], c[2], c[3], c[4], c[5] = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
-        elif code[s] == 1:
-            slant = max(z[n, 0], 0.0)
-            ca, sa, ce, se = math.cos(z[n, 1]), math.sin(z[n, 1]), math.cos(z[n, 2]), math.sin(z[n, 2])
-            axes[0, 0], axes[0, 1], axes[0, 2] = ca * ce, sa * ce, se
-            axes[1, 0], axes[1, 1], axes[1, 2] = -sa, ca, 0.0
-            axes[2, 0], axes[2, 1], axes[2, 2] = -ca * se, -sa * se, ce
-            for k in range(3):
-                centre[n, k] = place[s, k] + slant * axes[0, k]
-            # the target may be a sigma farther than measured; and near the zenith the azimuth opens up
-            arm = max(slant, math.sqrt(R[0, 0]))
-            tilt = max(abs(ce), math.sqrt(R[2, 2]))
-            bend = 0.5 * reach * arm * (R[1, 1] * ce * ce + R[2, 2])
-            wide = 4.0 * arm * arm if reach * max(R[1, 1], R[2, 2]) > 1.0 else 0.0
-            scale0, scale1, scale2 = 1.0, arm * tilt, arm
-            place_in = 0
-            for i in range(3):
-                for j in range(i, 3):
-                    total = wide if i == j else 0.0
-                    for k in range(3):
-                        fk = scale0 if k == 0 else (scale1 if k == 1 else scale2)
-                        for m in range(3):
-                            fm = scale0 if m == 0 else (scale1 if m == 1 else scale2)
-                            total += axes[k, i] * fk * R[k, m] * fm * axes[m, j]
-                    total += bend * bend * axes[0, i] * axes[0, j]
-                    c[place_in] = total
-                    place_in += 1
-        elif code[s] == 2:
-            slack = math.sqrt(reach * R[0, 0])
-            low = middle[2] - 2.0 * half[2] - place[s, 2]
-            high = middle[2] + 2.0 * half[2] - place[s, 2]
-            least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
-            most = max(abs(low), abs(high))
-            farthest = math.sqrt(max((z[n, 0] + slack) ** 2 - least * least, 0.0))
-            nearest = math.sqrt(max(max(z[n, 0] - slack, 0.0) ** 2 - most * most, 0.0))
-            ground = 0.5 * (farthest + nearest)
-            along = max(farthest - ground, slack) ** 2 / reach
-            bend = 0.5 * reach * R[1, 1] * farthest
-            along += bend * bend + (4.0 * farthest**2 if reach * R[1, 1] > 1.0 else 0.0)
-            across = max(farthest * farthest, R[0, 0]) * R[1, 1]
-            across += 4.0 * farthest**2 if reach * R[1, 1] > 1.0 else 0.0
-            ca, sa = math.cos(z[n, 1]), math.sin(z[n, 1])
-            centre[n, 0], centre[n, 1] = place[s, 0] + ground * ca, place[s, 1] + ground * sa
-            centre[n, 2] = middle[2]
-            c[0] = ca * ca * along + sa * sa * across
-            c[1] = ca * sa * (along - across)
-            c[3] = sa * sa * along + ca * ca * across
-        if code[s] != 3:
+        # first as wide as the gate asks, then as for any start
+        for turn in range(2):
+            c = spread[n] if turn == 0 else information[n]
+            size = reach if turn == 0 else _START_REACH
+            base = least if turn == 0 else _START_REACH
+            if code[s] == 0:
+                centre[n, 0], centre[n, 1] = z[n, 0], z[n, 1]
+                centre[n, 2] = z[n, 2] if dim[s] == 3 else middle[2]
+                c[0], c[1], c[2], c[3], c[4], c[5] = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
+            elif code[s] == 1:
+                _radar3d(z[n], place[s], R, size, base, centre[n], c)
+            else:
+                _radar2d(z[n], place[s], R, middle[2], half[2], size, base, centre[n], c)
             if dim[s] == 2:
                 c[2], c[4], c[5] = 0.0, 0.0, 1.0
-            ok, i0, i1, i2, i3, i4, i5 = _invert(c)
-            if not ok:
-                # too flat to invert: a ball of the same size will do for a start
-                i0 = i3 = i5 = 1.0 / (c[0] + c[3] + (c[5] if dim[s] == 3 else 0.0))
-                i1 = i2 = i4 = 0.0
-            information[n, 0], information[n, 1], information[n, 2] = i0, i1, i2
-            information[n, 3], information[n, 4], information[n, 5] = i3, i4, i5
+        c = information[n]
+        ok, i0, i1, i2, i3, i4, i5 = _invert(c)
+        if not ok:
+            # too flat to invert: a ball of the same size will do for a start
+            i0 = i3 = i5 = 1.0 / (c[0] + c[3] + (c[5] if dim[s] == 3 else 0.0))
+            i1 = i2 = i4 = 0.0
+        c[0], c[1], c[2], c[3], c[4], c[5] = i0, i1, i2, i3, i4, i5
     return centre, spread, information

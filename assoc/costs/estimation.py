@@ -6,8 +6,9 @@ the crossing of their bearings. With linear sensors the first step is the closed
 The region's prior enters only where the measurements leave a position open, so that one always exists. A
 tuple with a sensor that measures full positions never sees it. For other tuples it acts along those
 directions only in which the measurements tell less than the prior does (standard deviation: half the
-region's width); it is not part of the chi-square value, so it moves the position of an undetermined tuple
-but is never charged to it.
+region's width). The chi-square value is that of the measurements at the position found; the prior's own
+term is not part of it. So the cost of a determined tuple is exactly equation 5 at the maximum-likelihood
+position, and an undetermined one pays only where its measurements pull away from the region.
 
 Kernels that call one another live in one file: numba's cache does not notice an edited callee in another.
 Symmetric 3 x 3 matrices are passed as (xx, xy, xz, yy, yz, zz).
@@ -22,6 +23,7 @@ import numpy as np
 
 from assoc._compiled import njit
 from assoc.costs.arrays import ScanArrays, SensorArrays
+from assoc.costs.conversion import HEIGHTS
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Six = tuple[float, float, float, float, float, float]
@@ -30,6 +32,8 @@ _TURN = 2.0 * math.pi
 # a position is undetermined along a direction if the measurements tell less of it than this times the prior
 _WEAK = 1.0
 _MAX_STEPS = 100
+# nearer to a sensor than this (metres) the derivatives of angles are those at this distance
+_NEAREST = 0.01
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
 _POOR_FIT = 10.0
 
@@ -59,7 +63,7 @@ def _normal(
         flat2 = dx * dx + dy * dy
         turn = math.atan2(dy, dx)
         if code == 3:
-            flat2 = max(flat2, 1e-12)
+            flat2 = max(flat2, _NEAREST * _NEAREST)
             v0 = scan.z[n, 0] - turn
             v0 -= _TURN * round(v0 / _TURN)
             h0, h1 = -dy / flat2, dx / flat2
@@ -75,8 +79,8 @@ def _normal(
         v1 -= _TURN * round(v1 / _TURN)
         # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
         # taken if they help
-        slant = max(slant, 1e-6)
-        flat = max(flat, 1e-5 * slant)
+        slant = max(slant, _NEAREST)
+        flat = max(flat, 1e-5 * slant, _NEAREST)
         r0, r1, r2 = dx / slant, dy / slant, dz / slant
         t0, t1 = -dy / (flat * flat), dx / (flat * flat)
         if code == 2:
@@ -364,22 +368,23 @@ def _locate(
 
 
 @njit
-def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, positions: bool) -> tuple[Array, Array, Array]:
+def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> tuple[Array, Array, Array]:
     """Fit a position to each tuple.
 
     Parameters
     ----------
     rows : int32 (K, S)
         Measurement (row of `scan`) of each sensor, or -1.
-    positions : bool
-        Whether positions and covariances are wanted; else those arrays come back empty.
+    gating : bool
+        If true, positions and covariances come back empty, and chi-square is infinite where the height lies
+        beyond those sought (`assoc.costs.conversion.HEIGHTS`) and no sensor measures full positions.
 
     Returns
     -------
     chi-square (K,), position (K, 3), covariance (K, 3, 3)
     """
     total = len(rows)
-    kept = total if positions else 0
+    kept = 0 if gating else total
     chis, places, covariances = np.zeros(total), np.zeros((kept, 3)), np.zeros((kept, 3, 3))
     members = np.zeros(len(sensors.dim), np.int64)
     for t in range(total):
@@ -390,7 +395,13 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, positions: bool) -
                 count += 1
         chi, x, y, z, A, prior = _locate(sensors, scan, members[:count])
         chis[t] = chi
-        if not positions:
+        if gating:
+            if abs(z - sensors.middle[2]) > HEIGHTS * sensors.half[2]:
+                full = 0
+                for n in members[:count]:
+                    full += 1 if sensors.full[scan.owner[n]] else 0
+                if full == 0:
+                    chis[t] = math.inf
             continue
         places[t, 0], places[t, 1], places[t, 2] = x, y, z
         B = (

@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 Array = np.ndarray[Any, np.dtype[Any]]
 
 # room for the prior's small influence on chi-square values that otherwise could only grow with a tuple
-SLACK = 0.5
+SLACK = 1.0
 
 
 class Gates(NamedTuple):

@@ -17,7 +17,7 @@ from assoc.costs.pairs import Pairs
 Array = np.ndarray[Any, np.dtype[Any]]
 
 # an azimuth predicted with a larger standard deviation (rad) is not trusted to rule measurements out
-_TRUSTED = 0.2
+_TRUSTED = 0.03
 # grown tuples are fitted in blocks of about this size
 _BLOCK = 500_000
 
@@ -81,14 +81,14 @@ def _windows(
     sensors: SensorArrays, scan: ScanArrays, rows: Array, chi: Array, t: int, limit: float
 ) -> tuple[Array, Array]:
     """Azimuths at bearing sensor t for each tuple: middle and half width; pi where all must be tried."""
-    _, position, covariance = fit(sensors, scan, rows, True)
+    _, position, covariance = fit(sensors, scan, rows, False)
     dx, dy = position[:, 0] - sensors.place[t, 0], position[:, 1] - sensors.place[t, 1]
     away = np.maximum(dx * dx + dy * dy, 1e-12)
     u, v = -dy / away, dx / away
     variance = u * u * covariance[:, 0, 0] + 2 * u * v * covariance[:, 0, 1] + v * v * covariance[:, 1, 1]
-    # the chi-square value of the grown tuple may be at most `limit`; half as much again for bent models
+    # the chi-square value of the grown tuple may be at most `limit`; twice that far for bent models
     room = np.maximum(limit - chi, 1.0) if math.isfinite(limit) else np.full(len(rows), np.inf)
-    half = 1.5 * np.sqrt(room * (variance + sensors.covariance[t, 0, 0]))
+    half = 2.0 * np.sqrt(room * (variance + sensors.covariance[t, 0, 0]))
     return np.arctan2(dy, dx), np.where(variance < _TRUSTED**2, half, math.pi)
 
 
@@ -168,7 +168,7 @@ def _grown(
         low += done
         grown = rows[part][parent]
         grown[:, t] = added
-        value = fit(sensors, scan, grown, False)[0]
+        value = fit(sensors, scan, grown, True)[0]
         detected = grown >= 0
         freedom = np.minimum(degrees_of_freedom(sensors, detected) + later + 1, len(gates.joint) - 1)
         hopeful = value <= gates.joint[freedom] + SLACK

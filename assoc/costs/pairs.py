@@ -288,7 +288,7 @@ def compatible_pairs(
             rows = np.full((len(block), count), -1, dtype=np.int32)
             owners = scan.owner[block]
             np.put_along_axis(rows, owners, block, axis=1)
-            chi = fit(sensors, scan, rows, False)[0]
+            chi = fit(sensors, scan, rows, True)[0]
             passed = chi <= gates.pair[owners[:, 0], owners[:, 1]]
             kept.append(block[passed])
             values.append(chi[passed])
