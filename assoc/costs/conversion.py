@@ -123,7 +123,7 @@ def convert(
 
     The covariance is the linearised one, widened where the measurement bends so much that its ellipsoid of
     chi-square value `least` would not hold all positions within `reach`, the largest gate: by the sagitta of
-    the arc for radars, and for a radar that leaves the height open by the ground ranges of all heights sought.
+    the arc for radars, and by the ground ranges of all heights sought where the height is open.
 
     Returns
     -------

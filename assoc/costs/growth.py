@@ -11,7 +11,7 @@ from assoc._compiled import njit
 from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
-from assoc.costs.guard import refuse
+from assoc.costs.guard import refuse, too_many
 from assoc.costs.pairs import Pairs
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -176,6 +176,6 @@ def _grown(
         kept_rows.append(grown[hopeful])
         kept_chi.append(value[hopeful])
         so_far += len(kept_chi[-1])
-        if so_far > max_tuples:
+        if so_far > max_tuples or too_many(so_far - len(rows), low / len(rows), max_tuples):
             raise refuse(number, len(rows) + (so_far - len(rows)) * len(rows) / low, max_tuples)
     return np.concatenate(kept_rows), np.concatenate(kept_chi)

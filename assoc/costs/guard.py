@@ -8,6 +8,11 @@ MAX_TUPLES = 5_000_000
 """Default limit on the candidate tuples of one scan."""
 
 
+def too_many(found: int, share: float, limit: int) -> bool:
+    """Whether more than `limit` tuples were found, or clearly will be after this `share` of the search."""
+    return found > limit or (found > 0.05 * limit and found > 2.0 * share * limit)
+
+
 def refuse(scan: int, expected: float, limit: int) -> LimitExceededError:
     """Make the error that says how many tuples were to be expected and what to change."""
     return LimitExceededError(

@@ -13,7 +13,7 @@ from assoc._compiled import njit
 from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates
-from assoc.costs.guard import refuse
+from assoc.costs.guard import refuse, too_many
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -293,7 +293,7 @@ def compatible_pairs(
             kept.append(block[passed])
             values.append(chi[passed])
             so_far += len(kept[-1])
-            if so_far > max_tuples:
+            if too_many(so_far, share, max_tuples):
                 raise refuse(number, so_far / max(share, 1e-9), max_tuples)
     pairs, chi = np.concatenate(kept), np.concatenate(values)
     total = len(scan.z)
