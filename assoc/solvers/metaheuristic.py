@@ -123,7 +123,7 @@ def solve_by(
     done_weight = 0.0
     total_iterations = 0
     queue = [
-        (part, make(part, run.rng)) for part in _parts(packing, duals, np.arange(packing.num_columns))
+        (part, make(part, run.rng)) for part in split_components(packing, duals, np.arange(packing.num_columns))
     ]
     root_bound = sum(part.bound for part, _ in queue)
     while queue:
@@ -147,7 +147,7 @@ def solve_by(
         over = part.stalled >= patience or part.iterations >= iterations or bool(run.stopped_by)
         if part.best is None and over:
             _complete(part, run)
-        pieces = None if part.closed or over else _split(part)
+        pieces = None if part.closed or over else split_part(part)
         if pieces is not None:
             for piece in pieces:
                 if piece.closed:
@@ -167,7 +167,7 @@ def solve_by(
     return Outcome(chosen, total_iterations, total_bound, duals)
 
 
-def _parts(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
+def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
     bounds = component_bounds(packing, duals)
     if np.isposinf(bounds).any():
         from assoc.solvers.front import infeasible
@@ -183,14 +183,14 @@ def _parts(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[P
     return parts
 
 
-def _split(part: Part) -> list[Part] | None:
-    """Drop the columns that no better solution can use; None unless that shrinks the part by a third."""
+def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
+    """Drop the columns that no better solution can use; None unless at most ``share`` of them are left."""
     if part.best is None:
         return None
     keep = part.reduced <= part.weight - part.bound
     chosen = np.unique(part.best[part.best >= 0])
     keep[chosen] = True
-    if np.count_nonzero(keep) > 2 * keep.size // 3:
+    if np.count_nonzero(keep) > share * keep.size:
         return None
     smaller = part.packing.restrict(keep)
     duals = np.where(smaller.slack, np.minimum(part.duals[smaller.row_origin], 0.0), part.duals[smaller.row_origin])
@@ -203,7 +203,7 @@ def _split(part: Part) -> list[Part] | None:
     place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
     owner = part.best[smaller.row_origin]
     owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
-    pieces = _parts(smaller, duals, part.origin[smaller.origin])
+    pieces = split_components(smaller, duals, part.origin[smaller.origin])
     for c, piece in enumerate(pieces):
         own = owner[smaller.row_start[c] : smaller.row_start[c + 1]]
         piece.best = np.where(own >= 0, own - smaller.col_start[c], -1).astype(np.int32)
@@ -260,7 +260,7 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
     duals = dual_bound(packing, run=run)
     owner = Cover.of(packing, columns).owner
     total = 0.0
-    for c, part in enumerate(_parts(packing, duals, np.arange(packing.num_columns))):
+    for c, part in enumerate(split_components(packing, duals, np.arange(packing.num_columns))):
         own = owner[packing.row_start[c] : packing.row_start[c + 1]]
         part.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
         part.weight = float(part.packing.weights[_columns(part)].sum())

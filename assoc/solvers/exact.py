@@ -1,0 +1,51 @@
+"""Exact: bound, heuristic, reduced-cost fixing, then branch and bound on what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from assoc.solvers.run import Outcome, Parameters, Run
+
+if TYPE_CHECKING:
+    from assoc.solvers.packing import Packing
+
+
+@dataclass(frozen=True)
+class ExactParameters(Parameters):
+    """Parameters of the exact solver.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of branch and bound at the most; what is then open keeps its gap.
+    heuristic_steps : int
+        Exact sub-steps (neighbourhood.py) on an open part without improvement before branching starts.
+    """
+
+    nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
+    heuristic_steps: int = field(
+        default=150, metadata={"help": "exact sub-steps without improvement before branching starts"}
+    )
+
+    def __post_init__(self) -> None:
+        self._require(self.nodes >= 0, "nodes", "a whole number >= 0")
+        self._require(self.heuristic_steps >= 0, "heuristic_steps", "a whole number >= 0")
+
+
+def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
+    """Find the optimum and prove it; at the time limit return the best solution and a valid bound.
+
+    One iteration is one node of branch and bound.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution (proved), or none was found in the time.
+    """
+    from assoc.solvers.proving import prove
+
+    return prove(packing, parameters.nodes, parameters.heuristic_steps, run)
+
+
+parameters = ExactParameters

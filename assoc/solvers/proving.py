@@ -1,0 +1,138 @@
+"""The exact solver's course: reduce, improve, fix, and search the open parts in turns until all are proved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InfeasibleError
+from assoc.solvers.bounds import certified_bound, dual_bound, reduced_costs
+from assoc.solvers.branch_and_bound import Search
+from assoc.solvers.metaheuristic import Part, split_part
+from assoc.solvers.neighbourhood import improve_clusters
+from assoc.solvers.packing import Packing
+from assoc.solvers.reduction import Reduction
+from assoc.solvers.run import Outcome, Run
+
+
+@dataclass(slots=True)
+class _Task:
+    part: Part
+    search: Search | None = None
+
+    @property
+    def bound(self) -> float:
+        bound = self.part.bound if self.search is None else max(self.part.bound, self.search.lower_bound)
+        return min(bound, self.part.weight)
+
+
+def prove(packing: Packing, node_limit: int, heuristic_steps: int, run: Run) -> Outcome:
+    """Solve a packing to proven optimality or until the nodes or the time are used up."""
+    reduction = Reduction(packing, run)
+    parts = reduction.reduce()
+    tasks = [_Task(piece) for part in parts for piece in _sharpen(part, run)]
+    columns = reduction.closed_columns
+    weight, bound = reduction.closed_weight, reduction.closed_bound
+    _record(run, 0, weight, bound, tasks)
+    tasks = _improve(tasks, heuristic_steps, run)
+    nodes = 0
+    while tasks:
+        task = tasks.pop(0)
+        part = task.part
+        if not part.closed and not run.should_stop() and nodes < node_limit:
+            if task.search is None:
+                task.search = Search(part.packing, part.duals, part.weight, part.tolerance)
+            before = task.search.nodes
+            # about ten milliseconds of work between two looks at the clock
+            task.search.run(min(max(1, 200_000 // max(part.packing.num_columns, 1)), node_limit - nodes))
+            nodes += task.search.nodes - before
+            if task.search.columns is not None and task.search.weight < part.weight:
+                part.weight = task.search.weight
+                part.best = _owner(part.packing, task.search.columns)
+                _record(run, nodes, weight, bound, [task, *tasks])
+            if not task.search.done:
+                tasks.append(task)
+                continue
+        if part.best is None:
+            raise _no_solution(part, task, run)
+        columns.append(part.origin[np.unique(part.best[part.best >= 0])])
+        weight += part.weight
+        bound += task.bound
+    if nodes >= node_limit and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
+        run.stopped_by = "iterations"
+    _record(run, nodes, weight, bound, [])
+    chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
+    return Outcome(chosen, nodes, bound, None if parts else reduction.proof)
+
+
+def _sharpen(part: Part, run: Run) -> list[Part]:
+    """Ascend anew, with time enough at every temperature, on a part that the reduction left open."""
+    duals = dual_bound(part.packing, run=run)
+    bound = certified_bound(part.packing, duals)
+    if bound > part.bound:
+        part.bound, part.duals = bound, duals
+        part.reduced = reduced_costs(part.packing, duals)
+    return (None if part.closed else split_part(part, share=0.9)) or [part]
+
+
+def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
+    """Bring the incumbents of open parts near the optimum before any branching, and split what that allows."""
+    result: list[_Task] = []
+    queue = [(task, 0, 24) for task in tasks]
+    while queue:
+        task, stalled, size = queue.pop(0)
+        part = task.part
+        rows = part.packing.num_rows
+        # small parts are branched at once, and without an incumbent there is nothing to improve
+        if part.closed or part.best is None or rows < 30 or stalled >= patience or run.should_stop():
+            result.append(task)
+            continue
+        change, solved = improve_clusters(
+            part.packing,
+            part.reduced,
+            part.duals,
+            part.best,
+            run.rng,
+            10,
+            min(size, rows),
+            max((part.weight - part.bound) / 10.0, part.tolerance),
+            100,
+        )
+        part.weight += change
+        size = size + 2 if solved > 0.9 else max(size - 6, 24)
+        stalled = 0 if change < -part.tolerance else stalled + 10
+        pieces = split_part(part) if stalled == 0 else None
+        if pieces is None:
+            queue.append((task, stalled, size))
+        else:
+            queue.extend((_Task(piece), 0, size) for piece in pieces)
+    # whatever the patience, branching should start on as few columns as the incumbents allow
+    split: list[_Task] = []
+    for task in result:
+        pieces = None if task.part.closed else split_part(task.part, share=0.9)
+        split.extend([task] if pieces is None else [_Task(piece) for piece in pieces])
+    return split
+
+
+def _owner(packing: Packing, columns: NDArray[np.int32]) -> NDArray[np.int32]:
+    owner = np.full(packing.num_rows, -1, dtype=np.int32)
+    rows = packing.cols[columns]
+    used = rows >= 0
+    owner[rows[used]] = np.repeat(columns, used.sum(axis=1))
+    return owner
+
+
+def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:
+    run.record(
+        nodes, weight + sum(task.part.weight for task in tasks), bound + sum(task.bound for task in tasks)
+    )
+
+
+def _no_solution(part: Part, task: _Task, run: Run) -> InfeasibleError:
+    from assoc.solvers.front import infeasible
+
+    if task.search is not None and task.search.done:
+        return infeasible(part.packing)
+    return InfeasibleError(f"no solution was found before the search was stopped ({run.stopped_by or 'node limit'})")
