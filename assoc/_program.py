@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import os
+import signal
 import sys
+import threading
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
@@ -13,6 +17,10 @@ from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitEx
 
 DONE, BAD_INPUT, NOTHING_FEASIBLE, INTERRUPTED = 0, 2, 3, 130
 """Exit codes; the last one is the shell's own for Ctrl-C."""
+
+
+writing = threading.Lock()
+"""Held while files are written: an interrupt waits for it and leaves no half-written file behind."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -50,6 +58,27 @@ def run(program: Callable[[], None], name: str) -> int:
         sys.stdout = None
         return DONE
     return DONE
+
+
+def leave_on_interrupt(name: str) -> None:
+    """Let Ctrl-C end the program at once, with one line, also while a library solves without Python.
+
+    A Python handler would run only when the library returns, which can take minutes, and some MIP solvers
+    put a handler of their own in its place. So the signal is blocked, and a thread waits for it.
+    """
+    if not hasattr(signal, "pthread_sigmask") or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        return
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+    def watch() -> None:
+        signal.sigwait({signal.SIGINT})
+        for child in multiprocessing.active_children():
+            child.terminate()
+        with writing:
+            os.write(2, f"{name}: interrupted\n".encode())
+            os._exit(INTERRUPTED)
+
+    threading.Thread(target=watch, name="interrupt", daemon=True).start()
 
 
 class Option:

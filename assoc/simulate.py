@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from assoc._program import Option, Parser, given, options, run, whole_number
+from assoc._program import Option, Parser, given, leave_on_interrupt, options, run, whole_number, writing
 
 _PURPOSE = {
     "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
@@ -34,7 +34,8 @@ def _simulate(words: list[str]) -> None:
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
     seed = whole_number(parsed["seed"], "--seed", 0)
     scene = simulation.simulate(scenario, seed, **given(choices, parsed))
-    scene.save(parsed["output"])
+    with writing:
+        scene.save(parsed["output"])
     print(f"{parsed['output']}: {scene!r}")
 
 
@@ -67,4 +68,5 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
 
 
 if __name__ == "__main__":
+    leave_on_interrupt("assoc.simulate")
     raise SystemExit(main())

@@ -14,7 +14,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assoc._program import Option, Parser, given, one_line, options, run, seconds, whole_number
+from assoc._program import (
+    Option,
+    Parser,
+    given,
+    leave_on_interrupt,
+    one_line,
+    options,
+    run,
+    seconds,
+    whole_number,
+    writing,
+)
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -51,7 +62,8 @@ def _solve(words: list[str]) -> None:
     association = plan.gather(_with_progress(plan.run(items, settings.get("jobs", 1)), len(items)))
     elapsed = time.perf_counter() - started
     names = [files[number] for number, _ in items]
-    _write(association, names, parsed["json"], parsed["csv"])
+    with writing:
+        _write(association, names, parsed["json"], parsed["csv"])
 
     from assoc._tables import print_table
 
@@ -295,4 +307,5 @@ def _write(association: Association, names: list[str], json_path: str | None, cs
 
 
 if __name__ == "__main__":
+    leave_on_interrupt("assoc.solve")
     raise SystemExit(main())
