@@ -38,7 +38,8 @@ class AcoParameters(Parameters):
     scale : float
         The transform's scale, in units of cost.
     clusters : int
-        Mode mmas: exact sub-steps on the best ant of a cycle (0: insertion with ejection alone).
+        Mode mmas: exact sub-steps on the best ant of a cycle, and for every 30 measurements on the best solution
+        (0: insertion with ejection alone).
     """
 
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
@@ -84,7 +85,7 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     from assoc.solvers.metaheuristic import solve_by
 
     return solve_by(
-        lambda part, rng: Colony(part, parameters), packing, run, parameters.iterations, parameters.patience
+        lambda part, rng: Colony(part, parameters), packing, run, parameters.iterations, parameters.patience, parameters.clusters
     )
 
 

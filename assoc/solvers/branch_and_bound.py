@@ -21,6 +21,9 @@ from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
 
+# pairs that are tried on both sides before one is branched on
+CANDIDATES = 8
+
 
 class Search:
     """A depth-first search that can be stopped and continued.
@@ -230,12 +233,13 @@ def _greedy(cols: Any, weights: Floats, active: Any, order: Any, slack: Any, cov
 
 
 @njit
-def _doubtful_pair(
-    cols: Any, active: Any, slack: Any, row_ptr: Any, row_cols: Any, primal: Floats, together: Floats, partners: Any
-) -> Any:
-    """Return the pair of rows of which it is least clear whether they belong together, and how much they do."""
+def _doubtful_pairs(
+    cols: Any, active: Any, slack: Any, row_ptr: Any, row_cols: Any, primal: Floats, together: Floats, partners: Any,
+    pairs: Any, doubts: Floats, values: Floats
+) -> int:  # fmt: skip
+    """Fill ``pairs`` with those of which it is least clear whether they belong together; how many there are."""
     num_sensors = cols.shape[1]
-    best, first, second, value = -1.0, -1, -1, 0.0
+    doubts[:] = -1.0
     counts = np.zeros(slack.size, np.int64)
     for r in range(slack.size):
         num = 0
@@ -253,13 +257,82 @@ def _doubtful_pair(
         for i in range(num):
             q = partners[i]
             y = min(together[q], 1.0)
+            doubt = y * (1.0 - y)
             # where both rows always appear together and must be covered there is nothing to decide
             open_question = slack[r] or slack[q] or counts[q] < degree or counts[q] < row_ptr[q + 1] - row_ptr[q]
-            if open_question and y * (1.0 - y) > best:
-                best, first, second, value = y * (1.0 - y), r, q, y
+            if open_question and doubt > doubts[-1]:
+                place = doubts.size - 1
+                while place > 0 and doubts[place - 1] < doubt:
+                    doubts[place] = doubts[place - 1]
+                    values[place] = values[place - 1]
+                    pairs[place] = pairs[place - 1]
+                    place -= 1
+                doubts[place] = doubt
+                values[place] = y
+                pairs[place, 0], pairs[place, 1] = r, q
             together[q] = 0.0
             counts[q] = 0
-    return first, second, value
+    count = 0
+    while count < doubts.size and doubts[count] >= 0.0:
+        count += 1
+    return count
+
+
+@njit
+def _child_bound(
+    cols: Any, active: Any, num: int, slack: Any, row_ptr: Any, row_cols: Any, parent_duals: Floats,
+    parent_reduced: Floats, duals: Floats, reduced: Floats, primal: Floats, slack_primal: Floats,
+    one: int, two: int, joined: bool, temperature: float
+) -> float:  # fmt: skip
+    """Estimate the bound of a child by a few passes; ``inf`` when it has no solution."""
+    num_sensors = cols.shape[1]
+    duals[:] = parent_duals
+    for a in range(num):
+        uses = 0
+        for s in range(num_sensors):
+            r = cols[active[a], s]
+            if r == one or r == two:
+                uses += 1
+        dropped = uses == 1 if joined else uses == 2
+        reduced[a] = np.inf if dropped else parent_reduced[a]
+    if joined:
+        slack[one] = False
+        slack[two] = False
+    for a in range(num):
+        primal[a] = math.exp(-reduced[a] / temperature)
+    for r in range(slack.size):
+        slack_primal[r] = math.exp(duals[r] / temperature) if slack[r] else 0.0
+    possible = True
+    for _ in range(6):
+        for r in range(slack.size):
+            if row_ptr[r] == row_ptr[r + 1]:
+                continue
+            total = slack_primal[r]
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                total += primal[row_cols[k]]
+            if not 1e-200 < total < 1e200:
+                continue
+            step = math.log(total)
+            factor = 1.0 / total
+            duals[r] -= temperature * step
+            slack_primal[r] *= factor
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                primal[row_cols[k]] *= factor
+    for a in range(num):
+        if reduced[a] < np.inf:
+            value = parent_reduced[a]
+            for s in range(num_sensors):
+                r = cols[active[a], s]
+                if r >= 0:
+                    value += parent_duals[r] - duals[r]
+            reduced[a] = value
+    possible = _hard(slack, row_ptr, row_cols, duals, reduced, 1)
+    if not possible:
+        return np.inf
+    bound = 0.0
+    for r in range(slack.size):
+        bound += duals[r]
+    return bound
 
 
 @njit
@@ -299,6 +372,11 @@ def _search(
     trial = np.empty(num_rows, np.int32)
     together = np.zeros(num_rows)
     partners = np.empty(num_rows, np.int32)
+    pairs = np.zeros((CANDIDATES, 2), np.int32)
+    doubts = np.empty(CANDIDATES)
+    values = np.empty(CANDIDATES)
+    child_slack = np.empty(num_rows, np.bool_)
+    child_reduced = np.empty(most)
     count_found = -1
     nodes = 0
     while num_open > 0 and nodes < node_limit:
@@ -358,8 +436,10 @@ def _search(
         _smooth(
             slack, row_ptr, row_cols, num, branch_duals, reduced, primal, slack_primal, temperature, 60, 1.0
         )
-        one, two, value = _doubtful_pair(cols, active, slack, row_ptr, row_cols, primal, together, partners)
-        if one < 0:
+        candidates = _doubtful_pairs(
+            cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values
+        )
+        if candidates == 0:
             # no two columns compete any more: the greedy choice is this node's optimum
             order = np.argsort(reduced[:num])
             weight, count = _greedy(cols, weights, active, order, slack, covered, trial)
@@ -368,6 +448,24 @@ def _search(
                 count_found = count
                 found[:count] = trial[:count]
             continue
+        pick = 0
+        if candidates > 1:
+            _reduced(cols, weights, active, num, duals, reduced)
+            best_score = -1.0
+            for i in range(candidates):
+                one, two = pairs[i]
+                score = 1.0
+                for joined in range(2):
+                    child_slack[:] = slack
+                    gain = _child_bound(
+                        cols, active, num, child_slack, row_ptr, row_cols, duals, reduced, branch_duals,
+                        child_reduced, primal, slack_primal, one, two, joined == 1, temperature,
+                    ) - lower  # fmt: skip
+                    score *= min(max(gain, 1e-4 * (incumbent - lower)), 1.1 * (incumbent - lower))
+                if score > best_score:
+                    best_score, pick = score, i
+        one, two = pairs[pick]
+        value = values[pick]
         place = first[top]
         for side in range(2):
             # the more likely answer is pushed last and so searched first

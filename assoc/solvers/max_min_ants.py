@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.local_search import _improve, penalised
-from assoc.solvers.metaheuristic import Part
-from assoc.solvers.neighbourhood import improve_clusters
+from assoc.solvers.metaheuristic import Part, weight_of
+from assoc.solvers.neighbourhood import ClusterSteps
 
 if TYPE_CHECKING:
     from assoc.solvers.aco import AcoParameters
@@ -39,14 +39,14 @@ class Colony:
         # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
         degree = part.packing.row_cols.size / max(part.packing.num_rows, 1)
         self.lowest = 1.0 / (2.0 * max(degree, 1.0))
-        self.cluster_size = self.largest_cluster = min(48, max(6, part.packing.num_rows // 2))
+        self.clusters = ClusterSteps(part.packing.num_rows)
         if part.best is not None:
             self._deposit(part.packing.cols, part.best, 1.0 - parameters.rho)
 
     def iterate(self, part: Part, rng: np.random.Generator) -> None:
         """One cycle: all ants walk, the best is improved, the pheromone evaporates and is laid."""
         packing, p = part.packing, self.parameters
-        owner, weight = _walk(
+        owner, _ = _walk(
             packing.cols,
             self.weights,
             packing.slack,
@@ -62,15 +62,9 @@ class Colony:
             p.ants,
             rng,
         )
-        weight = float(packing.weights[np.unique(owner[owner >= 0])].sum())
-        gap = weight - part.bound
-        if p.clusters and gap > part.tolerance:
-            change, solved = improve_clusters(
-                packing, part.reduced, part.duals, owner, rng, p.clusters, self.cluster_size, part.temperature
-            )
-            weight += change
-            # clusters grow as long as they can be solved
-            self.cluster_size = min(self.cluster_size + 2, self.largest_cluster) if solved > 0.95 else max(self.cluster_size - 4, 6)
+        weight = weight_of(part, owner)
+        if weight - part.bound > part.tolerance:
+            weight += self.clusters.improve(part, owner, rng, p.clusters)
         part.offer(owner, weight)
         elite = part.best if part.best is not None and part.iterations % 3 == 2 else owner
         self._deposit(packing.cols, elite, 1.0 - p.rho)

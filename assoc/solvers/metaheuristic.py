@@ -20,6 +20,7 @@ from assoc.errors import InfeasibleError
 from assoc.solvers.bounds import component_bounds, dual_bound, hard_pass, reduced_costs
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.local_search import Cover
+from assoc.solvers.neighbourhood import ClusterSteps
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
 
@@ -59,6 +60,7 @@ class Part:
     weight: float = np.inf
     iterations: int = 0
     stalled: int = 0
+    clusters: ClusterSteps | None = None
 
     @property
     def tolerance(self) -> float:
@@ -78,12 +80,33 @@ class Part:
             return min(max((self.weight - self.bound) / 10.0, self.tolerance), widest)
         return widest
 
+    def refine(self, run: Run, steps: int) -> None:
+        """Improve the best cover by exact sub-steps, ``steps`` for every 30 rows."""
+        if self.best is None or steps == 0:
+            return
+        if self.clusters is None:
+            self.clusters = ClusterSteps(self.packing.num_rows)
+        left = steps * max(1, self.packing.num_rows // 30)
+        while left > 0 and not self.closed and not run.should_stop():
+            self.weight += self.clusters.improve(self, self.best, run.rng, min(left, 10))
+            left -= 10
+
     def offer(self, owner: Owner, weight: float) -> bool:
         """Keep a cover if it is complete and better than the best; whether it was."""
-        if weight < self.weight - self.tolerance and not bool((owner[~self.packing.slack] < 0).any()):
+        if weight < self.weight - self.tolerance and not incomplete(self, owner):
             self.best, self.weight = owner.copy(), weight
             return True
         return False
+
+
+def weight_of(part: Part, owner: Owner) -> float:
+    """Weight of a cover of the part."""
+    return float(part.packing.weights[np.unique(owner[owner >= 0])].sum())
+
+
+def incomplete(part: Part, owner: Owner) -> bool:
+    """Whether a row that must be covered is not."""
+    return bool((owner[~part.packing.slack] < 0).any())
 
 
 class Searcher(Protocol):
@@ -94,7 +117,8 @@ class Searcher(Protocol):
 
 
 def solve_by(
-    make: Callable[[Part, np.random.Generator], Searcher], packing: Packing, run: Run, iterations: int, patience: int
+    make: Callable[[Part, np.random.Generator], Searcher], packing: Packing, run: Run, iterations: int, patience: int,
+    refinement: int = 0
 ) -> Outcome:
     """Run a metaheuristic on every part of the packing.
 
@@ -110,6 +134,8 @@ def solve_by(
         Iterations on one part at the most.
     patience : int
         A part is left after so many iterations without improvement.
+    refinement : int
+        Exact sub-steps on the best cover after each iteration, for every 30 rows of the part.
 
     Raises
     ------
@@ -133,6 +159,7 @@ def solve_by(
         while first or turn < 10:
             before = part.weight
             searcher.iterate(part, run.rng)
+            part.refine(run, refinement)
             first = False
             turn += 1
             part.iterations += 1

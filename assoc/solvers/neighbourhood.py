@@ -8,7 +8,7 @@ multipliers, with which branch and bound closes a cluster of some twenty targets
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,27 @@ from assoc._compiled import njit
 from assoc.solvers.branch_and_bound import _search
 from assoc.solvers.packing import Packing
 
+if TYPE_CHECKING:
+    from assoc.solvers.metaheuristic import Part
+
 Floats = NDArray[np.float64]
+
+
+class ClusterSteps:
+    """Exact sub-steps whose clusters grow as long as they can be solved, up to half of a part's rows."""
+
+    def __init__(self, num_rows: int) -> None:
+        self.size = self.largest = min(48, max(6, num_rows // 2))
+
+    def improve(self, part: Part, owner: NDArray[np.int32], rng: np.random.Generator, steps: int) -> float:
+        """Improve a cover of the part in place; return the change of its weight (<= 0)."""
+        if steps == 0:
+            return 0.0
+        change, solved = improve_clusters(
+            part.packing, part.reduced, part.duals, owner, rng, steps, self.size, part.temperature
+        )
+        self.size = min(self.size + 2, self.largest) if solved > 0.95 else max(self.size - 4, 6)
+        return change
 
 
 def improve_clusters(

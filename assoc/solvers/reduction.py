@@ -18,7 +18,7 @@ from assoc._compiled import njit
 from assoc.solvers import bounds
 from assoc.solvers.local_search import _add_greedily, _improve, penalised
 from assoc.solvers.metaheuristic import TOLERANCE, Part, split_components
-from assoc.solvers.packing import Packing
+from assoc.solvers.packing import Packing, assemble
 from assoc.solvers.run import Run
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ class Reduction:
         if not alive.all():
             self._close(~alive)
         if 3 * np.count_nonzero(keep) < 2 * keep.size or not alive.all():
-            temperature = self._shrink(keep, temperature)
+            temperature = self._shrink(keep, alive, temperature)
         return temperature
 
     def _round(self, packing: Packing, reduced: Floats, temperature: Floats) -> NDArray[np.int32]:
@@ -123,11 +123,14 @@ class Reduction:
         self.closed_weight += math.fsum(self._weight[done])
         self.proof[self.rows[in_done]] = self._hard[in_done]
 
-    def _shrink(self, keep: NDArray[np.bool_], temperature: Floats) -> Floats:
+    def _shrink(self, keep: NDArray[np.bool_], alive: NDArray[np.bool_], temperature: Floats) -> Floats:
         packing = self.packing
         # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
         self.proof[self.rows] = self._hard
-        smaller = packing.restrict(keep)
+        # rows without slack of components that are done have been covered: they leave as rows with slack do
+        slack = packing.slack | np.repeat(~alive, np.diff(packing.row_start))
+        chosen = np.flatnonzero(keep).astype(np.int32)
+        smaller = assemble(packing.cols[chosen], packing.weights[chosen], slack, chosen)
         place = np.full(packing.num_columns, -1, dtype=np.int32)
         place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
         parent = np.repeat(np.arange(packing.num_components), np.diff(packing.row_start))[smaller.row_origin]
