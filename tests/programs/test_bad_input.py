@@ -1,0 +1,200 @@
+"""Bad input to `python -m assoc.solve`: one line that says what and where, exit code 2 or 3, no file written."""
+
+from __future__ import annotations
+
+import os
+import pickle
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.simulation import simulate
+
+
+class Trap:
+    """Unpickled it would leave a mark."""
+
+    def __reduce__(self):
+        return os.mkdir, ("executed",)
+
+
+def fields_of(path):
+    with np.load(path) as data:
+        return dict(data)
+
+
+@pytest.fixture(scope="module")
+def scene_fields(tmp_path_factory):
+    path = tmp_path_factory.mktemp("good") / "scene.npz"
+    simulate("three-radar", scans=2).save(path)
+    return fields_of(path)
+
+
+PROBLEM = {
+    "format": np.array("assoc.problem"),
+    "version": np.array(1),
+    "tuples": np.array([[1, 1], [1, 2]]),
+    "costs": np.array([-3.0, -1.0]),
+    "sizes": np.array([1, 2]),
+}
+
+
+def nan_at_start(values):
+    changed = np.array(values, dtype=float)
+    changed.flat[0] = np.nan
+    return changed
+
+
+SCENES = {
+    "future version": (lambda f: {**f, "version": np.array(99)}, "version 99"),
+    "version 0": (lambda f: {**f, "version": np.array(0)}, "version"),
+    "other format": (lambda f: {**f, "format": np.array("other.thing")}, "'other.thing'"),
+    "no format": (lambda f: {k: v for k, v in f.items() if k != "format"}, "format"),
+    "field missing": (lambda f: {k: v for k, v in f.items() if k != "times"}, "'times' is missing"),
+    "zero sensors": (lambda f: {**f, "sensor_kind": np.array([], dtype="U1")}, "at least one sensor"),
+    "P_d of 1": (
+        lambda f: {**f, "sensor_detection_probability": np.array([0.9, 1.0, 0.9])},
+        "detection_probability",
+    ),
+    "P_d negative": (
+        lambda f: {**f, "sensor_detection_probability": np.array([-0.1, 0.9, 0.9])},
+        "detection_probability",
+    ),
+    "negative noise": (lambda f: {**f, "sensor_covariance": -f["sensor_covariance"]}, "positive definite"),
+    "NaN measurement": (
+        lambda f: {**f, "measurement_values": nan_at_start(f["measurement_values"])},
+        "finite",
+    ),
+    "NaN time": (lambda f: {**f, "times": nan_at_start(f["times"])}, "times"),
+    "offsets out of range": (lambda f: {**f, "measurement_offsets": f["measurement_offsets"] + 1}, "offsets"),
+    "pickled field": (lambda f: {**f, "times": np.array([Trap()], dtype=object)}, "pickled"),
+    "pickled format": (lambda f: {**f, "format": np.array([Trap()], dtype=object)}, "format"),
+}
+
+PROBLEMS = {
+    "index out of range": ({"tuples": np.array([[1, 1], [1, 3]])}, "index 3"),
+    "negative index": ({"tuples": np.array([[1, 1], [-1, 2]])}, "index -1"),
+    "all-dummy tuple": ({"tuples": np.array([[0, 0], [1, 2]])}, "all-dummy"),
+    "NaN cost": ({"costs": np.array([np.nan, 1.0])}, "costs"),
+    "too few costs": ({"costs": np.array([1.0])}, "costs"),
+    "no sensors": ({"sizes": np.array([], dtype=int)}, "sizes"),
+    "float tuples": ({"tuples": np.array([[1.0, 1.0], [1.0, 2.0]])}, "tuples"),
+    "future version": ({"version": np.array(2)}, "version 2"),
+    "pickled costs": ({"costs": np.array([Trap(), 1.0], dtype=object)}, "pickled"),
+}
+
+
+def check(done, folder, message, before, code=2):
+    assert done.returncode == code, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
+    assert message in done.stderr
+    assert {entry.name for entry in folder.iterdir()} == before
+
+
+def solve(run, folder, *words):
+    before = {entry.name for entry in folder.iterdir()}
+    return run(
+        "assoc.solve", *words, "--solver", "greedy", "--json", "o.json", "--csv", "o.csv", cwd=folder
+    ), before
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_bad_scenes(run, tmp_path, scene_fields, case):
+    spoil, message = SCENES[case]
+    np.savez(tmp_path / "bad.npz", **spoil(scene_fields))
+    done, before = solve(run, tmp_path, "bad.npz")
+    check(done, tmp_path, message, before)
+    assert "bad.npz" in done.stderr
+
+
+@pytest.mark.parametrize("case", PROBLEMS)
+def test_bad_problems(run, tmp_path, case):
+    changed, message = PROBLEMS[case]
+    np.savez(tmp_path / "bad.npz", **{**PROBLEM, **changed})
+    done, before = solve(run, tmp_path, "bad.npz")
+    check(done, tmp_path, message, before)
+    assert "bad.npz" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("empty.npz", b""),
+        ("text.npz", b"this is no archive\n" * 20),
+        ("pickle.npz", pickle.dumps({"times": [1, 2]})),
+        ("cut.npz", None),
+        ("missing.npz", None),
+        ("folder.npz", None),
+    ],
+)
+def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    elif name == "folder.npz":
+        path.mkdir()
+    elif name == "cut.npz":
+        np.savez(path, **scene_fields)
+        path.write_bytes(path.read_bytes()[:-200])
+    done, before = solve(run, tmp_path, name)
+    check(done, tmp_path, name, before)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "FILE"),
+        (["s.npz", "--solver", "magic"], "unknown name 'magic'"),
+        (["s.npz", "--ants", "3"], "--ants"),
+        (["s.npz", "--seed", "-1"], "--seed: expected a whole number >= 0, got '-1'"),
+        (["s.npz", "--jobs", "0"], "--jobs: expected a whole number >= 1"),
+        (["s.npz", "--time-limit", "0"], "--time-limit: expected seconds > 0"),
+        (["s.npz", "--time-limit", "nan"], "--time-limit: expected seconds > 0"),
+        (["s.npz", "--scans", "1:9"], "--scans: 1:9 is not within the scans 0:2 of s.npz"),
+        (["s.npz", "--scans", "b:c"], "--scans: expected A:B"),
+        (["s.npz", "--gate-probability", "2"], "gate_probability"),
+        (["s.npz", "--solver", "aco", "--rho", "2"], "rho: expected"),
+        (["s.npz", "--solver", "aco", "--rho", "high"], "--rho: expected a number, got 'high'"),
+        (["s.npz", "--solver", "aco", "--mode", "quick"], "mode"),
+        (["s.npz", "--json", "no/such/o.json"], "does not exist"),
+        (["s.npz", "--json", "s.npz"], "s.npz: is given twice, or would overwrite what is read"),
+        (["s.npz", "--csv", "."], "is a folder"),
+        (["s.npz", "none.npz"], "none.npz: no such file"),
+        (["s.npz", "--config", "none.toml"], "none.toml: cannot be read"),
+        (["s.npz", "--config", "s.npz"], "s.npz: is not a TOML file"),
+        (["s.npz", "--config", "unknown.toml"], "unknown.toml: colour: unknown key"),
+        (["s.npz", "--config", "type.toml"], "seed: expected a whole number, got 'four'"),
+        (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
+        (["s.npz", "--config", "solver.toml"], "[bees] is no solver"),
+    ],
+)
+def test_bad_options(run, tmp_path, scene_fields, words, message):
+    np.savez(tmp_path / "s.npz", **scene_fields)
+    (tmp_path / "unknown.toml").write_text('colour = "red"\n')
+    (tmp_path / "type.toml").write_text('seed = "four"\n')
+    (tmp_path / "ants.toml").write_text('solver = "aco"\n[aco]\nants = "many"\n')
+    (tmp_path / "solver.toml").write_text("[bees]\nants = 3\n")
+    before = {entry.name for entry in tmp_path.iterdir()}
+    if "--solver" not in words and not any("ants.toml" in word for word in words):
+        words = [*words, "--solver", "greedy"]
+    done = run("assoc.solve", *words, cwd=tmp_path)
+    check(done, tmp_path, message, before)
+
+
+def test_limits_and_infeasible_problems_leave_with_3(run, tmp_path, scene_fields):
+    np.savez(tmp_path / "s.npz", **scene_fields)
+    assoc.AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False).save(tmp_path / "p.npz")
+    done, before = solve(run, tmp_path, "s.npz", "--max-tuples", 1)
+    check(done, tmp_path, "tuples", before, code=3)
+    done, before = solve(run, tmp_path, "p.npz")
+    check(done, tmp_path, "measurement", before, code=3)
+
+
+def test_a_failure_leaves_an_older_result_as_it_was(run, tmp_path, scene_fields):
+    np.savez(tmp_path / "s.npz", **scene_fields)
+    (tmp_path / "o.json").write_text("old")
+    done, _ = solve(run, tmp_path, "s.npz", "--max-tuples", 1)
+    assert done.returncode == 3
+    assert (tmp_path / "o.json").read_text() == "old"

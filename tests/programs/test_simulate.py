@@ -1,0 +1,72 @@
+"""`python -m assoc.simulate` as a program."""
+
+from __future__ import annotations
+
+import pytest
+
+import assoc
+
+
+@pytest.mark.parametrize("scenario", ["three-radar", "crowd", "bearing-only"])
+def test_same_seed_same_bytes(run, tmp_path, scenario):
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        done = run("assoc.simulate", scenario, "-o", tmp_path / f"{name}.npz", "--seed", seed, "--scans", 2)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert scenario in done.stdout
+    a, b, c = ((tmp_path / f"{name}.npz").read_bytes() for name in "abc")
+    assert a == b
+    assert a != c
+    assert assoc.Scene.load(tmp_path / "a.npz").num_scans == 2
+
+
+def test_options_arrive(run, tmp_path):
+    path = tmp_path / "s.npz"
+    words = ["--scans", "3", "--noise", "200", "--detection-probability", "0.7", "--radars", "4"]
+    assert run("assoc.simulate", "three-radar", *words, "-o", path).returncode == 0
+    scene = assoc.Scene.load(path)
+    assert scene.num_scans == 3 and len(scene.sensors) == 4
+    assert scene.sensors[3].detection_probability == 0.7
+    # a scene file keeps covariances
+    assert scene.sensors[0].covariance[0, 0] == pytest.approx(200.0**2)
+
+
+def test_from_tracks(run, tmp_path):
+    path = tmp_path / "tracks.csv"
+    path.write_text("time,id,lat,lon,altitude\n0,a,50,1,9000\n20,a,50.05,1,9000\n")
+    done = run("assoc.simulate", "from-tracks", path, "-o", tmp_path / "s.npz", "--interval", 5)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert assoc.Scene.load(tmp_path / "s.npz").num_scans == 5
+    done = run("assoc.simulate", "from-tracks", tmp_path / "none.csv", "-o", tmp_path / "t.npz")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "none.csv: cannot be read" in done.stderr
+
+
+@pytest.mark.parametrize("words", [["--help"], ["crowd", "--help"], ["from-tracks", "--help"]])
+def test_help_is_silent_on_stderr(run, words):
+    done = run("assoc.simulate", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "usage:" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "SCENARIO"),
+        (["five-radar", "-o", "x.npz"], "invalid choice: 'five-radar'"),
+        (["crowd"], "-o/--output"),
+        (["crowd", "-o", "x.npz", "--targets", "many"], "--targets: expected a whole number, got 'many'"),
+        (["crowd", "-o", "x.npz", "--noise", "-1"], "noise: expected a number above 0, got -1.0"),
+        (["crowd", "-o", "x.npz", "--detection-probability", "1.5"], "between 0 and 1, got 1.5"),
+        (["crowd", "-o", "x.npz", "--sensor", "sonar"], "expected one of position, radar"),
+        (["crowd", "-o", "x.npz", "--seed", "-3"], "--seed: expected a whole number >= 0"),
+        (["crowd", "-o", "x.npz", "--colour", "red"], "unrecognized arguments: --colour red"),
+        (["crowd", "-o", "no/such/x.npz"], "does not exist"),
+        (["crowd", "-o", "."], "is a folder"),
+    ],
+)
+def test_bad_input(run, tmp_path, words, message):
+    done = run("assoc.simulate", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1 and message in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,163 @@
+"""`python -m assoc.solve` as a program: what it prints and writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import assoc
+from assoc.simulation import simulate
+
+
+def content(path):
+    """A result file without what the clock decides."""
+    result = json.loads(path.read_text())
+    result["totals"].pop("runtime")
+    for scan in result["scans"]:
+        scan.pop("runtime")
+    return result
+
+
+def test_table_json_and_csv_agree(run, scene_file, tmp_path):
+    json_file, csv_file = tmp_path / "o.json", tmp_path / "o.csv"
+    words = ["assoc.solve", scene_file, "--solver", "milp", "--json", json_file, "--csv", csv_file]
+    done = run(*words)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0].split() == (
+        "scan measurements targets false alarms cost lower bound gap status ms correct".split()
+    )
+    assert [line.split()[0] for line in lines[1:7]] == list("012345")
+    assert "6 of 6 scans certified optimal" in done.stdout and "true tuples correct" in done.stdout
+    scans = json.loads(json_file.read_text())["scans"]
+    rows = list(csv.DictReader(csv_file.open()))
+    expected = assoc.associate(assoc.Scene.load(scene_file), "milp")
+    for scan, row, one in zip(scans, rows, expected.scans, strict=True):
+        assert scan["cost"] == float(row["cost"]) == pytest.approx(one.solution.cost)
+        assert scan["tuples"] == one.solution.tuples.tolist()
+        assert scan["status"] == row["status"] == "optimal"
+        assert row["sizes"] == " ".join(map(str, scan["sizes"]))
+
+
+def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
+    results = []
+    for jobs in (1, 2):
+        path = tmp_path / f"{jobs}.json"
+        words = ["--solver", "aco", "--mode", "paper", "--seed", 3, "--jobs", jobs, "--json", path]
+        done = run("assoc.solve", scene_file, *words)
+        assert (done.returncode, done.stderr) == (0, "")
+        results.append(content(path))
+    assert results[0] == results[1]
+    assert results[0]["seed"] == 3 and results[0]["parameters"]["mode"] == "paper"
+
+
+def test_scans_are_a_range(run, scene_file, tmp_path):
+    whole, part, one = tmp_path / "whole.json", tmp_path / "part.json", tmp_path / "one.json"
+    for path, words in ((whole, []), (part, ["--scans", "2:4"]), (one, ["--scans", "3"])):
+        assert run("assoc.solve", scene_file, "--solver", "aco", "--json", path, *words).returncode == 0
+    assert content(part)["scans"] == content(whole)["scans"][2:4]
+    assert content(one)["scans"] == content(whole)["scans"][3:4]
+
+
+def test_several_files_and_problems(run, scene_file, tmp_path):
+    problem = assoc.AssignmentProblem([[1, 1], [1, 2]], [-3.0, -1.0], [1, 2])
+    problem.save(tmp_path / "problem.npz")
+    path = tmp_path / "o.json"
+    done = run("assoc.solve", scene_file, tmp_path / "problem.npz", "--solver", "greedy", "--json", path)
+    assert (done.returncode, done.stderr) == (0, "")
+    scans = json.loads(path.read_text())["scans"]
+    assert [scan["file"] for scan in scans] == [str(scene_file)] * 6 + [str(tmp_path / "problem.npz")]
+    last = scans[-1]
+    assert (last["time"], last["cost"], last["tuples"]) == (None, -3.0, [[0, 2], [1, 1]])
+    assert last["targets"] == [{"tuple": [1, 1], "position": None, "covariance": None}]
+
+
+def test_parameters_from_options_and_from_a_file(run, scene_file, tmp_path):
+    config = tmp_path / "c.toml"
+    config.write_text('solver = "aco"\nseed = 4\nscans = "0:2"\n\n[aco]\nants = 7\nalpha = 2\n\n[milp]\n')
+    path = tmp_path / "o.json"
+    done = run("assoc.solve", scene_file, "--config", config, "--ants", 9, "--rho", 0.3, "--json", path)
+    assert (done.returncode, done.stderr) == (0, "")
+    result = content(path)
+    chosen = result["parameters"]
+    assert (result["solver"], result["seed"], len(result["scans"])) == ("aco", 4, 2)
+    # the command line comes before the file, the file before the defaults
+    assert (chosen["ants"], chosen["alpha"], chosen["rho"], chosen["beta"]) == (9, 2.0, 0.3, 1.0)
+
+
+def test_help_is_silent_and_quick(run):
+    done = run("assoc.solve", "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    for name in assoc.solvers.names():
+        assert name in done.stdout
+    done = run("assoc.solve", "--solver", "aco", "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    for flag in ("--alpha", "--beta", "--rho", "--ants", "--mode", "--time-limit", "--config"):
+        assert flag in done.stdout
+    times = {}
+    for name, words in (("help", ["-m", "assoc.solve", "--help"]), ("numpy", ["-c", "import numpy"])):
+        took = []
+        for _ in range(4):
+            started = time.perf_counter()
+            subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=True)
+            took.append(time.perf_counter() - started)
+        times[name] = min(took)
+    # loose: other tests run beside this one; a compiler or OR-Tools in the help would cost several times more
+    assert times["help"] < 3 * times["numpy"] + 0.2
+
+
+def test_time_limit_is_for_each_scan(run, tmp_path):
+    path = tmp_path / "ghosts.npz"
+    simulate("bearing-only", targets=40, scans=2).save(path)
+    result = tmp_path / "o.json"
+    words = ["--solver", "aco", "--time-limit", "0.5", "--iterations", 10**9, "--patience", 10**9]
+    done = run("assoc.solve", path, *words, "--json", result, "--csv", tmp_path / "o.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    for scan in json.loads(result.read_text())["scans"]:
+        assert scan["cost"] >= scan["lower_bound"] - 1e-9
+    rows = list(csv.DictReader((tmp_path / "o.csv").open()))
+    assert all(row["stopped_by"] in ("time_limit", "gap") for row in rows)
+
+
+@pytest.mark.parametrize("solver", ["milp", "aco"])
+def test_interrupt_is_clean(tmp_path, solver):
+    simulate("bearing-only", targets=70, scans=4).save(tmp_path / "s.npz")
+    endless = ["--iterations", "1000000000", "--patience", "1000000000"] if solver == "aco" else []
+    command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", solver, "--json", "o.json", *endless]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    )
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert (process.returncode, out, err) == (130, "", "assoc.solve: interrupted\n")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["s.npz"]
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
+def test_on_a_terminal_the_table_is_drawn(scene_file):
+    main, side = os.openpty()
+    command = [sys.executable, "-m", "assoc.solve", str(scene_file), "--solver", "greedy"]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
+    process = subprocess.Popen(command, stdout=side, stderr=side, env=environment)
+    os.close(side)
+    shown = b""
+    while True:
+        try:
+            part = os.read(main, 4096)
+        except OSError:  # Linux says so that the other side is closed
+            break
+        if not part:
+            break
+        shown += part
+    os.close(main)
+    assert process.wait(60) == 0
+    text = shown.decode()
+    assert "─" in text and "associating" in text and "lower bound" in text

@@ -1,0 +1,107 @@
+"""Named scenarios: what they promise, one seed one scene, and clear refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.simulation import names, parameters, simulate
+from assoc.simulation.scenarios.bearing_only import BearingOnlyParameters, places
+
+
+def same(a, b) -> bool:
+    return all(
+        np.array_equal(x, y)
+        for k, m in zip(a.measurements, b.measurements, strict=True)
+        for x, y in zip(k, m, strict=True)
+    )
+
+
+@pytest.mark.parametrize("name", ["three-radar", "crowd", "bearing-only"])
+def test_one_seed_one_scene(name):
+    first, again, other = simulate(name, 3, scans=4), simulate(name, 3, scans=4), simulate(name, 4, scans=4)
+    assert same(first, again)
+    assert not same(first, other)
+    assert first.name == f"{name} (seed 3, scans 4)" if name != "crowd" else "scans 4" in first.name
+
+
+def test_three_radar_is_the_papers_scene():
+    scene = simulate("three-radar")
+    assert scene.num_scans == 100
+    assert np.array_equal(np.diff(scene.times), np.ones(99))
+    assert [s.kind for s in scene.sensors] == ["radar3d"] * 3
+    assert all(s.detection_probability == 0.9 and s.false_alarm_rate == 1.0 for s in scene.sensors)
+    first = scene.scan(0).truth_positions / 1000
+    np.testing.assert_allclose(first, [[30, 20, 2], [20.45, 11.25, 2], [50, 20, 2]])
+    paths = np.concatenate([scene.scan(k).truth_positions for k in range(100)])
+    extent = np.ptp(paths, axis=0)
+    np.testing.assert_allclose(scene.region[:, 0], paths.min(axis=0) - 0.1 * extent)
+    np.testing.assert_allclose(scene.region[:, 1], paths.max(axis=0) + 0.1 * extent)
+    for sensor in scene.sensors:
+        assert sensor.in_view(sensor.measure(paths)).all()
+        assert sensor.noise[0] == 50.0
+        assert sensor.noise[1] * 50e3 == pytest.approx(50.0)
+
+
+def test_crowd_keeps_its_density_on_request():
+    small, large = (simulate("crowd", targets=n, constant_density=True) for n in (100, 400))
+    area = [float(np.prod(s.region[:2, 1] - s.region[:2, 0])) for s in (small, large)]
+    assert area[1] / area[0] == pytest.approx(4.0)
+    fixed = simulate("crowd", targets=400)
+    assert np.array_equal(fixed.region, small.region)
+    assert fixed.sensors[0].false_alarm_rate == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("sensor", ["position", "radar"])
+def test_nobody_leaves_the_crowds_region(sensor):
+    scene = simulate("crowd", targets=30, scans=5, interval=10.0, sensor=sensor)
+    for k in range(5):
+        where = scene.scan(k).truth_positions
+        assert ((where >= scene.region[:, 0]) & (where <= scene.region[:, 1])).all()
+        assert all(s.in_view(s.measure(where)).all() for s in scene.sensors)
+
+
+def test_bearing_only_has_the_stated_geometry():
+    np.testing.assert_allclose(places(BearingOnlyParameters()) / 1000, [[0, 0, 0], [50, -10, 0], [100, 0, 0]])
+    scene = simulate("bearing-only", sensors=5, targets=12, scans=20, interval=30.0)
+    assert len(scene.sensors) == 5 and {s.kind for s in scene.sensors} == {"bearing"}
+    for k in range(20):
+        where = scene.scan(k).truth_positions
+        assert ((where >= scene.region[:, 0]) & (where <= scene.region[:, 1])).all()
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_parameter_is_described(name):
+    from dataclasses import fields
+
+    assert all(field.metadata["help"] for field in fields(parameters(name)))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("four-radar", {}, "unknown name 'four-radar'"),
+        ("three-radar", {"colour": 1}, "colour: no parameter"),
+        ("three-radar", {"detection_probability": 1.0}, "detection_probability: expected .* between 0 and 1"),
+        ("three-radar", {"detection_probability": 0.0}, "detection_probability"),
+        ("three-radar", {"noise": -1.0}, "noise: expected a number above 0"),
+        ("three-radar", {"noise": float("nan")}, "noise: expected a number above 0"),
+        ("three-radar", {"scans": 0}, "scans: expected a whole number from 1"),
+        ("three-radar", {"scans": 2.5}, "scans: expected a whole number"),
+        ("three-radar", {"false_alarms": 0.0}, "false_alarms: expected a number above 0"),
+        ("crowd", {"targets": True}, "targets: expected a whole number"),
+        ("crowd", {"sensor": "sonar"}, "sensor: expected 'position' or 'radar'"),
+        ("bearing-only", {"sensors": 1}, "sensors: expected a whole number from 2"),
+        ("from-tracks", {}, "file: scenario 'from-tracks' needs a value"),
+    ],
+)
+def test_refusals(name, values, message):
+    with pytest.raises(InvalidInputError, match=message):
+        simulate(name, **values)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, "3"])
+def test_bad_seed(seed):
+    with pytest.raises(InvalidInputError, match="seed: expected a whole number >= 0"):
+        simulate("crowd", seed)

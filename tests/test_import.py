@@ -1,0 +1,56 @@
+"""`import assoc` is quick, its names are there, and the program `assoc.solve` stays out of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import assoc
+
+SLOW = ("numba", "scipy", "pandas", "ortools", "rich", "numpy")
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_import_loads_nothing_slow():
+    loaded = run("import assoc, sys; print(*sys.modules)").split()
+    assert not {name.split(".")[0] for name in loaded} & {*SLOW}
+
+
+@pytest.mark.parametrize("module", ["assoc.simulate", "assoc.solve", "assoc.solvers"])
+def test_programs_and_registry_load_no_compiler(module):
+    code = f"import {module}, sys\nimport assoc.solvers as s\n"
+    code += "for name in s.names(): s.parameters(name)\nprint(*sys.modules)"
+    loaded = {name.split(".")[0] for name in run(code).split()}
+    assert not loaded & {"numba", "scipy", "pandas", "ortools", "rich"}
+
+
+def test_public_names_resolve():
+    for name in assoc.__all__:
+        assert getattr(assoc, name) is not None
+    assert set(assoc.__all__) <= set(dir(assoc))
+    with pytest.raises(AttributeError, match="no attribute 'solve_everything'"):
+        assoc.solve_everything  # noqa: B018
+
+
+def test_package_does_not_import_the_program():
+    code = (
+        "import assoc, sys\n"
+        "for name in assoc.__all__: getattr(assoc, name)\n"
+        "assert 'assoc.solve' not in sys.modules and not hasattr(assoc, 'solve')"
+    )
+    run(code)
+
+
+def test_the_list_of_programs():
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "assoc"], capture_output=True, text=True, check=True
+    )
+    assert "assoc.simulate" in done.stdout and "assoc.solve" in done.stdout
+    assert done.stderr == ""
