@@ -1,4 +1,4 @@
-"""Bad input to `python -m assoc.solve`: one line that says what and where, exit code 2 or 3, no file written."""
+"""Bad input to `python -m assoc.solve`: one line that says what and where, exit code 2 or 3, no file."""
 
 from __future__ import annotations
 

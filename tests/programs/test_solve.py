@@ -25,6 +25,10 @@ def content(path):
     return result
 
 
+def table(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
 def test_table_json_and_csv_agree(run, scene_file, tmp_path):
     json_file, csv_file = tmp_path / "o.json", tmp_path / "o.csv"
     words = ["assoc.solve", scene_file, "--solver", "milp", "--json", json_file, "--csv", csv_file]
@@ -37,7 +41,7 @@ def test_table_json_and_csv_agree(run, scene_file, tmp_path):
     assert [line.split()[0] for line in lines[1:7]] == list("012345")
     assert "6 of 6 scans certified optimal" in done.stdout and "true tuples correct" in done.stdout
     scans = json.loads(json_file.read_text())["scans"]
-    rows = list(csv.DictReader(csv_file.open()))
+    rows = table(csv_file)
     expected = assoc.associate(assoc.Scene.load(scene_file), "milp")
     for scan, row, one in zip(scans, rows, expected.scans, strict=True):
         assert scan["cost"] == float(row["cost"]) == pytest.approx(one.solution.cost)
@@ -122,7 +126,7 @@ def test_time_limit_is_for_each_scan(run, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     for scan in json.loads(result.read_text())["scans"]:
         assert scan["cost"] >= scan["lower_bound"] - 1e-9
-    rows = list(csv.DictReader((tmp_path / "o.csv").open()))
+    rows = table(tmp_path / "o.csv")
     assert all(row["stopped_by"] in ("time_limit", "gap") for row in rows)
 
 
