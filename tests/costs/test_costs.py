@@ -1,0 +1,199 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assoc.costs import positions_and_covariances, tuple_costs
+from assoc.errors import InvalidInputError
+from assoc.scene import Scene
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
+from tests.costs.reference import (
+    CIRCLE,
+    all_tuples,
+    best_fit,
+    constant,
+    determined,
+    make_scene,
+    measures_positions,
+    residuals,
+)
+
+MIXES = ["RRR", "PPP", "ppp", "bbb", "rrr", "RrP", "RPb", "PbP", "pRb", "bbbb", "rrrb"]
+
+
+@pytest.mark.parametrize("kinds", MIXES)
+@pytest.mark.parametrize("seed", range(3))
+def test_costs_are_equation_5_at_the_position_scipy_finds(kinds, seed):
+    scene, truth = make_scene(kinds, seed)
+    tuples = all_tuples(scene)
+    costs = tuple_costs(scene, 0, tuples)
+    positions, _ = positions_and_covariances(scene, 0, tuples)
+    compared = 0
+    # the plausible ones, on which everything depends, and a few others
+    for k in [*np.argsort(costs)[:12], *np.random.default_rng(seed).integers(len(tuples), size=5)]:
+        one = tuples[k]
+        chi, where = best_fit(scene, one, [positions[k], truth[0]])
+        ours = 2 * (costs[k] - constant(scene, one))
+        assert ours >= chi - 1e-6 * (1 + chi)
+        # beyond any gate local minima may differ
+        if chi < 40 and determined(scene, one, where):
+            assert ours == pytest.approx(chi, rel=1e-6, abs=1e-5)
+            compared += 1
+    assert compared >= 3
+
+
+@pytest.mark.parametrize("kinds", ["RRR", "RR", "PPP", "RPb", "RPr"])
+def test_position_and_covariance_are_those_of_the_likelihood(kinds):
+    scene, truth = make_scene(kinds, 5, targets=1, false_alarms=0.0)
+    one = np.array([[min(1, len(z)) for z in scene.measurements[0]]])
+    assert measures_positions(scene, one[0])
+    positions, covariances = positions_and_covariances(scene, 0, one)
+    _, where = best_fit(scene, one[0], [truth[0]])
+    np.testing.assert_allclose(positions[0], where, atol=1e-2)
+    jacobian = np.empty((len(residuals(scene, one[0], where)), 3))
+    for axis in range(3):
+        step = 0.5 * np.eye(3)[axis]
+        jacobian[:, axis] = residuals(scene, one[0], where + step) - residuals(scene, one[0], where - step)
+    np.testing.assert_allclose(covariances[0], np.linalg.inv(jacobian.T @ jacobian), rtol=1e-3, atol=1e-3)
+
+
+def test_linear_sensors_have_the_closed_form():
+    rng = np.random.default_rng(0)
+    covariances = [np.diag([1.0, 4.0, 9.0]), np.array([[3.0, 1, 0], [1, 2, 0.5], [0, 0.5, 1]])]
+    view = [[-100, 100]] * 3
+    sensors = [PositionSensor(position=[0, 0, 0], noise=c, field_of_view=view) for c in covariances]
+    z = rng.normal(size=(2, 3))
+    scene = Scene(sensors, [0.0], [[z[:1], z[1:]]])
+    information = sum(np.linalg.inv(c) for c in covariances)
+    mean = np.linalg.solve(
+        information, sum(np.linalg.inv(c) @ v for c, v in zip(covariances, z, strict=True))
+    )
+    chi = sum((v - mean) @ np.linalg.inv(c) @ (v - mean) for c, v in zip(covariances, z, strict=True))
+    position, covariance = positions_and_covariances(scene, 0, [[1, 1]])
+    np.testing.assert_allclose(position[0], mean, rtol=1e-12)
+    np.testing.assert_allclose(covariance[0], np.linalg.inv(information), rtol=1e-10)
+    assert tuple_costs(scene, 0, [[1, 1]])[0] == pytest.approx(chi / 2 + constant(scene, [1, 1]), rel=1e-12)
+
+
+def test_the_region_never_moves_a_determined_tuple():
+    scene, _ = make_scene("RPbb", 1)
+    tuples = all_tuples(scene)
+    tuples = tuples[(tuples[:, :2] > 0).any(axis=1)]
+    elsewhere = Scene(
+        scene.sensors, scene.times, scene.measurements, region=[[9e4, 9.1e4]] * 2 + [[5e4, 5e4]]
+    )
+    np.testing.assert_array_equal(tuple_costs(scene, 0, tuples), tuple_costs(elsewhere, 0, tuples))
+
+
+def test_bearings_take_only_the_height_from_the_region():
+    truth = np.array([[2e4, 3e4, 0.0]])
+    sensors = [BearingSensor(position=p, noise=[1e-3]) for p in ([0, 0, 0], [4e4, 0, 0])]
+    measured = [s.measure(truth) for s in sensors]
+    scene = Scene(sensors, [0.0], [measured], region=[[-1e6, 3e6], [-1e6, 2e6], [1000, 5000]])
+    position, covariance = positions_and_covariances(scene, 0, [[1, 1]])
+    np.testing.assert_allclose(position[0], [2e4, 3e4, 3000], rtol=1e-9)
+    assert covariance[0, 0, 0] < 100**2 < 1e5**2 < covariance[0, 2, 2]
+    assert tuple_costs(scene, 0, [[1, 1]])[0] == pytest.approx(constant(scene, [1, 1]), abs=1e-9)
+
+
+def test_two_range_azimuth_radars_take_an_open_height_from_the_region():
+    # target in the plane of the radars: slant ranges do not tell the height there
+    truth = np.array([[2e4, 3e4, 0.0]])
+    sensors = [
+        Radar2D(position=p, noise=[50, 1e-3], field_of_view=[[0, 1e5], CIRCLE])
+        for p in ([0, 0, 0], [4e4, 0, 0])
+    ]
+    scene = Scene(
+        sensors, [0.0], [[s.measure(truth) for s in sensors]], region=[[0, 5e4], [0, 5e4], [-2000, 2000]]
+    )
+    position, covariance = positions_and_covariances(scene, 0, [[1, 1]])
+    np.testing.assert_allclose(position[0], truth[0], atol=100)
+    assert np.isfinite(covariance).all()
+    assert tuple_costs(scene, 0, [[1, 1]])[0] == pytest.approx(constant(scene, [1, 1]), abs=0.1)
+
+
+def test_single_measurements_cost_nothing_and_have_a_position():
+    scene, _ = make_scene("RrbPp", 3)
+    singles = np.array([t for t in all_tuples(scene, least=1) if np.count_nonzero(t) == 1])
+    assert (tuple_costs(scene, 0, singles) == 0).all()
+    positions, covariances = positions_and_covariances(scene, 0, singles)
+    assert np.isfinite(positions).all()
+    assert (np.linalg.eigvalsh(covariances) > 0).all()
+
+
+def test_azimuths_on_both_sides_of_pi_belong_together():
+    truth = np.array([[-5e4, 0.0, 3000.0]])
+    sensors = [
+        Radar3D(position=[0, y, 0], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], CIRCLE, [0, 1.5]])
+        for y in (-1.0, 1.0)
+    ]
+    scene = Scene(sensors, [0.0], [[s.measure(truth) for s in sensors]])
+    a, b = scene.measurements[0]
+    assert a[0, 1] * b[0, 1] < 0
+    assert tuple_costs(scene, 0, [[1, 1]])[0] == pytest.approx(constant(scene, [1, 1]), abs=1e-6)
+
+
+def radar(place, noise=(50, 1e-3, 1e-3)):
+    return Radar3D(position=place, noise=noise, field_of_view=[[0, 2e5], CIRCLE, [-1.6, 1.6]])
+
+
+@pytest.mark.parametrize(
+    ("sensors", "measurements"),
+    [
+        ([radar([0, 0, 0])] * 3, [[[1e4, 0, 0.1]]] * 3),
+        ([radar([0, 0, 0])] * 2, [[[1e4, 0, np.pi / 2]], [[1e4, 2, np.pi / 2]]]),
+        ([radar([0, 0, 0])] * 2, [[[1e4, 0, -np.pi / 2]], [[1e4, 2, np.pi / 2]]]),
+        ([radar([0, 0, 0])] * 2, [[[1e-3, 0, 0.1]], [[1e-3, 2, 0.1]]]),
+        ([radar([0, 0, 0]), BearingSensor(position=[0, 0, 0], noise=[5e-3])], [[[0, 0, 0]], [[1.0]]]),
+        ([radar([0, 0, 0]), radar([1e5, 0, 0])], [[[-20.0, 0, 0.1]], [[1e5, 3.14, 0.0]]]),
+        ([radar([0, 0, 0]), radar([1e5, 0, 0])], [[[1e9, 0, 0.1]], [[1e9, 0, 0.1]]]),
+        ([radar([0, 0, 0]), BearingSensor(position=[0, 1e5, 0], noise=[1e-3])], [[[1e9, 0, 0.1]], [[0.0]]]),
+        ([BearingSensor(position=[0, y, 0], noise=[5e-3]) for y in (0, 1e4, 2e4)], [[[0.0], [np.pi]]] * 3),
+        ([BearingSensor(position=[0, 0, 0], noise=[5e-3])] * 2, [[[0.0], [2.0], [np.pi]]] * 2),
+        ([BearingSensor(position=[x, 0, 0], noise=[5e-3]) for x in (0, 1e4)], [[[0.0], [np.pi]]] * 2),
+    ],
+)
+def test_extremes_stay_finite(sensors, measurements):
+    scene = Scene(sensors, [0.0], [measurements])
+    tuples = all_tuples(scene, least=1)
+    positions, covariances = positions_and_covariances(scene, 0, tuples)
+    assert np.isfinite(tuple_costs(scene, 0, tuples)).all()
+    assert np.isfinite(positions).all() and np.isfinite(covariances).all()
+    assert (np.linalg.eigvalsh(covariances) > 0).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.permutations(range(4)), st.sampled_from(["RPbp", "RRRR", "bbbR", "pPpb"]))
+def test_the_order_of_sensors_does_not_matter(seed, order, kinds):
+    scene, _ = make_scene(kinds, seed, targets=2)
+    tuples = all_tuples(scene)
+    if not len(tuples):
+        return
+    turned = Scene(
+        [scene.sensors[s] for s in order], [0.0], [[scene.measurements[0][s] for s in order]], scene.region
+    )
+    a, b = tuple_costs(scene, 0, tuples), tuple_costs(turned, 0, tuples[:, list(order)])
+    near = a < 50
+    np.testing.assert_allclose(a[near], b[near], rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("tuples", "words"),
+    [
+        ([[1, 99]], "index 99 for sensor 1"),
+        ([[-1, 1]], "index -1 for sensor 0"),
+        ([[0, 0]], "no measurement"),
+        ([[1, 1, 1]], "shape"),
+        ([[1.0, 1.0]], "integers"),
+    ],
+)
+def test_wrong_tuples_are_refused(tuples, words):
+    scene, _ = make_scene("RP", 0)
+    with pytest.raises(InvalidInputError, match=words):
+        tuple_costs(scene, 0, tuples)
+
+
+def test_no_tuples_is_fine():
+    scene, _ = make_scene("RP", 0)
+    assert tuple_costs(scene, 0, []).shape == (0,)
+    assert positions_and_covariances(scene, 0, np.zeros((0, 2), int))[1].shape == (0, 3, 3)
