@@ -128,7 +128,7 @@ NAN = float("nan")
         ({"region": [[0, 0]] * 3}, "some extent"),
         ({"truth": "none"}, "truth is a str"),
         ({"truth": Truth([[]], [[]])}, "truth has 1 scans, expected 3"),
-        ({"truth": Truth([[]] * 3, [[]] * 3, [[[1]] * 4] * 3)}, "sources of scan 0"),
+        ({"truth": Truth([[]] * 3, [[]] * 3, [[[1] * 9] * 4] * 3)}, "sources of scan 0"),
         ({"name": 3}, "name must be text"),
     ],
 )

@@ -1,7 +1,8 @@
 """Maximum-likelihood positions of tuples (equation 4 of the ant colony paper), compiled.
 
 Levenberg-Marquardt on the residuals of the members, started from their converted measurements or from
-the crossing of their bearings. With linear sensors the first step is the closed form.
+the crossing of their bearings. With linear sensors the first step is the closed form. Of two mirror images,
+above and below range-azimuth radars, the one on the side of the region's middle is found.
 
 The region's prior enters only where the measurements leave a position open, so that one always exists. A
 tuple with a sensor that measures full positions never sees it. For other tuples it acts along those
