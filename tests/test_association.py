@@ -109,7 +109,23 @@ def test_the_seed_of_a_scan_does_not_depend_on_what_was_solved_before():
     for one, other in zip(forward, backward, strict=True):
         assert np.array_equal(one.solution.tuples, other.solution.tuples)
         assert one.solution.iterations == other.solution.iterations
-    assert len({tuple(np.random.SeedSequence(5, spawn_key=(k,)).generate_state(4)) for k in range(4)}) == 4
+
+
+def test_each_scan_has_random_numbers_of_its_own(monkeypatch):
+    import assoc._plan as module
+
+    drawn = []
+
+    def watched(problem, solver, *, seed, **options):
+        drawn.append(float(np.random.default_rng(seed).random()))
+        return assign(problem, solver, seed=seed, **options)
+
+    assign = module.assign
+    monkeypatch.setattr(module, "assign", watched)
+    scene = simulate("three-radar", scans=3)
+    for seed in (0, 1):
+        associate(scene, "greedy", seed=seed)
+    assert len(set(drawn)) == 6
 
 
 def test_processes_do_not_change_the_answer():

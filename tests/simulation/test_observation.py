@@ -19,7 +19,7 @@ FULL = [-math.pi, math.pi]
 
 def sensors():
     common = {"detection_probability": DETECTION, "false_alarm_rate": RATE}
-    correlated = np.array([[900.0, 200.0, 0.0], [200.0, 400.0, 50.0], [0.0, 50.0, 100.0]])
+    correlated = np.array([[900.0, 500.0, 0.0], [500.0, 400.0, 50.0], [0.0, 50.0, 100.0]])
     return [
         Radar3D(
             position=[0, 0, 0], noise=[30, 0.002, 0.004], field_of_view=[[0, 60e3], FULL, [0, 1.5]], **common
