@@ -196,12 +196,16 @@ class AssignmentProblem:
         InvalidInputError
             The file is missing, damaged, of another format or a future version, or its content is wrong.
         """
-        from assoc._files import load_npz
+        from assoc._files import Field, load_npz
 
-        data = load_npz(path, FORMAT, VERSION, required=("tuples", "costs", "sizes"), optional=("dummy",))
+        fields = {
+            "tuples": Field("int", 2),
+            "costs": Field("float", 1),
+            "sizes": Field("int", 1),
+            "dummy": Field("bool", 0, required=False),
+        }
+        data = load_npz(path, FORMAT, VERSION, fields)
         dummy = data.get("dummy", np.array(True))
-        if dummy.shape != () or dummy.dtype.kind not in "bui":
-            raise InvalidInputError(f"{path}: dummy: expected one boolean")
         try:
             return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(dummy))
         except InvalidInputError as error:

@@ -117,6 +117,8 @@ def _walk(
     num, num_sensors = cols.shape
     num_rows = slack.size
     value = np.empty(num)
+    trail = pheromone**alpha
+    slack_trail = slack_pheromone**alpha
     stay = np.zeros(num_rows)
     best = np.full(num_rows, -1, np.int32)
     best_weight = np.inf
@@ -127,10 +129,11 @@ def _walk(
         # ants differ in how strictly they follow the visibility: some explore, some refine
         strictness = beta * 2.0 ** (ant % 10) / temperature
         for j in range(num):
-            value[j] = pheromone[j] ** alpha * np.exp(-strictness * reduced[j])
+            power = strictness * reduced[j]
+            value[j] = trail[j] * np.exp(-power) if power < 40.0 else 0.0
         for r in range(num_rows):
             if slack[r]:
-                stay[r] = slack_pheromone[r] ** alpha * np.exp(strictness * min(duals[r], 0.0))
+                stay[r] = slack_trail[r] * np.exp(strictness * min(duals[r], 0.0))
         owner[:] = -1
         for i in range(num_rows - 1, 0, -1):
             k = rng.integers(0, i + 1)

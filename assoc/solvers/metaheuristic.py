@@ -77,8 +77,15 @@ class Part:
         """Scale of the reduced costs that matter: a share of the gap, at most of the weights' spread."""
         widest = max(0.02 * float(np.ptp(self.packing.weights)), 1e-12)
         if self.weight < np.inf:
-            return min(max((self.weight - self.bound) / 10.0, self.tolerance), widest)
+            return min(max((self.weight - self.bound) / 4.0, self.tolerance), widest)
         return widest
+
+    def offer_greedy(self) -> None:
+        """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
+        cover = Cover.empty(self.packing)
+        cover.add_greedily(np.argsort(self.reduced, kind="stable"))
+        cover.improve()
+        self.offer(cover.owner, weight_of(self, cover.owner))
 
     def refine(self, run: Run, steps: int) -> None:
         """Improve the best cover by exact sub-steps, ``steps`` for every 30 rows."""
@@ -151,10 +158,12 @@ def solve_by(
     queue = [
         (part, make(part, run.rng)) for part in split_components(packing, duals, np.arange(packing.num_columns))
     ]
+    for part, _ in queue:
+        part.offer_greedy()
     root_bound = sum(part.bound for part, _ in queue)
     while queue:
         part, searcher = queue.pop(0)
-        first = part.best is None
+        first = part.iterations == 0
         turn = 0
         while first or turn < 10:
             before = part.weight
@@ -201,7 +210,7 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
 
         raise infeasible(packing)
     reduced = reduced_costs(packing, duals)
-    parts = []
+    parts: list[Part] = []
     for c in range(packing.num_components):
         piece = packing.component(c) if packing.num_components > 1 else packing
         top, end = packing.row_start[c], packing.row_start[c + 1]

@@ -27,7 +27,8 @@ class ClusterSteps:
     """Exact sub-steps whose clusters grow as long as they can be solved, up to half of a part's rows."""
 
     def __init__(self, num_rows: int) -> None:
-        self.size = self.largest = min(48, max(6, num_rows // 2))
+        self.largest = min(64, max(6, num_rows // 2))
+        self.size = min(36, self.largest)
 
     def improve(self, part: Part, owner: NDArray[np.int32], rng: np.random.Generator, steps: int) -> float:
         """Improve a cover of the part in place; return the change of its weight (<= 0)."""
@@ -36,7 +37,10 @@ class ClusterSteps:
         change, solved = improve_clusters(
             part.packing, part.reduced, part.duals, owner, rng, steps, self.size, part.temperature
         )
-        self.size = min(self.size + 2, self.largest) if solved > 0.95 else max(self.size - 4, 6)
+        if solved < 0.85:
+            self.size = max(self.size - 6, min(24, self.largest))
+        elif change == 0.0:
+            self.size = min(self.size + 2, self.largest)
         return change
 
 
@@ -68,7 +72,8 @@ def improve_clusters(
     size : int
         Rows to free.
     temperature : float
-        Columns are drawn with probability proportional to exp(-reduced cost / temperature).
+        Columns are drawn with probability proportional to exp(-reduced cost / temperature),
+        and those above ten temperatures are left out.
     node_limit : int
         Nodes of branch and bound for one cluster.
 
@@ -180,6 +185,8 @@ def _improve_clusters(
                         break
         tolerance = 1e-9 * max(1.0, abs(current))
         excess = current - lower
+        # far from the optimum most columns could still pay; the first steps take the promising ones alone
+        limit = min(excess, 10.0 * temperature)
         if excess > tolerance:
             # columns that lie within the cluster and can be part of something better
             count = 0
@@ -187,7 +194,7 @@ def _improve_clusters(
                 r = rows[i]
                 for k in range(row_ptr[r], row_ptr[r + 1]):
                     j = row_cols[k]
-                    if reduced[j] < excess and _first_row(cols, j) == r and _inside(cols, j, local):
+                    if reduced[j] < limit and _first_row(cols, j) == r and _inside(cols, j, local):
                         count += 1
             sub_cols = np.empty((count, num_sensors), np.int32)
             sub_weights = np.empty(count)
@@ -197,7 +204,7 @@ def _improve_clusters(
                 r = rows[i]
                 for k in range(row_ptr[r], row_ptr[r + 1]):
                     j = row_cols[k]
-                    if reduced[j] < excess and _first_row(cols, j) == r and _inside(cols, j, local):
+                    if reduced[j] < limit and _first_row(cols, j) == r and _inside(cols, j, local):
                         for s in range(num_sensors):
                             q = cols[j, s]
                             sub_cols[count, s] = local[q] if q >= 0 else -1

@@ -97,7 +97,7 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
             run.rng,
             10,
             min(size, rows),
-            max((part.weight - part.bound) / 10.0, part.tolerance),
+            part.temperature,
             100,
         )
         part.weight += change

@@ -38,13 +38,7 @@ class TabuSearch:
         """Some moves, then exact sub-steps on the best solution they met."""
         packing, p = part.packing, self.parameters
         if self.owner is None:
-            cover = Cover.empty(packing)
-            cover.add_greedily(np.argsort(part.reduced, kind="stable"))
-            cover.improve()
-            self.owner = cover.owner
-            part.offer(self.owner, weight_of(part, self.owner))
-            if part.closed:
-                return
+            self.owner = part.best.copy() if part.best is not None else Cover.empty(packing).owner
         elif part.best is not None and part.stalled and part.stalled % p.restart == 0:
             self.owner = part.best.copy()
             self.until[:] = 0
