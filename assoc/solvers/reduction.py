@@ -157,7 +157,9 @@ class Reduction:
         self.packing = smaller
         # the parts of a component start from the same cover and the same multipliers
         known = np.isfinite(self._weight)[parent[first]] if first.size else np.zeros(0, dtype=bool)
-        self._weight = np.where(known, _cover_weights(smaller.weights, smaller.cols, smaller.row_start, self._owner), np.inf)
+        self._weight = np.where(
+            known, _cover_weights(smaller.weights, smaller.cols, smaller.row_start, self._owner), np.inf
+        )
         self._bound = bounds.component_bounds(smaller, self._hard)
         return temperature[parent[first]]
 

@@ -1,0 +1,188 @@
+"""What must not change the answer: order, constant shifts, units, repetition; and that solvers stop when told."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+from assoc.solvers.front import assign
+from tests.oracles import axial_problem, brute_force, check_answer, gated_problem
+from tests.solvers.test_against_brute_force import installed
+
+QUICK = [name for name in installed() if name != "milp"]
+
+
+@st.composite
+def problems(draw):
+    """A random problem of two to five sensors, with or without dummies."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    sizes = tuple(draw(st.lists(st.integers(1, 4), min_size=2, max_size=4)))
+    style = draw(st.sampled_from(["mixed", "positive", "negative", "ties"]))
+    if draw(st.booleans()):
+        return gated_problem(rng, sizes, 0.6, style, listed_singletons=0.5, duplicates=0.1)
+    return axial_problem(rng, sizes, 1.0, style)
+
+
+def optimum(problem):
+    """Cost by the exact solver, which has proved it."""
+    solution = assign(problem, "exact")
+    assert solution.status == "optimal"
+    assert check_answer(problem, solution.tuples) == pytest.approx(solution.cost)
+    return solution.cost
+
+
+@given(problems(), st.integers(0, 2**32 - 1))
+def test_renumbering_measurements(problem, seed):
+    rng = np.random.default_rng(seed)
+    tuples = problem.tuples.copy()
+    for s, n in enumerate(problem.sizes):
+        tuples[:, s] = np.concatenate([[0], rng.permutation(n) + 1])[tuples[:, s]]
+    other = AssignmentProblem(tuples, problem.costs, problem.sizes, dummy=problem.dummy)
+    assert optimum(other) == pytest.approx(optimum(problem), abs=1e-9)
+
+
+@given(problems(), st.randoms(use_true_random=False))
+def test_order_of_sensors_and_of_tuples(problem, random):
+    order = list(range(problem.num_sensors))
+    random.shuffle(order)
+    rows = list(range(problem.num_tuples))
+    random.shuffle(rows)
+    other = AssignmentProblem(
+        problem.tuples[rows][:, order], problem.costs[rows], problem.sizes[order], dummy=problem.dummy
+    )
+    assert optimum(other) == pytest.approx(optimum(problem), abs=1e-9)
+
+
+@given(problems(), st.integers(0, 2**32 - 1), st.floats(0.1, 100.0))
+def test_adding_multipliers_shifts_all_solutions_alike(problem, seed, size):
+    """A constant for each measurement that every solution uses."""
+    rng = np.random.default_rng(seed)
+    costs = problem.costs.copy()
+    total = 0.0
+    for s, n in enumerate(problem.sizes):
+        if problem.dummy or n == problem.sizes.min():
+            shift = rng.normal(0.0, size, n)
+            costs += np.concatenate([[0.0], shift])[problem.tuples[:, s]]
+            total += shift.sum()
+    other = AssignmentProblem(problem.tuples, costs, problem.sizes, dummy=problem.dummy)
+    assert optimum(other) == pytest.approx(optimum(problem) + total, abs=1e-8)
+
+
+@given(problems(), st.integers(-6, 6))
+def test_units_of_costs(problem, exponent):
+    scale = 10.0**exponent
+    other = AssignmentProblem(problem.tuples, problem.costs * scale, problem.sizes, dummy=problem.dummy)
+    solution = assign(other, "exact")
+    # below the tolerances a small scale makes differences vanish; the bound stays valid
+    allowed = 2e-6 * max(1.0, abs(solution.cost)) / scale if scale < 1.0 else 1e-6
+    assert check_answer(problem, solution.tuples) <= brute_force(problem) + allowed
+    assert solution.lower_bound / scale <= brute_force(problem) + 1e-9
+
+
+@given(problems())
+def test_a_tuple_more_never_makes_it_worse(problem):
+    rng = np.random.default_rng(problem.num_tuples)
+    least = 0 if problem.dummy else 1
+    extra = [rng.integers(least, n + 1) for n in problem.sizes]
+    if not any(extra):
+        return
+    other = AssignmentProblem(
+        np.concatenate([problem.tuples, [extra]]),
+        np.append(problem.costs, rng.normal(-3.0, 4.0)),
+        problem.sizes,
+        dummy=problem.dummy,
+    )
+    assert optimum(other) <= optimum(problem) + 1e-9
+
+
+@pytest.mark.parametrize("name", installed())
+def test_same_seed_same_answer(name):
+    rng = np.random.default_rng(9)
+    problem = gated_problem(rng, (8, 8, 8), 0.4, "ties")
+    first, second = (
+        assign(AssignmentProblem(problem.tuples, problem.costs, problem.sizes), name, seed=7) for _ in range(2)
+    )
+    assert first.tuples.tolist() == second.tuples.tolist()
+    assert first.cost == second.cost
+    assert first.lower_bound == second.lower_bound
+    assert first.iterations == second.iterations
+    generator = assign(problem, name, seed=np.random.default_rng(7))
+    assert generator.tuples.tolist() == first.tuples.tolist()
+
+
+@pytest.fixture(scope="module")
+def hard():
+    """Random axial costs: far too hard to prove in a second, and full of near-optimal solutions."""
+    return AssignmentProblem.from_dense(np.random.default_rng(10).integers(0, 100, (26, 26, 26)), dummy=False)
+
+
+@pytest.mark.parametrize("name", [name for name in QUICK if name != "greedy"])
+def test_time_limit(name, hard):
+    assign(axial_problem(np.random.default_rng(0), (4, 4, 4)), name)
+    endless = {key: 10**8 for key in ("iterations", "patience") if key in _fields(name)}
+    started = time.perf_counter()
+    solution = assign(hard, name, time_limit=0.4, **endless)
+    elapsed = time.perf_counter() - started
+    assert elapsed < 2.0
+    check_answer(hard, solution.tuples)
+    assert solution.runtime == pytest.approx(elapsed, abs=0.1)
+    assert solution.lower_bound <= solution.cost
+    assert -1.0 <= solution.lower_bound <= 2.0
+    if solution.status != "optimal":
+        assert solution.stopped_by == "time_limit"
+
+
+@pytest.mark.parametrize("name", [name for name in QUICK if name != "greedy"])
+def test_callback_stops(name, hard):
+    points = []
+    started = time.perf_counter()
+    solution = assign(hard, name, time_limit=20.0, callback=lambda point: points.append(point) or True)
+    assert time.perf_counter() - started < 10.0
+    assert solution.stopped_by == "callback"
+    assert points and points == list(solution.trace[: len(points)])
+    check_answer(hard, solution.tuples)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_trace_never_gets_worse(name):
+    problem = gated_problem(np.random.default_rng(12), (9, 9, 9), 0.5, "mixed")
+    trace = assign(problem, name).trace
+    assert trace
+    costs = [point.cost for point in trace if np.isfinite(point.cost)]
+    assert all(b <= a + 1e-6 for a, b in zip(costs, costs[1:], strict=False))
+    seconds = [point.seconds for point in trace]
+    assert seconds == sorted(seconds)
+    assert all(point.lower_bound <= costs[-1] + 1e-6 for point in trace)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_solving_leaves_the_problem_as_it_was(name):
+    problem = gated_problem(np.random.default_rng(13), (5, 5, 5), 0.5)
+    before = [array.copy() for array in _arrays(problem)]
+    first = assign(problem, name)
+    assert all(np.array_equal(a, b) for a, b in zip(before, _arrays(problem), strict=True))
+    assert assign(problem, name).tuples.tolist() == first.tuples.tolist()
+
+
+def test_infeasible_within_the_time_limit():
+    """Every first index competes for the same second one."""
+    problem = AssignmentProblem([[i, 1, i] for i in range(1, 7)], np.zeros(6), [6, 6, 6], dummy=False)
+    for name in QUICK:
+        with pytest.raises(InfeasibleError):
+            assign(problem, name, time_limit=5.0)
+
+
+def _arrays(problem):
+    return problem.tuples, problem.costs, problem.sizes
+
+
+def _fields(name):
+    from dataclasses import fields
+
+    from assoc.solvers import parameters
+
+    return {field.name for field in fields(parameters(name))}
