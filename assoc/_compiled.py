@@ -35,7 +35,9 @@ def _source_stamp(solvers: bool) -> str:
     return digest.hexdigest()
 
 
-_STANDARD_LOCATORS = tuple(caching.CacheImpl._locator_classes)
+_CACHES: Any = caching.CacheImpl
+_CONFIG: Any = numba.config
+_STANDARD_LOCATORS = tuple(_CACHES._locator_classes)
 
 
 class _PackageCacheLocator:
@@ -51,14 +53,14 @@ class _PackageCacheLocator:
             if locator is not None:
                 break
         else:
-            numba.config.CACHE_DIR = tempfile.mkdtemp(prefix="assoc-numba-")
+            _CONFIG.CACHE_DIR = tempfile.mkdtemp(prefix="assoc-numba-")
             locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
         stamp = _source_stamp(path.parent.name == "solvers")
         locator.get_source_stamp = lambda: stamp
         return locator
 
 
-caching.CacheImpl._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
+_CACHES._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
 
 
 def njit(function: Callable[..., Any]) -> Any:

@@ -70,9 +70,7 @@ class AssignmentProblem:
         if tuples_.shape == (0, 0):
             tuples_ = tuples_.reshape(0, sizes_.size)
         if tuples_.shape[1] != sizes_.size:
-            raise InvalidInputError(
-                f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}"
-            )
+            raise InvalidInputError(f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}")
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
         _check_indices(tuples_, sizes_, dummy)
@@ -298,6 +296,6 @@ def _with_singletons(
 
 
 def _frozen(array: NDArray[Any], dtype: type) -> NDArray[Any]:
-    result = np.array(array, dtype=dtype, order="C")
+    result: NDArray[Any] = np.array(array, dtype=dtype, order="C")
     result.flags.writeable = False
     return result

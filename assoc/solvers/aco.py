@@ -85,7 +85,12 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     from assoc.solvers.metaheuristic import solve_by
 
     return solve_by(
-        lambda part, rng: Colony(part, parameters), packing, run, parameters.iterations, parameters.patience, parameters.clusters
+        lambda part, rng: Colony(part, parameters),
+        packing,
+        run,
+        parameters.iterations,
+        parameters.patience,
+        parameters.clusters,
     )
 
 

@@ -95,7 +95,7 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
     """
     if kind == "exponential":
         # beyond e^600 differences of visibility no longer matter but powers of it would overflow
-        return np.exp(np.minimum((costs - costs.min()) / scale, 150.0))  # type: ignore[no-any-return]
+        return np.exp(np.minimum((costs - costs.min()) / scale, 150.0))
     if kind == "shifted":
         return costs - costs.min() + scale
     if costs.min() <= 0:

@@ -73,7 +73,7 @@ def work_arrays(packing: Packing) -> tuple[Floats, Floats, Floats]:
 
 def spread(packing: Packing) -> Floats:
     """Return for each component the spread of its weights (with 0, where rows have slack); never 0."""
-    return _spread(packing.weights, packing.slack, packing.col_start, packing.row_start)  # type: ignore[no-any-return]
+    return _spread(packing.weights, packing.slack, packing.col_start, packing.row_start)
 
 
 def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
@@ -126,7 +126,7 @@ def component_bounds(packing: Packing, duals: Floats) -> Floats:
     for as many columns as a solution can have, so that the bound holds whatever ``duals`` are.
     ``inf`` means that a row without slack has no column: there is no solution.
     """
-    return _component_bounds(  # type: ignore[no-any-return]
+    return _component_bounds(
         packing.cols,
         packing.weights,
         packing.slack,

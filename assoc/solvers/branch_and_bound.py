@@ -397,9 +397,7 @@ def _search(
         for level in range(3):
             index_by_row(cols, active, num, row_ptr, row_cols)
             if level > 0:
-                _smooth(
-                    slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5
-                )
+                _smooth(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5)
             _reduced(cols, weights, active, num, duals, reduced)
             if not _hard(slack, row_ptr, row_cols, duals, reduced, 2):
                 pruned = True
@@ -433,9 +431,7 @@ def _search(
         index_by_row(cols, active, num, row_ptr, row_cols)
         branch_duals[:] = duals
         _reduced(cols, weights, active, num, duals, reduced)
-        _smooth(
-            slack, row_ptr, row_cols, num, branch_duals, reduced, primal, slack_primal, temperature, 60, 1.0
-        )
+        _smooth(slack, row_ptr, row_cols, num, branch_duals, reduced, primal, slack_primal, temperature, 60, 1.0)
         candidates = _doubtful_pairs(
             cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values
         )

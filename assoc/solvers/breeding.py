@@ -97,7 +97,7 @@ class Breeding:
 
     def _child(self, part: Part, one: int, two: int, rng: np.random.Generator) -> NDArray[np.int32]:
         packing = part.packing
-        return _cross(  # type: ignore[no-any-return]
+        return _cross(
             packing.cols,
             self.weights,
             packing.slack,

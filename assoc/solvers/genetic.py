@@ -65,7 +65,12 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
     from assoc.solvers.metaheuristic import solve_by
 
     return solve_by(
-        lambda part, rng: Breeding(part, parameters), packing, run, parameters.iterations, parameters.patience, parameters.clusters
+        lambda part, rng: Breeding(part, parameters),
+        packing,
+        run,
+        parameters.iterations,
+        parameters.patience,
+        parameters.clusters,
     )
 
 

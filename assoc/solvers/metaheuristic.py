@@ -124,8 +124,12 @@ class Searcher(Protocol):
 
 
 def solve_by(
-    make: Callable[[Part, np.random.Generator], Searcher], packing: Packing, run: Run, iterations: int, patience: int,
-    refinement: int = 0
+    make: Callable[[Part, np.random.Generator], Searcher],
+    packing: Packing,
+    run: Run,
+    iterations: int,
+    patience: int,
+    refinement: int = 0,
 ) -> Outcome:
     """Run a metaheuristic on every part of the packing.
 
@@ -150,14 +154,14 @@ def solve_by(
         A part has no complete cover, or none was found.
     """
     # without a solution at the time limit there would be nothing to return: the bound gets a share of the time
-    duals = dual_bound(packing, run=Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started))
+    duals = dual_bound(
+        packing, run=Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
+    )
     columns: list[NDArray[np.int64]] = []
     total_bound = 0.0
     done_weight = 0.0
     total_iterations = 0
-    queue = [
-        (part, make(part, run.rng)) for part in split_components(packing, duals, np.arange(packing.num_columns))
-    ]
+    queue = [(part, make(part, run.rng)) for part in split_components(packing, duals, np.arange(packing.num_columns))]
     for part, _ in queue:
         part.offer_greedy()
     root_bound = sum(part.bound for part, _ in queue)
@@ -204,6 +208,13 @@ def solve_by(
 
 
 def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
+    """Return the components as parts without a cover.
+
+    Raises
+    ------
+    InfeasibleError
+        A row that must be covered has no column.
+    """
     bounds = component_bounds(packing, duals)
     if np.isposinf(bounds).any():
         from assoc.solvers.front import infeasible

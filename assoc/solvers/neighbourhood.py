@@ -166,9 +166,7 @@ def _improve_clusters(
     total = 0.0
     solved = 0
     for _ in range(steps):
-        num = _grow_cluster(
-            cols, row_ptr, row_cols, reduced, owner, rng, min(size, num_rows), temperature, local, rows
-        )
+        num = _grow_cluster(cols, row_ptr, row_cols, reduced, owner, rng, min(size, num_rows), temperature, local, rows)
         current = 0.0
         lower = 0.0
         chosen = 0

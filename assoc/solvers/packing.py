@@ -124,7 +124,7 @@ class Prepared:
 def prepare(problem: AssignmentProblem) -> Prepared:
     """Bring a problem into packing form; the result is kept with the problem, which never changes."""
     if problem._prepared is not None:
-        return problem._prepared  # type: ignore[no-any-return]
+        return problem._prepared
     sizes = problem.sizes.astype(np.int64)
     offsets = np.cumsum(sizes) - sizes
     total = int(sizes.sum())

@@ -125,9 +125,7 @@ def _owner(packing: Packing, columns: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:
-    run.record(
-        nodes, weight + sum(task.part.weight for task in tasks), bound + sum(task.bound for task in tasks)
-    )
+    run.record(nodes, weight + sum(task.part.weight for task in tasks), bound + sum(task.bound for task in tasks))
 
 
 def _no_solution(part: Part, task: _Task, run: Run) -> InfeasibleError:

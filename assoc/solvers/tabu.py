@@ -61,7 +61,12 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
     from assoc.solvers.tabu_moves import TabuSearch
 
     return solve_by(
-        lambda part, rng: TabuSearch(part, parameters), packing, run, parameters.iterations, parameters.patience, parameters.clusters
+        lambda part, rng: TabuSearch(part, parameters),
+        packing,
+        run,
+        parameters.iterations,
+        parameters.patience,
+        parameters.clusters,
     )
 
 
