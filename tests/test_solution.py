@@ -1,0 +1,120 @@
+"""What a Solution says about itself, and what the front door refuses."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+from assoc.solvers.front import assign
+from tests.oracles import gated_problem
+
+
+def solution(cost, bound, tuples=((1, 1, 0), (0, 0, 1))):
+    return Solution(
+        tuples=np.array(tuples, dtype=np.int32).reshape(-1, 3),
+        indices=np.arange(len(tuples)),
+        cost=cost,
+        lower_bound=bound,
+        solver="greedy",
+        iterations=1,
+        runtime=0.001,
+    )
+
+
+@pytest.mark.parametrize(
+    ("cost", "bound", "status"),
+    [
+        (5.0, 5.0, "optimal"),
+        (5.0, 5.0 - 4e-6, "optimal"),
+        (5.0, 5.0 - 6e-6, "feasible"),
+        (-5.0, -5.0 - 4e-6, "optimal"),
+        (-5.0, -5.0 - 6e-6, "feasible"),
+        (0.0, -9e-7, "optimal"),
+        (0.0, -2e-6, "feasible"),
+        (1e6, 1e6 - 0.9, "optimal"),
+        (1.0, -np.inf, "feasible"),
+    ],
+)
+def test_status_follows_from_the_gap(cost, bound, status):
+    found = solution(cost, bound)
+    assert found.status == status
+    assert found.gap == cost - bound
+
+
+def test_targets_are_tuples_of_two_or_more():
+    assert solution(0.0, 0.0).num_targets == 1
+    assert solution(0.0, 0.0, ()).num_targets == 0
+
+
+def test_frame():
+    frame = solution(0.0, 0.0).to_frame()
+    assert list(frame.columns) == ["sensor_1", "sensor_2", "sensor_3", "measurements"]
+    assert frame.to_numpy().tolist() == [[1, 1, 0, 2], [0, 0, 1, 1]]
+    assert len(solution(0.0, 0.0, ()).to_frame()) == 0
+
+
+def test_solutions_are_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        solution(0.0, 0.0).cost = 1.0
+
+
+def test_repr_says_what_matters():
+    text = repr(solution(5.0, 4.0))
+    assert "greedy" in text and "cost 5" in text and "lower bound 4" in text and "feasible" in text
+
+
+def test_what_assign_returns():
+    problem = gated_problem(np.random.default_rng(1), (5, 5, 5), 0.5)
+    found = assoc.assign(problem, seed=np.random.SeedSequence(3))
+    assert found.solver == "exact" and found.status == "optimal"
+    assert found.runtime > 0.0
+    assert found.tuples.tolist() == sorted(found.tuples.tolist())
+    assert found.trace[-1].cost == pytest.approx(found.cost)
+    assert found.parameters
+    assert np.array_equal(problem.tuples[found.indices], found.tuples)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"solver": "exakt"}, "solver: unknown name 'exakt'; did you mean exact"),
+        ({"solver": "nothing like it"}, "solver: unknown name .* known: greedy"),
+        ({"solver": 3}, "solver: unknown name 3"),
+        ({"seed": -1}, "seed: expected a whole number >= 0, got -1"),
+        ({"seed": 1.5}, "seed: expected"),
+        ({"seed": "one"}, "seed: expected"),
+        ({"seed": True}, "seed: expected"),
+        ({"seed": None}, "seed: expected"),
+        ({"time_limit": 0}, "time_limit: expected seconds > 0"),
+        ({"time_limit": -1.0}, "time_limit: expected"),
+        ({"time_limit": float("nan")}, "time_limit: expected"),
+        ({"time_limit": "1"}, "time_limit: expected"),
+        ({"time_limit": True}, "time_limit: expected"),
+        ({"nodez": 3}, "nodez: no parameter of solver 'exact'; did you mean nodes"),
+        ({"nodes": -3}, "nodes: expected"),
+        ({"solver": "greedy", "ants": 3}, "ants: no parameter of solver 'greedy'; it takes none"),
+    ],
+)
+def test_assign_refuses(arguments, message):
+    problem = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
+    with pytest.raises(InvalidInputError, match=message) as caught:
+        assign(problem, **arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_assign_takes_problems_only():
+    with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem, got ndarray"):
+        assign(np.zeros((2, 2)))
+
+
+def test_infeasible_says_why():
+    with pytest.raises(InfeasibleError, match="1 measurement.* that must be used are in no tuple"):
+        assign(AssignmentProblem([[1, 1]], [0.0], [2, 3], dummy=False))
+    with pytest.raises(InfeasibleError, match="no choice of tuples"):
+        assign(AssignmentProblem([[1, 1], [2, 1]], [0.0, 0.0], [2, 3], dummy=False))
+    with pytest.raises(InfeasibleError, match="that must be used"):
+        assign(AssignmentProblem([[1, 1]], [float("inf")], [1, 1], dummy=False))
