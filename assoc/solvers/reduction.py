@@ -24,7 +24,7 @@ from assoc.solvers.run import Run
 Floats = NDArray[np.float64]
 
 # passes at one temperature; the last temperatures get more, because by then few columns are left
-_PASSES = (20, 20, 20, 30, 30, 60, 60, 100, 200, 200, 200)
+_PASSES = (10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200)
 
 
 class Reduction:
