@@ -186,7 +186,7 @@ def solve_by(
         total_iterations += turn
         over = part.stalled >= patience or part.iterations >= iterations or bool(run.stopped_by)
         if part.best is None and over:
-            _complete(part, run)
+            complete(part, run)
         pieces = None if part.closed or over else split_part(part)
         if pieces is not None:
             for piece in pieces:
@@ -198,7 +198,7 @@ def solve_by(
                     queue.append((piece, make(piece, run.rng)))
         elif part.closed or over:
             columns.append(part.origin[_columns(part)])
-            total_bound += part.bound if part.closed else _proof(part, run)
+            total_bound += part.bound if part.closed else bound_of_part(part, run)
             done_weight += part.weight
         else:
             queue.append((part, searcher))
@@ -264,7 +264,7 @@ def _columns(part: Part) -> NDArray[np.int64]:
     return np.unique(part.best[part.best >= 0]).astype(np.int64)
 
 
-def _complete(part: Part, run: Run) -> None:
+def complete(part: Part, run: Run) -> None:
     """Last resort for a part in which no iteration covered all that must be covered."""
     from assoc.solvers.front import infeasible
 
@@ -277,7 +277,7 @@ def _complete(part: Part, run: Run) -> None:
         raise InfeasibleError("no complete solution was found")
 
 
-def _proof(part: Part, run: Run) -> float:
+def bound_of_part(part: Part, run: Run) -> float:
     """Raise the bound of an open part by a short branch and bound."""
     if run.should_stop():
         return part.bound
@@ -311,5 +311,5 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
         own = owner[packing.row_start[c] : packing.row_start[c + 1]]
         part.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
         part.weight = float(part.packing.weights[_columns(part)].sum())
-        total += part.bound if part.closed else _proof(part, run)
+        total += part.bound if part.closed else bound_of_part(part, run)
     return total, duals
