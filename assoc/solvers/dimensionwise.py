@@ -160,7 +160,7 @@ def _rematch(
     cols: Any, weights: Floats, slack: Any, row_ptr: Any, row_cols: Any, owner: Any, sensor: Any, mask: int
 ) -> float:
     """Re-match the halves of one split; returns the change of weight (0: nothing better)."""
-    num_rows, num_sensors = owner.size, cols.shape[1]
+    num_rows = owner.size
     half = np.empty(num_rows, np.int64)
     left_size, left_first = np.empty(num_rows, np.int64), np.empty(num_rows, np.int64)
     right_size, right_first = np.empty(num_rows, np.int64), np.empty(num_rows, np.int64)
