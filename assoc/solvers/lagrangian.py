@@ -1,61 +1,292 @@
-"""Lagrangian relaxation: two sensors are matched exactly, the constraints of the others are priced."""
+"""Lagrangian relaxation from S dimensions to two, and recovery upward again.
+
+The constraints of sensors 3..S are relaxed with multipliers u (u <= 0 where a measurement may stay
+unused, free where it must be used). For each pair of measurements of the first two sensors only the cheapest
+column, by weight less its u, matters; what remains is a two-dimensional assignment, solved to the optimum:
+
+    L(u) = sum(u) + min { 2-D assignment of c_ij = min_j' (w_j' - u of its rows in sensors 3..S) } <= optimum
+
+Its duals together with u are feasible multipliers of the whole problem, which is how the bound is
+certified. Multipliers move along the subgradient g_r = 1 - (times that r is used) by Polyak's step. From
+the pairs a solution is recovered sensor by sensor: the tuples so far are assigned to the measurements of
+the next sensor, those of later sensors still priced by u, each step again an exact 2-D assignment.
+
+The multipliers start from the smoothed dual ascent (bounds.py), which is near the LP bound in milliseconds;
+columns whose reduced cost exceeds the gap are dropped on the way.
+
+References
+----------
+S. Deb, M. Yeddanapudi, K. Pattipati and Y. Bar-Shalom, "A generalized S-D assignment algorithm for
+multisensor-multitarget state estimation", IEEE Trans. AES 33, 523-538 (1997).
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from assoc.solvers.run import Outcome, Parameters, Run
 
 if TYPE_CHECKING:
     from assoc.solvers.packing import Packing
 
+Floats = NDArray[np.float64]
+
+_COARSE_LEVELS = 4
+_COARSE_PASSES = 10
+_POLISH_STEPS = 50
+_POLISH_ROUNDS = 20
+_POLISH_TUPLES = 20
+
 
 @dataclass(frozen=True)
 class LagrangianParameters(Parameters):
-    """Parameters of the Lagrangian relaxation.
+    """Parameters of ``lagrangian``.
 
     Attributes
     ----------
     iterations : int
-        Subgradient steps on one component at the most.
-    patience : int
-        A component is left after so many steps without a better bound or solution.
-    step : float
-        Factor of the Polyak step (best cost - relaxed cost) / |g|^2; it is halved while the bound stalls.
+        Subgradient steps, each with one 2-D relaxation and one recovery.
     gap : float
-        A component is left when its gap is below this share of its cost (0: only when it is closed).
+        Stop when cost - bound <= gap * max(1, abs(cost)).
+    step : float
+        Factor of Polyak's step; halved after ``patience`` iterations in which the bound did not rise.
+    patience : int
+        See ``step``; after ten halvings the method has converged.
     warm_start : bool
-        Start from the multipliers of a short smoothed dual ascent (bounds.py) instead of zero.
+        Start from the smoothed dual ascent; else from u = 0, as in the paper.
     polish : bool
-        Improve recovered solutions by insertion with ejection and dimensionwise search.
+        Improve every recovered solution by dimensionwise search and insertion with ejection, and the
+        best one at the end by cluster search.
     """
 
-    iterations: int = field(default=300, metadata={"help": "subgradient steps on one component at the most"})
-    patience: int = field(default=60, metadata={"help": "steps without progress before a component is left"})
-    step: float = field(default=1.0, metadata={"help": "factor of the Polyak step"})
-    gap: float = field(default=0.0, metadata={"help": "relative gap at which a component is left"})
-    warm_start: bool = field(default=True, metadata={"help": "start from a short smoothed dual ascent"})
+    iterations: int = field(default=100, metadata={"help": "subgradient steps"})
+    gap: float = field(default=1e-9, metadata={"help": "stop at this relative gap"})
+    step: float = field(default=1.0, metadata={"help": "factor of Polyak's step"})
+    patience: int = field(default=5, metadata={"help": "steps without a better bound until the factor is halved"})
+    warm_start: bool = field(default=True, metadata={"help": "start from the smoothed dual ascent, not from 0"})
     polish: bool = field(default=True, metadata={"help": "improve recovered solutions by local search"})
 
     def __post_init__(self) -> None:
-        self._require(self.iterations >= 1, "iterations", "a whole number >= 1")
-        self._require(self.patience >= 1, "patience", "a whole number >= 1")
-        self._require(0 < self.step <= 2, "step", "a number above 0, at most 2")
-        self._require(0 <= self.gap < float("inf"), "gap", "a number >= 0")
+        for name in ("iterations", "patience"):
+            value = getattr(self, name)
+            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+            self._require(whole and value >= 1, name, "a whole number >= 1")
+        for name, low, high in (("gap", 0.0, 1.0), ("step", 1e-6, 10.0)):
+            value = getattr(self, name)
+            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+            self._require(number and low <= value <= high, name, f"a number in {low:g}..{high:g}")
+        for name in ("warm_start", "polish"):
+            self._require(isinstance(getattr(self, name), (bool, np.bool_)), name, "true or false")
 
 
 def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outcome:
-    """Raise the multipliers step by step; one iteration is one relaxed 2-D assignment with its recovery.
+    """Relax and recover; one iteration is one subgradient step.
 
-    References
-    ----------
-    S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom, A generalized S-D assignment algorithm for
-    multisensor-multitarget state estimation, IEEE Transactions on Aerospace and Electronic Systems 33 (1997).
+    Raises
+    ------
+    InfeasibleError
+        There is no solution, or none was found.
     """
-    from assoc.solvers.relaxation import relax
+    from assoc.solvers.bounds import certified_bound, dual_bound, hard_pass
+    from assoc.solvers.front import infeasible
+    from assoc.solvers.local_search import Cover
 
-    return relax(packing, parameters, run)
+    if packing.num_columns == 0:
+        if packing.is_axial:
+            raise infeasible(packing)
+        return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0, np.zeros(packing.num_rows))
+    if parameters.warm_start:
+        # coarse: it need only be good enough to drop most columns before the rest is done
+        duals = dual_bound(packing, levels=_COARSE_LEVELS, passes=_COARSE_PASSES, run=run)
+    else:
+        duals = np.zeros(packing.num_rows)
+        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+    bound = certified_bound(packing, duals)
+    if bound == math.inf:
+        raise infeasible(packing)
+    search = _Search(packing, duals, parameters, run, bound)
+    search.iterate()
+    if parameters.polish:
+        search.polish()
+    columns = search.columns
+    if columns is None:
+        cover = Cover.empty(packing)
+        cover.add_greedily(np.argsort(packing.weights, kind="stable"))
+        if not cover.complete(run):
+            raise infeasible(packing)
+        columns = cover.columns().astype(np.int64)
+    # the proof of a bound over the columns that are left needs the columns that were dropped, too
+    proof = search.proof
+    bound = min(search.bound, float(packing.weights[columns].sum()))
+    return Outcome(columns, search.iterations, bound, proof)
+
+
+class _Search:
+    """The state of the method: multipliers, best bound, best solution, and the columns that are left."""
+
+    def __init__(
+        self, packing: Packing, duals: Floats, parameters: LagrangianParameters, run: Run, bound: float
+    ) -> None:
+        self.parameters = parameters
+        self.run = run
+        self.whole = packing
+        self.bound = bound
+        self.proof: Floats | None = duals
+        self.columns: NDArray[np.int64] | None = None
+        self.weight = math.inf
+        self.iterations = 0
+        self._focus(packing, duals, np.arange(packing.num_columns))
+
+    def _focus(self, packing: Packing, duals: Floats, place: NDArray[np.int64]) -> None:
+        """Work on these columns from now on; ``place`` are theirs in the whole problem."""
+        from assoc.solvers.relaxation import Relaxation
+
+        self.packing = packing
+        self.place = place
+        self.relaxation = Relaxation(packing)
+        self.duals = duals
+        self.best = duals
+
+    def iterate(self) -> None:
+        """Relax, recover, step, until the gap is closed or nothing moves any more."""
+        factor = self.parameters.step
+        stalled = 0
+        while self.iterations < self.parameters.iterations:
+            self.iterations += 1
+            before = self.bound
+            subgradient = self._relax()
+            if subgradient is None:
+                # the columns left allow no solution better than the best one
+                self._raise_bound(self.weight, None)
+                break
+            self._recover()
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed() or self.run.should_stop():
+                break
+            if self.bound > before + 1e-9 * max(1.0, abs(before)):
+                stalled = 0
+            else:
+                stalled += 1
+                if stalled % self.parameters.patience == 0:
+                    factor *= 0.5
+                    self.duals = self.best
+                    if factor < self.parameters.step / 1024.0:
+                        break
+                    continue
+            dropped = self._drop_columns()
+            if self.iterations == 1 and self.parameters.warm_start:
+                self._refine()
+            elif not dropped and not self._step(subgradient, factor):
+                break
+
+    def polish(self) -> None:
+        """Improve the best solution by cluster search, within the columns that are left."""
+        from assoc.solvers.cluster_search import ClusterSearch
+        from assoc.solvers.local_search import Cover
+
+        if self.columns is None or self._gap_closed():
+            return
+        search = ClusterSearch.of(self.packing, self.best)
+        cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.place, self.columns)))
+        for _ in range(_POLISH_ROUNDS):
+            if self.run.should_stop():
+                return
+            change, _ = search.run(
+                cover.owner, self.run.rng, _POLISH_STEPS, _POLISH_TUPLES * self.packing.cols.shape[1]
+            )
+            if change == 0.0:
+                return
+            self.weight = cover.weight
+            self.columns = self.place[cover.columns()]
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed():
+                return
+
+    def _gap_closed(self) -> bool:
+        if self.weight == math.inf:
+            return False
+        closed = self.weight - self.bound <= self.parameters.gap * max(1.0, abs(self.weight + self.run.offset))
+        if closed and not self.run.stopped_by:
+            self.run.stopped_by = "gap"
+        return closed
+
+    def _relax(self) -> Floats | None:
+        """Solve the 2-D relaxation; returns the subgradient, None where it has no solution."""
+        from assoc.solvers.bounds import certified_bound
+
+        answer = self.relaxation.solve(self.duals)
+        if answer is None:
+            return None
+        self.duals, subgradient = answer
+        bound = certified_bound(self.packing, self.duals)
+        if bound > self.bound:
+            self._raise_bound(bound, self.duals if self.packing is self.whole else None)
+            self.best = self.duals
+        return subgradient
+
+    def _raise_bound(self, bound: float, proof: Floats | None) -> None:
+        self.bound, self.proof = max(self.bound, bound), proof
+
+    def _recover(self) -> None:
+        from assoc.solvers.dimensionwise import improve
+        from assoc.solvers.local_search import Cover
+
+        columns = self.relaxation.recover(self.duals)
+        if columns is None:
+            return
+        cover = Cover.of(self.packing, columns)
+        if self.parameters.polish:
+            cover.improve()
+            improve(self.packing, cover.owner)
+        if cover.weight < self.weight:
+            self.weight = cover.weight
+            self.columns = self.place[cover.columns()]
+
+    def _drop_columns(self) -> bool:
+        """Drop what no better solution can use; True if that was worth it."""
+        from assoc.solvers.bounds import reduced_costs
+
+        if self.weight == math.inf:
+            return False
+        room = self.weight - self.bound + 1e-9 * max(1.0, abs(self.weight))
+        reduced = reduced_costs(self.packing, self.best)
+        # the multipliers prove their own bound, which may be less than the best
+        slack = max(0.0, self.bound - float(self.best.sum()))
+        keep = reduced <= room + slack
+        if np.count_nonzero(keep) > 0.5 * keep.size:
+            return False
+        smaller = self.packing.restrict(keep)
+        place = self.place[smaller.origin]
+        self._focus(smaller, self.best[smaller.row_origin], place)
+        return True
+
+    def _refine(self) -> None:
+        """Do the smoothed dual ascent in full, on the columns that are left."""
+        from assoc.solvers.bounds import certified_bound, dual_bound
+
+        duals = dual_bound(self.packing, run=self.run)
+        bound = certified_bound(self.packing, duals)
+        if bound > certified_bound(self.packing, self.best):
+            self.duals = self.best = duals
+            if bound > self.bound:
+                self._raise_bound(bound, duals if self.packing is self.whole else None)
+
+    def _step(self, subgradient: Floats, factor: float) -> bool:
+        """Polyak's step on the relaxed rows; False where the subgradient is 0 (u is optimal)."""
+        slack = self.packing.slack
+        direction = np.where(slack & (self.duals >= 0.0) & (subgradient > 0.0), 0.0, subgradient)
+        norm = float(direction @ direction)
+        if norm == 0.0:
+            return False
+        target = self.weight if self.weight < math.inf else self.bound + 0.1 * max(1.0, abs(self.bound))
+        moved = self.duals + factor * max(target - self.bound, 1e-9) / norm * direction
+        self.duals = np.where(slack, np.minimum(moved, 0.0), moved)
+        return True
 
 
 parameters = LagrangianParameters

@@ -1,0 +1,127 @@
+"""The Lagrangian bound is valid on every kind of problem, and the recovered solutions are good."""
+
+import numpy as np
+import pytest
+
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.solvers.bounds import certified_bound, dual_bound
+from assoc.solvers.front import assign
+from assoc.solvers.packing import prepare
+from assoc.solvers.relaxation import Relaxation
+from experiments.instances.synthetic import axial_known_optimum, planted
+from tests.oracles import (
+    axial_problem,
+    brute_force,
+    check_answer,
+    gated_problem,
+    milp_optimum,
+    small_problems,
+)
+
+SETTINGS = [
+    {},
+    {"warm_start": False, "iterations": 30},
+    {"warm_start": False, "step": 2.0, "polish": False, "iterations": 15},
+    {"iterations": 1, "polish": False},
+]
+
+
+def test_bound_is_valid_on_two_thousand_small_problems():
+    closed = 0
+    solved = 0
+    for number, problem in enumerate(small_problems(2000, seed=21)):
+        try:
+            expected = brute_force(problem)
+        except InfeasibleError:
+            with pytest.raises(InfeasibleError):
+                assign(problem, "lagrangian", **SETTINGS[number % 4])
+            continue
+        solution = assign(problem, "lagrangian", **SETTINGS[number % 4])
+        assert check_answer(problem, solution.tuples) == pytest.approx(solution.cost, abs=1e-9)
+        assert solution.lower_bound <= expected + 1e-9 * max(1.0, abs(expected))
+        assert solution.cost >= expected - 1e-9
+        if number % 4 == 0:
+            solved += 1
+            closed += solution.cost <= expected + 1e-6
+    assert closed >= 0.99 * solved
+
+
+@pytest.mark.parametrize("number", range(30))
+def test_bound_is_valid_on_larger_ones(number):
+    rng = np.random.default_rng([77, number])
+    if number % 3 == 0:
+        sizes = [(9, 9, 9), (6, 8, 10), (10, 7, 7), (5, 6, 5, 7), (6, 6, 6, 6)][number // 3 % 5]
+        problem = axial_problem(rng, sizes, [1.0, 0.6][number % 2], ["mixed", "positive"][number % 2])
+    else:
+        sizes = [(12, 9, 14), (8, 8, 8, 8), (5, 0, 6, 7), (6, 6, 5, 6, 5)][number % 4]
+        problem = gated_problem(rng, sizes, [0.3, 0.1, 0.05, 0.02][number % 4], listed_singletons=0.5)
+    expected = milp_optimum(problem)
+    for settings in SETTINGS:
+        solution = assign(problem, "lagrangian", **settings)
+        assert solution.lower_bound <= expected + 1e-7
+        assert check_answer(problem, solution.tuples) >= expected - 1e-7
+
+
+def test_relaxation_is_above_the_multipliers_it_starts_from():
+    rng = np.random.default_rng(5)
+    for number in range(60):
+        problem = gated_problem(rng, [(6, 7, 8), (5, 5, 5, 5)][number % 2], 0.2)
+        packing = prepare(problem).packing
+        start = dual_bound(packing, levels=2, passes=5)
+        relaxation = Relaxation(packing)
+        duals, subgradient = relaxation.solve(start)
+        assert certified_bound(packing, duals) == pytest.approx(duals.sum(), abs=1e-9)
+        assert duals.sum() >= start.sum() - 1e-9
+        assert (duals <= 1e-12).all()
+        # a supergradient: no multipliers of sensors 3..S do better than the plane through it
+        other = np.minimum(start + rng.normal(0, 1, start.size), 0.0)
+        moved, _ = relaxation.solve(other)
+        upper = relaxation.sensor >= 2
+        assert moved.sum() <= duals.sum() + subgradient @ ((moved - duals) * upper) + 1e-7
+
+
+@pytest.mark.parametrize("sensors", [3, 4, 5, 6])
+def test_planted_optimum(sensors):
+    problem, optimum = planted(sensors, 100, 8)
+    solution = assign(problem, "lagrangian")
+    assert solution.cost == pytest.approx(optimum, abs=1e-6)
+    assert solution.status == "optimal"
+
+
+def test_proof_by_multipliers():
+    for problem in small_problems(100, seed=33, dummy=True):
+        solution = assign(problem, "lagrangian", iterations=1)
+        if not solution.duals:
+            continue
+        price = np.zeros(problem.num_tuples)
+        for s, duals in enumerate(solution.duals):
+            price += np.concatenate([[0.0], duals])[problem.tuples[:, s]]
+        assert (problem.costs - price >= -1e-9).all()
+        assert sum(d.sum() for d in solution.duals) <= solution.cost + 1e-9
+
+
+def test_known_optimum_axial():
+    problem, optimum = axial_known_optimum(12, 100)
+    solution = assign(problem, "lagrangian")
+    assert solution.cost == pytest.approx(optimum)
+    assert solution.lower_bound <= optimum
+
+
+def test_one_and_two_sensors():
+    assert assign(AssignmentProblem([[1], [2]], [-1.0, 2.0], [2]), "lagrangian").cost == 1.0
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        problem = gated_problem(rng, (6, 5), 0.5)
+        solution = assign(problem, "lagrangian")
+        assert solution.status == "optimal"
+        assert solution.cost == pytest.approx(brute_force(problem), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"iterations": 0}, {"gap": -1.0}, {"gap": float("nan")}, {"step": 0.0}, {"patience": 1.5}, {"polish": "yes"}],
+)
+def test_parameters_are_checked(bad):
+    with pytest.raises(InvalidInputError, match=f"{next(iter(bad))}: expected"):
+        assign(planted(3, 100, 3)[0], "lagrangian", **bad)
