@@ -1,9 +1,9 @@
-"""Two-dimensional assignment: exact, sparse or dense, with slack on either side, and with its duals.
+"""Two-dimensional assignment: exact, sparse, with slack on either side, and with its duals.
 
 Rows are matched to columns at the cost of the edge; a row or column left alone costs what its side's slack
 costs (``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima
-and the augmenting row reduction of [1]_, then Dijkstra from every row that is left, over a heap (sparse) or
-by scanning (dense). A row's slack is a private column at the end of any path.
+and the augmenting row reduction of [1]_, then Dijkstra over a heap from every row that is left. A row's slack is a
+private column at the end of any path.
 
 The duals solve
 
@@ -135,9 +135,7 @@ def match_sparse(
             else:
                 pending[num_pending] = i
                 num_pending += 1
-    num_pending = _reduce_rows(
-        indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending
-    )
+    num_pending = _reduce_rows(indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending)
     if num_pending > 0 and not _augment_all(
         indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending
     ):
@@ -335,133 +333,3 @@ def _pop(key: Any, item: Any, size: int) -> None:
         place = child
     key[place] = value
     item[place] = thing
-
-
-@njit
-def match_dense(
-    costs: Floats, n: int, m: int, column_of: Any, row_of: Any, v: Any, distance: Any, previous: Any, queue: Any,
-    pending: Any
-) -> None:  # fmt: skip
-    """Match all n rows of ``costs[:n, :m]`` (finite, n <= m) to columns; no memory is allocated.
-
-    ``column_of`` (n), ``row_of`` (m; -1 is free) and the column potentials ``v`` (m) are the result; the
-    potential of row i is ``costs[i, column_of[i]] - v[column_of[i]]``. The other arrays are room to work:
-    ``distance``, ``previous``, ``queue`` (m) and ``pending`` (n).
-    """
-    for j in range(m):
-        v[j] = 0.0
-        row_of[j] = -1
-    left = 0
-    for i in range(n):
-        best = 0
-        least = costs[i, 0]
-        for j in range(1, m):
-            if costs[i, j] < least:
-                least = costs[i, j]
-                best = j
-        column_of[i] = best
-        if row_of[best] < 0:
-            row_of[best] = i
-        else:
-            pending[left] = i
-            left += 1
-    left = _reduce_dense(costs, m, column_of, row_of, v, pending, left)
-    for at in range(left):
-        _augment_dense(costs, m, column_of, row_of, v, distance, previous, queue, pending[at])
-
-
-@njit
-def _reduce_dense(
-    costs: Floats, m: int, column_of: Any, row_of: Any, v: Any, pending: Any, num_pending: int
-) -> int:
-    """Augmenting row reduction, as for the sparse case."""
-    steps = 2 * num_pending + 4
-    left = 0
-    for at in range(num_pending):
-        i = pending[at]
-        while True:
-            least, second = np.inf, np.inf
-            best, other = 0, 0
-            for j in range(m):
-                value = costs[i, j] - v[j]
-                if value < second:
-                    if value < least:
-                        second, other = least, best
-                        least, best = value, j
-                    else:
-                        second, other = value, j
-            if row_of[best] >= 0 and second <= least and m > 1 and row_of[other] < 0:
-                best = other
-            k = row_of[best]
-            if k < 0:
-                row_of[best] = i
-                column_of[i] = best
-                break
-            steps -= 1
-            if steps <= 0 or second <= least or second == np.inf:
-                pending[left] = i
-                left += 1
-                break
-            v[best] -= second - least
-            row_of[best] = i
-            column_of[i] = best
-            i = k
-    return left
-
-
-@njit
-def _augment_dense(
-    costs: Floats,
-    m: int,
-    column_of: Any,
-    row_of: Any,
-    v: Any,
-    distance: Any,
-    previous: Any,
-    queue: Any,
-    start: int,
-) -> None:
-    """Shortest augmenting path from row ``start`` by scanning; ``queue`` holds closed, then open columns."""
-    least = np.inf
-    for j in range(m):
-        value = costs[start, j] - v[j]
-        distance[j] = value
-        previous[j] = start
-        queue[j] = j
-        least = min(least, value)
-    closed = 0
-    sink = -1
-    while True:
-        # the nearest open column
-        place = closed
-        nearest = distance[queue[closed]]
-        for t in range(closed + 1, m):
-            if distance[queue[t]] < nearest:
-                nearest = distance[queue[t]]
-                place = t
-        j = queue[place]
-        queue[place] = queue[closed]
-        queue[closed] = j
-        if row_of[j] < 0:
-            sink = j
-            break
-        closed += 1
-        i = row_of[j]
-        shift = nearest - (costs[i, j] - v[j])
-        for t in range(closed, m):
-            q = queue[t]
-            value = shift + costs[i, q] - v[q]
-            if value < distance[q]:
-                distance[q] = value
-                previous[q] = i
-    for t in range(closed):
-        j = queue[t]
-        v[j] -= nearest - distance[j]
-    j = sink
-    while True:
-        i = previous[j]
-        row_of[j] = i
-        if i == start:
-            column_of[i] = j
-            break
-        j, column_of[i] = column_of[i], j

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from assoc.errors import InfeasibleError
-from assoc.solvers.assignment2d import match, match_dense
+from assoc.solvers.assignment2d import match
 
 
 def _sparse(matrix, keep):
@@ -92,25 +92,3 @@ def test_parallel_edges():
     assert found.cost == -1.0
     found = match([0, 2, 4], [0, 0, 0, 0], [-1.0, -1.0, -3.0, -2.0], [0.0, 0.0], [0.0])
     assert found.row_edge.tolist() == [-1, 2]
-
-
-@pytest.mark.parametrize("ties", [False, True])
-def test_dense_against_scipy(ties):
-    rng = np.random.default_rng(7)
-    for _ in range(300):
-        n = int(rng.integers(1, 12))
-        m = n + int(rng.integers(0, 4))
-        costs = rng.integers(-3, 4, (n, m)).astype(float) if ties else rng.normal(0, 10, (n, m))
-        column_of, pending = np.empty(n, np.int64), np.empty(n, np.int64)
-        row_of, previous, queue = (np.empty(m, np.int64) for _ in range(3))
-        v, distance = np.empty(m), np.empty(m)
-        match_dense(costs, n, m, column_of, row_of, v, distance, previous, queue, pending)
-        assert np.unique(column_of).size == n
-        assert (row_of[column_of] == np.arange(n)).all()
-        assert np.count_nonzero(row_of >= 0) == n
-        chosen = costs[np.arange(n), column_of]
-        assert chosen.sum() == pytest.approx(costs[linear_sum_assignment(costs)].sum(), abs=1e-9)
-        u = chosen - v[column_of]
-        assert (u[:, None] + v <= costs + 1e-9).all()
-        assert (v <= 0).all()
-        assert (v[row_of < 0] == 0).all()
