@@ -1,0 +1,61 @@
+"""Filters, one a file, and motion models; see docs/filters.md."""
+
+from __future__ import annotations
+
+from assoc.filters.adaptive import FuzzyAdaptiveEKF, paper_rules, tuned_data
+from assoc.filters.base import Expected, Filter, Update
+from assoc.filters.consistency import bounds, nees
+from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
+from assoc.filters.imm import InteractingMultipleModel, Mixture
+from assoc.filters.inference import FuzzyRules, FuzzyVariable
+from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
+from assoc.filters.measurement import FunctionMeasurement, LinearMeasurement, Measurement
+from assoc.filters.modified import ModifiedEKF
+from assoc.filters.motion import (
+    ConstantAcceleration,
+    ConstantVelocity,
+    CoordinatedTurn,
+    FunctionMotion,
+    LinearMotion,
+    Motion,
+    Padded,
+)
+from assoc.filters.smoother import FixedLagSmoother, Window
+from assoc.filters.state import Gaussian
+from assoc.filters.uav import UnmannedAircraft
+from assoc.filters.unscented import UnscentedKalmanFilter
+
+__all__ = [
+    "ConstantAcceleration",
+    "ConstantVelocity",
+    "CoordinatedTurn",
+    "Ensemble",
+    "EnsembleKalmanFilter",
+    "Expected",
+    "ExtendedKalmanFilter",
+    "Filter",
+    "FixedLagSmoother",
+    "FunctionMeasurement",
+    "FunctionMotion",
+    "FuzzyAdaptiveEKF",
+    "FuzzyRules",
+    "FuzzyVariable",
+    "Gaussian",
+    "InteractingMultipleModel",
+    "KalmanFilter",
+    "LinearMeasurement",
+    "LinearMotion",
+    "Measurement",
+    "Mixture",
+    "ModifiedEKF",
+    "Motion",
+    "Padded",
+    "UnmannedAircraft",
+    "UnscentedKalmanFilter",
+    "Update",
+    "Window",
+    "bounds",
+    "nees",
+    "paper_rules",
+    "tuned_data",
+]

@@ -1,0 +1,260 @@
+"""The EKF whose process and measurement noise fuzzy rules scale."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Expected, Filter, Update
+from assoc.filters.inference import FuzzyRules, FuzzyVariable
+from assoc.filters.kalman import ExtendedKalmanFilter
+from assoc.filters.measurement import Measurement
+from assoc.filters.motion import Motion, positive
+from assoc.filters.state import Gaussian, gaussian
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Adaptive:
+    """Gaussians with what the adaptation remembers.
+
+    Attributes
+    ----------
+    mean, covariance : (B, n), (B, n, n)
+    without_noise : (B, n, n)
+        Covariance of the last prediction before process noise was added.
+    process_noise : (B or 1, n, n)
+        Process noise of the last prediction, unscaled.
+    innovations : (B, W, d)
+        The last normalised innovations, newest last; d is 0 before the first measurement.
+    process_scale : (B,)
+        What the process noise is multiplied with, q.
+    """
+
+    mean: Array
+    covariance: Array
+    without_noise: Array
+    process_noise: Array
+    innovations: Array
+    process_scale: Array
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+    def __getitem__(self, rows: Any) -> Adaptive:
+        """Return the targets that an index array, mask or slice selects."""
+        noise = self.process_noise
+        return Adaptive(
+            np.ascontiguousarray(self.mean[rows]),
+            np.ascontiguousarray(self.covariance[rows]),
+            self.without_noise[rows],
+            noise[rows] if len(noise) > 1 else noise,
+            self.innovations[rows],
+            self.process_scale[rows],
+        )
+
+    def __repr__(self) -> str:
+        return f"Adaptive({self.mean.shape[0]} x {self.mean.shape[1]})"
+
+    @property
+    def gaussian(self) -> Gaussian:
+        """Means and covariances alone."""
+        return gaussian(self.mean, self.covariance)
+
+
+class FuzzyAdaptiveEKF(Filter[Adaptive]):
+    """An EKF with Q scaled by q and R by r, which fuzzy rules infer from the last innovations.
+
+    The rules' input is |sum of the last W innovations|^2 / W, each component in units of its standard
+    deviation, averaged over the components: equation 36 of the paper for W = 1. Its mean is 1 when the
+    filter is right; with W > 1 it grows only with innovations of one direction, as those of a manoeuvre, and
+    not with large noise.
+
+    Parameters
+    ----------
+    motion : Motion
+    process : FuzzyRules or None
+        Infers q; None leaves it at 1.
+    measurement : FuzzyRules or None
+        Infers r; None leaves it at 1.
+    window : int
+        W.
+    logarithmic : bool
+        Whether the rules' outputs are the logarithms (base 10) of q and r.
+    immediate : bool
+        Whether q already scales the noise of the prediction that the measurement corrects; otherwise, as in
+        the paper, that of the next.
+
+    References
+    ----------
+    Wiranto, Ridwan and Kadir, hybrid of the extended Kalman filter and fuzzy inference, equations 32 to 36.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        process: FuzzyRules | None,
+        measurement: FuzzyRules | None = None,
+        *,
+        window: int = 1,
+        logarithmic: bool = False,
+        immediate: bool = False,
+    ) -> None:
+        super().__init__(motion)
+        if isinstance(window, bool) or not isinstance(window, int) or window < 1:
+            raise InvalidInputError(f"window must be a whole number of at least 1, got {window!r}")
+        for name, rules in (("process", process), ("measurement", measurement)):
+            if rules is not None and not logarithmic and rules.output.corners[:, 1].min() < 0:
+                raise InvalidInputError(f"{name}: a scale must not be negative")
+        self.process, self.measurement = process, measurement
+        self.window, self.logarithmic, self.immediate = window, logarithmic, immediate
+        self._ekf, self._bare = ExtendedKalmanFilter(motion), ExtendedKalmanFilter(_NoiseFree(motion))
+
+    @classmethod
+    def from_data(cls, motion: Motion, data: Mapping[str, Any]) -> FuzzyAdaptiveEKF:
+        """Make a filter of parameters kept as data: window, immediate, input and output centres (log10 q).
+
+        Parameters
+        ----------
+        motion : Motion
+        data : mapping
+            "inputs" and "outputs": increasing centres and their log10 q, "window", "immediate".
+        """
+        inputs, outputs = data["inputs"], data["outputs"]
+        names = [f"level {i}" for i in range(1, len(inputs) + 1)]
+        rules = FuzzyRules(
+            FuzzyVariable.from_centres(names, inputs, 1.0),
+            FuzzyVariable.from_centres(names, outputs, float(data.get("reach", 0.05))),
+            [(name, name) for name in names],
+            points=int(data.get("points", 101)),
+        )
+        return cls(
+            motion,
+            rules,
+            window=int(data["window"]),
+            logarithmic=True,
+            immediate=bool(data["immediate"]),
+        )
+
+    def start(self, state: Gaussian) -> Adaptive:
+        """Begin with q = 1 and no innovations."""
+        state = self._ekf.start(state)
+        B = len(state)
+        return Adaptive(
+            state.mean, state.covariance, state.covariance, np.zeros((1, *state.covariance.shape[1:])),
+            np.zeros((B, self.window, 0)), np.ones(B),
+        )  # fmt: skip
+
+    def predict(self, state: Adaptive, dt: float) -> Adaptive:
+        """Return the state dt seconds later; see `Filter.predict`."""
+        Q = self.motion.noise(state.mean, dt)
+        moved = self._bare.predict(state.gaussian, dt)
+        scaled = state.process_scale[:, None, None] * Q
+        return Adaptive(
+            moved.mean, moved.covariance + scaled, moved.covariance, Q, state.innovations, state.process_scale
+        )
+
+    def move(self, state: Adaptive, dt: float) -> tuple[Adaptive, Array]:
+        """`predict`, and the covariance P F' of the states before and after it."""
+        F = self.motion.jacobian(state.mean, dt)
+        return self.predict(state, dt), state.covariance @ F.transpose(0, 2, 1)
+
+    def update(self, state: Adaptive, measured: Array, sensor: Measurement) -> Update[Adaptive]:
+        """Infer q and r, then correct each target with its measurement; see `Filter.update`."""
+        o = self._ekf.observe(sensor)
+        first = self._ekf.correct(state.gaussian, measured, o, o.covariance)
+        variances = np.einsum("bii->bi", first.covariance)
+        fresh = first.innovation / np.sqrt(variances)
+        past = state.innovations
+        if past.shape[2] != o.dim:
+            # the first measurement, or a sensor with other components: nothing to add it to
+            past = np.zeros((len(fresh), self.window, o.dim))
+        recent = np.concatenate([past[:, 1:], fresh[:, None]], axis=1)
+        known = np.maximum((recent != 0).any(axis=2).sum(axis=1), 1)
+        level = (recent.sum(axis=1) ** 2).mean(axis=1) / known
+        q = self._scale(self.process, level)
+        r = self._scale(self.measurement, level)
+        prior = state.covariance
+        if self.immediate:
+            prior = state.without_noise + q[:, None, None] * state.process_noise
+        done = first
+        if self.immediate or self.measurement is not None:
+            done = self._ekf.correct(gaussian(state.mean, prior), measured, o, r[:, None, None] * o.covariance)
+        corrected = Adaptive(done.state.mean, done.state.covariance, prior, state.process_noise, recent, q)
+        return Update(corrected, done.innovation, done.covariance, done.nis, done.log_likelihood)
+
+    def prior(self, predicted: Adaptive, corrected: Adaptive) -> tuple[Array, Array]:
+        """Mean and covariance of the prediction as it was corrected, after the adaptation."""
+        return predicted.mean, corrected.without_noise
+
+    def _scale(self, rules: FuzzyRules | None, level: Array) -> Array:
+        if rules is None:
+            return np.ones(len(level))
+        scale = rules(level)
+        return np.power(10.0, scale) if self.logarithmic else scale
+
+    def expected(self, state: Adaptive, sensor: Measurement) -> Expected:
+        """Return the expected measurements and covariances at the present q; see `Filter.expected`."""
+        return self._ekf.expected(state.gaussian, sensor)
+
+
+class _NoiseFree(Motion):
+    """A motion model with its process noise taken away."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.dim, self.position, self.inner = motion.dim, motion.position, motion
+        self._zero = np.zeros((1, motion.dim, motion.dim))
+
+    @property
+    def linear(self) -> bool:
+        return self.inner.linear
+
+    def propagate(self, states: Array, dt: float) -> Array:
+        return self.inner.propagate(states, dt)
+
+    def jacobian(self, states: Array, dt: float) -> Array:
+        return self.inner.jacobian(states, dt)
+
+    def noise(self, states: Array, dt: float) -> Array:
+        return self._zero
+
+
+PAPER_SETS: dict[str, Mapping[str, tuple[float, float, float, float]]] = {
+    "input": {
+        "near zero": (0.0, 0.0, 0.1, 0.6),
+        "small": (0.1, 1.0, 1.0, 2.0),
+        "medium": (1.0, 2.0, 2.0, 4.0),
+        "large": (2.0, 4.0, 6.0, 6.0),
+    },
+    "output": {
+        "near zero": (0.0, 0.0, 0.2, 0.6),
+        "near 1": (0.2, 1.0, 1.0, 1.5),
+        "little larger than 1": (1.0, 1.5, 1.5, 3.0),
+        "large": (2.0, 4.0, 6.0, 6.0),
+    },
+}
+"""Membership functions under the paper's names; it shows no numbers, these are chosen."""
+
+
+def paper_rules() -> FuzzyRules:
+    """Return the paper's four rules, the same for q and r, with the chosen `PAPER_SETS`."""
+    input_sets, output_sets = FuzzyVariable(PAPER_SETS["input"]), FuzzyVariable(PAPER_SETS["output"])
+    return FuzzyRules(input_sets, output_sets, list(zip(input_sets.sets, output_sets.sets, strict=True)), points=201)
+
+
+def tuned_data() -> dict[str, Any]:
+    """Return the tuned parameters that come with the package, for `FuzzyAdaptiveEKF.from_data`.
+
+    They were tuned by experiments/filters/tune_fuzzy.py for constant velocity with `acceleration_noise`.
+    """
+    text = files("assoc.filters").joinpath("fuzzy_parameters.json").read_text(encoding="utf-8")
+    data: dict[str, Any] = json.loads(text)
+    positive(data["acceleration_noise"], "acceleration_noise")
+    return data

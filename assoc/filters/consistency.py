@@ -1,0 +1,42 @@
+"""Whether a filter's covariances tell the truth: NEES and NIS with their chi-square bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import State
+from assoc.filters.state import finite
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def nees(state: State, truth: Array) -> Array:
+    """Normalised estimation error squared of each target, (B,); its mean is n if the filter is right.
+
+    Parameters
+    ----------
+    state
+        B targets.
+    truth : array (B, n)
+    """
+    truth = finite(truth, "truth", 2)
+    if truth.shape != state.mean.shape:
+        raise InvalidInputError(f"truth must have shape {state.mean.shape}, got {truth.shape}")
+    error = truth - state.mean
+    result: Array = np.einsum("bi,bi->b", error, np.linalg.solve(state.covariance, error[..., None])[..., 0])
+    return result
+
+
+def bounds(dim: int, runs: int, probability: float = 0.95) -> tuple[float, float]:
+    """Interval that the mean of `runs` chi-square variables of `dim` degrees of freedom hits."""
+    from scipy.stats import chi2
+
+    if dim < 1 or runs < 1 or not 0 < probability < 1:
+        raise InvalidInputError(
+            f"dim and runs must be above 0, probability between 0 and 1, got {dim}, {runs}, {probability}"
+        )
+    tail = (1 - probability) / 2
+    return float(chi2.ppf(tail, dim * runs)) / runs, float(chi2.ppf(1 - tail, dim * runs)) / runs

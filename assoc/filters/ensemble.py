@@ -1,0 +1,172 @@
+"""The ensemble Kalman filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
+from assoc.filters.kernels import GOOD
+from assoc.filters.measurement import Measurement, Observation
+from assoc.filters.motion import Motion
+from assoc.filters.sigma_kernels import ensemble_update, move_ensemble
+from assoc.filters.state import Gaussian, finite
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_NOTHING2 = np.zeros((0, 0))
+_NOTHING3 = np.zeros((0, 0, 0))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble:
+    """Ensembles of N members for each of B targets, (B, N, n)."""
+
+    members: Array
+
+    def __post_init__(self) -> None:
+        members = finite(self.members, "members", 3)
+        if members.shape[1] < 2:
+            raise InvalidInputError(f"members must be at least 2 for each target, got {members.shape[1]}")
+        object.__setattr__(self, "members", members)
+
+    @cached_property
+    def mean(self) -> Array:
+        """Sample means, (B, n)."""
+        mean: Array = self.members.mean(axis=1)
+        return mean
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Sample covariances, (B, n, n)."""
+        deviation = self.members - self.mean[:, None]
+        covariance: Array = deviation.transpose(0, 2, 1) @ deviation / (self.members.shape[1] - 1)
+        return covariance
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def __getitem__(self, rows: Any) -> Ensemble:
+        """Return the targets that an index array, mask or slice selects."""
+        return _ensemble(np.ascontiguousarray(self.members[rows]))
+
+    def __repr__(self) -> str:
+        return f"Ensemble({' x '.join(map(str, self.members.shape))})"
+
+
+def _ensemble(members: Array) -> Ensemble:
+    made = object.__new__(Ensemble)
+    made.__dict__["members"] = members
+    return made
+
+
+class EnsembleKalmanFilter(Filter[Ensemble]):
+    """The ensemble Kalman filter with perturbed measurements (equations 8 to 13 of the UAV paper).
+
+    Parameters
+    ----------
+    motion : Motion
+    size : int
+        Members of an ensemble, N.
+    rng : numpy.random.Generator or int
+        The source of all perturbations; the same seed gives the same result.
+    """
+
+    def __init__(self, motion: Motion, size: int = 100, rng: np.random.Generator | int = 0) -> None:
+        super().__init__(motion)
+        if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or size < 2:
+            raise InvalidInputError(f"size must be a whole number of at least 2, got {size!r}")
+        self.size = int(size)
+        self.rng = np.random.default_rng(rng)
+        self._factors: tuple[Any, Array] = (None, _NOTHING3)
+
+    def start(self, state: Gaussian) -> Ensemble:
+        """Draw ensembles from Gaussians."""
+        check_dimension(state, self.motion.dim)
+        B, n = state.mean.shape
+        factors = np.linalg.cholesky(state.covariance)
+        shocks = self.rng.standard_normal((B, self.size, n))
+        return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))
+
+    def predict(self, state: Ensemble, dt: float) -> Ensemble:
+        """Return the ensembles dt seconds later, each member with noise of its own."""
+        members = state.members
+        B, N, n = members.shape
+        if n != self.motion.dim:
+            raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
+        motion = self.motion
+        if motion.linear:
+            moved, F = _NOTHING3, motion.jacobian(_NOTHING2, dt)
+        else:
+            flat = motion.propagate(members.reshape(-1, n), dt)
+            moved, F = np.ascontiguousarray(flat).reshape(B, N, n), _NOTHING3
+        out = np.empty(members.shape)
+        move_ensemble(members, F, self.rng.standard_normal((B, N, n)), moved, self._roots(state, dt), out)
+        return _ensemble(out)
+
+    def _roots(self, state: Ensemble, dt: float) -> Array:
+        """Lower factors of the process noise, which may be singular."""
+        Q = self.motion.noise(state.mean, dt) if not self.motion.linear else self.motion.noise(_NOTHING2, dt)
+        if self._factors[0] is not Q:
+            self._factors = (Q, _lower_roots(Q))
+        return self._factors[1]
+
+    def move(self, state: Ensemble, dt: float) -> tuple[Ensemble, Array]:
+        """`predict`, and the sample covariance of the members before and after it, (B, n, n)."""
+        after = self.predict(state, dt)
+        before = state.members - state.mean[:, None]
+        cross = before.transpose(0, 2, 1) @ (after.members - after.mean[:, None])
+        return after, cross / (state.members.shape[1] - 1)
+
+    def update(self, state: Ensemble, measured: Array, sensor: Measurement) -> Update[Ensemble]:
+        """Correct each target with a measurement of its own; see `Filter.update`."""
+        o = self.observe(sensor)
+        z = measured_array(measured, len(state.members), o.dim)
+        return self._run(state, z, o, True)
+
+    def expected(self, state: Ensemble, sensor: Measurement) -> Expected:
+        """Return the expected measurements and their covariances; see `Filter.expected`."""
+        o = self.observe(sensor)
+        done = self._run(state, np.zeros((len(state.members), o.dim)), o, False)
+        return Expected(done.innovation, done.covariance)
+
+    def _run(self, state: Ensemble, z: Array, o: Observation, correcting: bool) -> Update[Ensemble]:
+        members = state.members
+        B, N, n = members.shape
+        if n != self.motion.dim:
+            raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
+        d = o.dim
+        given, first, base = _NOTHING3, _NOTHING2, None
+        if o.code < 0:
+            seen = o.model.measure(members.reshape(-1, n)).reshape(B, N, d)
+            base = np.ascontiguousarray(seen[:, 0])
+            repeated = np.repeat(base, N, axis=0)
+            given = np.ascontiguousarray(o.model.residual(seen.reshape(-1, d), repeated).reshape(B, N, d))
+            first = np.ascontiguousarray(o.model.residual(z, base)) if correcting else z
+        shocks = self.rng.standard_normal((B, N, d)) if correcting else _NOTHING3
+        out = np.empty(members.shape if correcting else (0, 0, 0))
+        v, S, nis, ll = np.empty((B, d)), np.empty((B, d, d)), np.empty(B), np.empty(B)
+        status = ensemble_update(
+            members, z, o.code, o.place, o.columns, o.matrix, o.covariance, given, first, shocks, correcting,
+            out, v, S, nis, ll,
+        )  # fmt: skip
+        if status != GOOD:
+            complain(status)
+        if base is not None and not correcting:
+            v += base
+        return Update(_ensemble(out), v, S, nis, ll)
+
+
+def _lower_roots(Q: Array) -> Array:
+    """Lower triangular L with L L' = Q for positive semidefinite Q (B, n, n)."""
+    values, vectors = np.linalg.eigh(Q)
+    if (values < -1e-9 * np.abs(values).max(axis=1, keepdims=True)).any():
+        raise InvalidInputError("noise must be a positive semidefinite covariance")
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    # Q = root root' = (R' R) with the triangular R of root' = q R
+    lower: Array = np.linalg.qr(root.transpose(0, 2, 1))[1].transpose(0, 2, 1)
+    return np.ascontiguousarray(lower)

@@ -1,0 +1,206 @@
+"""The interacting multiple model filter: several filters side by side, mixed at each step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Expected, Filter, GaussianFilter, Update, check_dimension
+from assoc.filters.measurement import Measurement
+from assoc.filters.state import Gaussian, finite, gaussian
+from assoc.filters.unscented import UnscentedKalmanFilter
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mixture:
+    """Gaussian mixtures, one component for each of m models: (B, m, n), (B, m, n, n), weights (B, m)."""
+
+    means: Array
+    covariances: Array
+    weights: Array
+
+    @cached_property
+    def mean(self) -> Array:
+        """Means of the mixtures, (B, n)."""
+        mean: Array = np.einsum("bm,bmi->bi", self.weights, self.means)
+        return mean
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariances of the mixtures, (B, n, n)."""
+        spread = self.means - self.mean[:, None]
+        covariance: Array = np.einsum("bm,bmij->bij", self.weights, self.covariances)
+        return covariance + np.einsum("bm,bmi,bmj->bij", self.weights, spread, spread)
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    def __getitem__(self, rows: Any) -> Mixture:
+        """Return the targets that an index array, mask or slice selects."""
+        return Mixture(self.means[rows], self.covariances[rows], self.weights[rows])
+
+    def __repr__(self) -> str:
+        return f"Mixture({' x '.join(map(str, self.means.shape))})"
+
+    def component(self, j: int) -> Gaussian:
+        """Return the Gaussians of one model."""
+        return gaussian(np.ascontiguousarray(self.means[:, j]), np.ascontiguousarray(self.covariances[:, j]))
+
+
+class InteractingMultipleModel(Filter[Mixture]):
+    """The interacting multiple model filter.
+
+    Parameters
+    ----------
+    filters : sequence of filters with Gaussian states
+        Their motion models share one state; see `assoc.filters.Padded`.
+    transition : array_like (m, m)
+        Probability that a target in mode i is in mode j one step later; rows sum to 1.
+    weights : array_like (m,), optional
+        Probabilities of the modes at the start; without it the stationary ones of `transition`.
+
+    References
+    ----------
+    Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 11.6.6.
+    """
+
+    def __init__(
+        self,
+        filters: Sequence[GaussianFilter | UnscentedKalmanFilter],
+        transition: Array,
+        weights: Array | None = None,
+    ) -> None:
+        if len(filters) < 2:
+            raise InvalidInputError(f"filters must be at least 2, got {len(filters)}")
+        dims = [one.motion.dim for one in filters]
+        if len(set(dims)) > 1:
+            raise InvalidInputError(f"filters must share one state, got dimensions {dims}")
+        super().__init__(filters[0].motion)
+        self.filters = tuple(filters)
+        m = len(filters)
+        self.transition = finite(transition, "transition", 2)
+        if self.transition.shape != (m, m):
+            raise InvalidInputError(f"transition must have shape {(m, m)}, got {self.transition.shape}")
+        if (self.transition < 0).any() or np.abs(self.transition.sum(axis=1) - 1).max() > 1e-9:
+            raise InvalidInputError("transition must have probabilities in its rows that sum to 1")
+        if weights is None:
+            values, vectors = np.linalg.eig(self.transition.T)
+            stationary = np.abs(vectors[:, np.argmax(values.real)].real)
+            weights = stationary / stationary.sum()
+        self.weights = finite(weights, "weights", 1)
+        if self.weights.shape != (m,) or (self.weights < 0).any() or abs(self.weights.sum() - 1) > 1e-9:
+            raise InvalidInputError(f"weights must be {m} probabilities that sum to 1")
+
+    def start(self, state: Gaussian) -> Mixture:
+        """Give every model the same Gaussian."""
+        check_dimension(state, self.motion.dim)
+        m, B = len(self.filters), len(state)
+        return Mixture(
+            np.repeat(state.mean[:, None], m, axis=1),
+            np.repeat(state.covariance[:, None], m, axis=1),
+            np.broadcast_to(self.weights, (B, m)).copy(),
+        )
+
+    def predict(self, state: Mixture, dt: float) -> Mixture:
+        """Mix the models and predict each; see `Filter.predict`."""
+        return self._predict(state, dt, False)[0]
+
+    def move(self, state: Mixture, dt: float) -> tuple[Mixture, Array]:
+        """`predict`, and the covariance of the mixtures before and after it, (B, n, n)."""
+        return self._predict(state, dt, True)
+
+    def _predict(self, state: Mixture, dt: float, crossing: bool) -> tuple[Mixture, Array]:
+        weights = state.weights @ self.transition
+        # share of model i in what model j starts from
+        share = state.weights[:, :, None] * self.transition / np.maximum(weights, 1e-300)[:, None, :]
+        means = share.transpose(0, 2, 1) @ state.means
+        away = state.means[:, :, None] - means[:, None]
+        # sum over i of share_ij (P_i + away away')
+        B, m, n = means.shape
+        P = (share.transpose(0, 2, 1) @ state.covariances.reshape(B, m, n * n)).reshape(B, m, n, n)
+        weighted = (share[..., None] * away).transpose(0, 2, 3, 1)
+        P += weighted @ away.transpose(0, 2, 1, 3)
+        new_means, new_P = np.empty_like(means), np.empty_like(P)
+        cross = np.zeros((B, n, n))
+        whole = state.mean
+        for j, one in enumerate(self.filters):
+            mixed = gaussian(np.ascontiguousarray(means[:, j]), np.ascontiguousarray(P[:, j]))
+            if crossing:
+                moved, between = one.move(mixed, dt)
+                cross += weights[:, j, None, None] * (
+                    between + (means[:, j] - whole)[:, :, None] * moved.mean[:, None, :]
+                )
+            else:
+                moved = one.predict(mixed, dt)
+            new_means[:, j], new_P[:, j] = moved.mean, moved.covariance
+        # sum of w (m - whole) moved' needs no centring of moved: the first factor sums to zero
+        return Mixture(new_means, new_P, weights), cross
+
+    def update(self, state: Mixture, measured: Array, sensor: Measurement) -> Update[Mixture]:
+        """Correct each model and its probability; see `Filter.update`."""
+        m = len(self.filters)
+        done = [one.update(state.component(j), measured, sensor) for j, one in enumerate(self.filters)]
+        with np.errstate(divide="ignore"):
+            joint = np.stack([d.log_likelihood for d in done], axis=1) + np.log(state.weights)
+        top = joint.max(axis=1, keepdims=True)
+        scaled = np.exp(joint - top)
+        total = scaled.sum(axis=1, keepdims=True)
+        corrected = Mixture(
+            np.stack([d.state.mean for d in done], axis=1),
+            np.stack([d.state.covariance for d in done], axis=1),
+            scaled / total,
+        )
+        # innovation of the mixture, in deviations from the first model's, which are small angles
+        v = np.stack([d.innovation for d in done], axis=1)
+        o = self.observe(sensor)
+        base = v[:, :1]
+        if hasattr(sensor, "angular"):
+            turns = np.array(sensor.angular[: o.dim]) * 2 * np.pi
+            with np.errstate(invalid="ignore", divide="ignore"):
+                v = base + (v - base) - np.where(turns > 0, turns * np.round((v - base) / turns), 0.0)
+        mean = np.einsum("bm,bmi->bi", state.weights, v)
+        away = v - mean[:, None]
+        S = np.einsum("bm,bmij->bij", state.weights, np.stack([d.covariance for d in done], axis=1))
+        S += np.einsum("bm,bmi,bmj->bij", state.weights, away, away)
+        nis = np.einsum("bi,bi->b", mean, np.linalg.solve(S, mean[..., None])[..., 0])
+        assert m == v.shape[1]
+        return Update(corrected, mean, S, nis, (top + np.log(total))[:, 0])
+
+    def expected(self, state: Mixture, sensor: Measurement) -> Expected:
+        """Return the expected measurements and covariances of the mixtures; see `Filter.expected`."""
+        h, S = self._each(state, sensor)
+        base = h[:, :1]
+        away = h - base
+        if hasattr(sensor, "angular"):
+            angular = np.array(sensor.angular[: h.shape[2]])
+            away[..., angular] = np.mod(away[..., angular] + np.pi, 2 * np.pi) - np.pi
+        mean = np.einsum("bm,bmi->bi", state.weights, away)
+        spread = away - mean[:, None]
+        covariance = np.einsum("bm,bmij->bij", state.weights, S)
+        covariance += np.einsum("bm,bmi,bmj->bij", state.weights, spread, spread)
+        return Expected(base[:, 0] + mean, covariance)
+
+    def _each(self, state: Mixture, sensor: Measurement) -> tuple[Array, Array]:
+        all_expected = [one.expected(state.component(j), sensor) for j, one in enumerate(self.filters)]
+        return (
+            np.stack([e.mean for e in all_expected], axis=1),
+            np.stack([e.covariance for e in all_expected], axis=1),
+        )
+
+    def log_likelihood(self, state: Mixture, measurements: Array, sensor: Measurement) -> Array:
+        """Log-likelihood under the mixture of the models' predictions, (B, M)."""
+        each = np.stack(
+            [one.log_likelihood(state.component(j), measurements, sensor) for j, one in enumerate(self.filters)],
+            axis=1,
+        )
+        with np.errstate(divide="ignore"):
+            joint = each + np.log(state.weights)[:, :, None]
+        result: Array = np.logaddexp.reduce(joint, axis=1)
+        return result

@@ -1,0 +1,162 @@
+"""What filters see of a measurement: sensors of `assoc.sensors`, matrices, or a user's own function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.kernels import GIVEN, LINEAR
+from assoc.filters.motion import Motion, differences
+from assoc.filters.state import finite, positive_definite
+from assoc.sensors.base import Sensor
+from assoc.sensors.kernels import CODES
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_NO_MATRIX = np.zeros((0, 0))
+_NO_PLACE = np.zeros(3)
+
+
+class LinearMeasurement:
+    """z = H x + v, v ~ N(0, R), on any components of the state.
+
+    Parameters
+    ----------
+    matrix : array_like (d, n)
+    covariance : array_like (d, d)
+    """
+
+    def __init__(self, matrix: Array, covariance: Array) -> None:
+        self.matrix = finite(matrix, "matrix", 2)
+        self.dim = len(self.matrix)
+        self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
+
+    def measure(self, states: Array) -> Array:
+        """Noise-free measurements (m, d) of states (m, n)."""
+        result: Array = states @ self.matrix.T
+        return result
+
+
+class FunctionMeasurement:
+    """A user's own measurement model of the whole state.
+
+    Parameters
+    ----------
+    function : callable states (m, n) -> (m, d)
+    covariance : array_like (d, d)
+    jacobian : callable states (m, n) -> (m, d, n), optional
+        Without it central differences are taken.
+    residual : callable (measured, predicted) -> difference, optional
+        For angles; without it the plain difference.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Array], Array],
+        covariance: Array,
+        *,
+        jacobian: Callable[[Array], Array] | None = None,
+        residual: Callable[[Array, Array], Array] | None = None,
+    ) -> None:
+        covariance = finite(covariance, "covariance", 2)
+        self.dim = len(covariance)
+        self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
+        self._function, self._jacobian, self._residual = function, jacobian, residual
+
+    def measure(self, states: Array) -> Array:
+        """Noise-free measurements (m, d) of states (m, n)."""
+        result = finite(self._function(states), "the measurement function's result", 2)
+        if result.shape != (len(states), self.dim):
+            raise InvalidInputError(
+                f"the measurement function's result must have shape {(len(states), self.dim)}, got {result.shape}"
+            )
+        return result
+
+    def jacobian(self, states: Array) -> Array:
+        """Derivatives of `measure`, (m, d, n)."""
+        if self._jacobian is None:
+            return differences(self.measure, states)
+        return finite(self._jacobian(states), "the measurement function's jacobian", 3)
+
+    def residual(self, measured: Array, predicted: Array) -> Array:
+        """Return measured - predicted."""
+        if self._residual is None:
+            return np.asarray(measured) - predicted
+        return finite(self._residual(measured, predicted), "the measurement function's residual")
+
+
+Measurement = Sensor | LinearMeasurement | FunctionMeasurement
+
+
+class Observation(NamedTuple):
+    """A measurement model in the form that the kernels take; see `assoc.filters.kernels.update`."""
+
+    code: int
+    dim: int
+    place: Array
+    columns: Array
+    matrix: Array
+    covariance: Array
+    """(1, d, d)."""
+    model: FunctionMeasurement
+    """The user's model; used only where `code` is GIVEN."""
+
+
+class _SensorAsFunction(FunctionMeasurement):
+    """A sensor of the user's own class, which has no compiled twin."""
+
+    def __init__(self, sensor: Sensor, position: Array, dim: int) -> None:
+        self.dim, self.covariance = sensor.dim, np.array(sensor.covariance)
+        self.sensor, self.position, self.states = sensor, position, dim
+
+    def _places(self, states: Array) -> Array:
+        places = np.zeros((len(states), 3))
+        places[:, : len(self.position)] = states[:, self.position]
+        return places
+
+    def measure(self, states: Array) -> Array:
+        return finite(self.sensor.measure(self._places(states)), "the sensor's measure", 2)
+
+    def jacobian(self, states: Array) -> Array:
+        H = np.zeros((len(states), self.dim, self.states))
+        slopes = self.sensor.jacobian(self._places(states))
+        H[:, :, self.position] = slopes[:, :, : len(self.position)]
+        return H
+
+    def residual(self, measured: Array, predicted: Array) -> Array:
+        return self.sensor.residual(measured, predicted)
+
+
+_NO_MODEL: Any = None
+
+
+def observation(measurement: Measurement, motion: Motion) -> Observation:
+    """Put a measurement model in the form that the kernels take, for states of a motion model."""
+    every = np.arange(motion.dim)
+    if isinstance(measurement, Sensor):
+        columns = np.array(motion.position, dtype=np.int64)
+        code = CODES.get(type(measurement))
+        if code == 0 and measurement.dim > len(columns):
+            raise InvalidInputError(
+                f"sensor measures {measurement.dim} coordinates, the motion model has {len(columns)}"
+            )
+        if code is not None:
+            R = np.ascontiguousarray(measurement.covariance)[None].copy()
+            place = np.array(measurement.position)
+            return Observation(code, measurement.dim, place, columns, _NO_MATRIX, R, _NO_MODEL)
+        measurement = _SensorAsFunction(measurement, columns, motion.dim)
+    if isinstance(measurement, LinearMeasurement):
+        if measurement.matrix.shape[1] != motion.dim:
+            raise InvalidInputError(f"matrix must have {motion.dim} columns, got shape {measurement.matrix.shape}")
+        R = measurement.covariance[None]
+        # most entries are zeros: only the components that are read take part
+        read = np.flatnonzero(measurement.matrix.any(axis=0))
+        matrix = np.ascontiguousarray(measurement.matrix[:, read])
+        return Observation(LINEAR, measurement.dim, _NO_PLACE, read, matrix, R, _NO_MODEL)
+    if isinstance(measurement, FunctionMeasurement):
+        R = measurement.covariance[None]
+        return Observation(GIVEN, measurement.dim, _NO_PLACE, every, _NO_MATRIX, R, measurement)
+    raise InvalidInputError(f"sensor must be a sensor or a measurement model, got {type(measurement).__name__}")

@@ -1,0 +1,134 @@
+"""Tune the fuzzy rules and, with the same care, the IMM; writes assoc/filters/fuzzy_parameters.json.
+
+Both see the same random flights, the same measurements and as many evaluations. None of these flights
+is in the report (experiments/fuzzy_ekf.py).
+
+    python -m experiments.filters.tune_fuzzy [--evaluations N] [--seed N] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from assoc.errors import AssocError
+from assoc.filters import CoordinatedTurn, FuzzyAdaptiveEKF
+from assoc.filters.base import Filter
+from experiments.filters.manoeuvres import Batch, errors, imm, random_flights
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+LEVELS = 4
+OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy_parameters.json"
+
+
+def fuzzy_data(x: Array, window: int) -> dict[str, Any]:
+    """Parameters of the fuzzy filter from a free vector; inputs and outputs are kept increasing."""
+    noise, rate = np.exp(x[:2])
+    inputs = np.cumsum(np.exp(x[2 : 2 + LEVELS]))
+    steps = x[2 + LEVELS :]
+    outputs = np.cumsum(np.concatenate([steps[:1], np.exp(steps[1:])]))
+    return {
+        "acceleration_noise": float(noise),
+        "rate_noise": float(rate),
+        "inputs": inputs.tolist(),
+        "outputs": outputs.tolist(),
+        "window": window,
+        "immediate": True,
+    }
+
+
+def fuzzy_filter(data: dict[str, Any]) -> FuzzyAdaptiveEKF:
+    """Return the fuzzy filter of these parameters, on a coordinated turn."""
+    return FuzzyAdaptiveEKF.from_data(CoordinatedTurn(data["acceleration_noise"], data["rate_noise"]), data)
+
+
+def imm_data(x: Array) -> dict[str, float]:
+    """Parameters of the IMM from a free vector."""
+    stay = 1 / (1 + np.exp(-x[4:6]))
+    return {
+        "straight_noise": float(np.exp(x[0])),
+        "rate_spread": float(np.exp(x[1])),
+        "turn_noise": float(np.exp(x[2])),
+        "rate_noise": float(np.exp(x[3])),
+        "stay_straight": float(stay[0]),
+        "stay_turning": float(stay[1]),
+    }
+
+
+def score(make: Callable[[], Filter[Any]], batch: Batch) -> float:
+    """Mean over the flights of the logarithm of the RMSE, so that gentle and hard flights weigh alike."""
+    try:
+        squared = errors(make(), batch).mean(axis=0)
+    except AssocError:
+        return 1e3
+    return float(0.5 * np.log(squared).mean())
+
+
+def search(objective: Callable[[Array], float], start: Array, evaluations: int) -> tuple[Array, float]:
+    """Nelder and Mead, begun again from the best once it has shrunk."""
+    best, value = start, objective(start)
+    for part in (0.6, 0.4):
+        simplex = np.vstack([best, best + 0.35 * np.eye(len(best))])
+        found = minimize(
+            objective,
+            best,
+            method="Nelder-Mead",
+            options={
+                "maxfev": int(part * evaluations),
+                "initial_simplex": simplex,
+                "adaptive": True,
+                "xatol": 1e-3,
+                "fatol": 1e-5,
+            },
+        )
+        if found.fun < value:
+            best, value = found.x, float(found.fun)
+    return best, value
+
+
+def main() -> None:
+    """Tune and write."""
+    parser = argparse.ArgumentParser(description="Tune the fuzzy rules and the IMM on random flights.")
+    parser.add_argument("--evaluations", type=int, default=500, help="of each search (default 500)")
+    parser.add_argument("--flights", type=int, default=120, help="random flights (default 120)")
+    parser.add_argument("--seed", type=int, default=20_000, help="of flights and noise (default 20000)")
+    parser.add_argument("--output", type=Path, default=OUTPUT, help="the parameter file to write")
+    chosen = parser.parse_args()
+    rng = np.random.default_rng(chosen.seed)
+    batch = Batch.draw(random_flights(chosen.flights, rng), 1, rng)
+
+    best: tuple[float, dict[str, Any]] | None = None
+    for window in (2, 3, 4):
+        start = np.concatenate(
+            [np.log([1.0, 0.012]), np.log([0.8, 0.9, 1.4, 1.9]), [-0.7], np.log([0.6, 0.9, 0.9])]
+        )
+        x, value = search(
+            lambda x, w=window: score(lambda: fuzzy_filter(fuzzy_data(x, w)), batch),  # type: ignore[misc]
+            start,
+            chosen.evaluations // 3,
+        )
+        print(f"fuzzy, window {window}: {np.exp(value):.2f} m")
+        if best is None or value < best[0]:
+            best = value, fuzzy_data(x, window)
+    start = np.concatenate([np.log([1.0, 0.1, 3.0, 0.02]), [3.5, 3.0]])
+    x, value = search(lambda x: score(lambda: imm(imm_data(x)), batch), start, chosen.evaluations)
+    print(f"IMM: {np.exp(value):.2f} m")
+    assert best is not None
+    about = (
+        f"tuned by experiments/filters/tune_fuzzy.py --seed {chosen.seed} on {chosen.flights} random flights, "
+        f"{chosen.evaluations} evaluations each"
+    )
+    text = json.dumps({"about": about, **best[1], "imm": imm_data(x)}, indent=2)
+    chosen.output.write_text(text + "\n", encoding="utf-8")
+    print(f"{chosen.output}: written")
+
+
+if __name__ == "__main__":
+    main()
