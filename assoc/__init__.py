@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
-    from assoc import solvers
+    from assoc import solvers, sweeps
     from assoc.association import Association, associate
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
@@ -34,6 +34,7 @@ __all__ = [
     "associate",
     "build_problem",
     "solvers",
+    "sweeps",
 ]
 
 _HOME = {
@@ -51,8 +52,8 @@ def __getattr__(name: str) -> Any:
     """Load a public name from its home on first use (PEP 562)."""
     if name in _HOME:
         value = getattr(importlib.import_module(_HOME[name]), name)
-    elif name == "solvers":
-        value = importlib.import_module("assoc.solvers")
+    elif name in ("solvers", "sweeps"):
+        value = importlib.import_module(f"assoc.{name}")
     else:
         raise AttributeError(f"module 'assoc' has no attribute {name!r}")
     globals()[name] = value

@@ -1,0 +1,191 @@
+"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from assoc._program import Parser, run
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc.sweeps.study import Counts, Study
+
+_SHOWN = 60
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return run(lambda: _sweep(words), "assoc.sweep")
+
+
+def _sweep(words: list[str]) -> None:
+    parser = _parser()
+    given = {name: value for name, value in vars(parser.parse_args(words)).items() if value is not None}
+    if "summary" in given:
+        _summary(given)
+        return
+    from assoc.sweeps.options import check_outputs, read
+
+    options = read(given)
+    check_outputs(options.output, given.get("csv"))
+    if options.tune is not None:
+        _tune(options, given)
+        return
+    study = options.study()
+    with _watched(options.output) as progress:
+        counts = study.run(options.output, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
+    _report(options.output, given, study)
+    spread = f", {1e3 * counts.solving / counts.new:.3g} ms a run in the solver" if counts.new else ""
+    print(f"{counts.total} runs in {options.output}: {counts.new} new, {counts.before} there before{spread}")
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="assoc.sweep",
+        usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
+        "       python -m assoc.sweep --config STUDY.toml\n"
+        "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE]",
+        description="Run a design of solver parameters over scenes and problems, with repeats, and keep every\n"
+        "result as it comes. The same command again runs only what is missing.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("files", nargs="*", metavar="FILE", help="scene.npz or problem.npz")
+    add("--solver", nargs="+", metavar="NAME", help="one solver or several")
+    add(
+        "--grid",
+        nargs="+",
+        metavar="NAME=V1,V2",
+        help="values of parameters, every combination is run; SOLVER.NAME=... for one solver of several; "
+        "with --random also ranges LOW:HIGH or LOW:HIGH:log",
+    )
+    add("--random", metavar="N", help="draw N settings from the values and ranges of --grid")
+    add("--config", metavar="FILE", help="TOML file of these options; the design in tables [solver]")
+    add("--repeats", metavar="N", help="runs of each setting on each scan, each with its own seed (default 1)")
+    add("--seed", metavar="N", help="all other seeds derive from it (default 0)")
+    add("--time-limit", metavar="S", help="seconds for each run")
+    add("--scans", metavar="A:B", help="scans A to B-1 of each scene, counted from 0; A alone is one scan")
+    add("--gate-probability", metavar="P", help="share of true tuples that a gate lets through, in (0, 1]")
+    add("--max-tuples", metavar="N", help="refuse scans with more candidate tuples than this")
+    add("-o", "--output", metavar="FOLDER", help="the study's folder")
+    add("--jobs", metavar="N", help="processes on this machine; 'all' takes every core (default 1)")
+    add("--scheduler", metavar="ADDRESS", help="do the work on a dask cluster: tcp://host:port")
+    add("--tune", metavar="N", help="search the ranges of --grid for good parameters in N trials")
+    add("--target", metavar="NAME", help="of --tune: gap (mean gap) or time (time to optimum); default gap")
+    add("--summary", metavar="FOLDER", help="print the table of a study and run nothing")
+    add("--csv", metavar="FILE", help="write the table as CSV")
+    add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
+    return parser
+
+
+def _summary(given: dict[str, Any]) -> None:
+    strange = sorted({*given} - {"summary", "csv", "plot", "files"})
+    if strange or given["files"]:
+        raise InvalidInputError(
+            f"--summary: runs nothing and goes only with --plot and --csv, not with {(strange or given['files'])[0]}"
+        )
+    from assoc.sweeps.options import check_outputs
+
+    check_outputs(None, given.get("csv"))
+    _report(given["summary"], given, None)
+
+
+def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
+    """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
+    from assoc.sweeps.frame import load
+    from assoc.sweeps.store import damaged_lines
+    from assoc.sweeps.summary import print_summary, summarize
+
+    frame = load(folder)
+    if study is not None:
+        frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
+    table = summarize(frame)
+    print_summary(table, _SHOWN if study is not None else None)
+    print()
+    damaged = damaged_lines(folder)
+    if damaged and study is None:
+        print(f"{damaged} unfinished lines of the log are passed over; the same sweep again does their runs")
+    if "csv" in given:
+        from assoc._files import write_atomically
+
+        text = table.to_csv(index=False, lineterminator="\n")
+        write_atomically(given["csv"], lambda file: file.write(text.encode()))
+    if "plot" in given:
+        from assoc.sweeps.plots import draw
+
+        for path in draw(folder, frame):
+            print(f"drawn: {path}")
+
+
+def _tune(options: Any, given: dict[str, Any]) -> None:
+    from assoc.sweeps.tuning import print_report
+
+    with _watched(options.output) as progress:
+        report = options.tuning(progress)
+    print_report(report)
+    if "plot" in given or "csv" in given:
+        _report(options.output, given, None)
+
+
+@contextmanager
+def _watched(folder: str) -> Iterator[Any]:
+    """Show progress on a terminal, and say on Ctrl-C how to go on."""
+    from assoc.sweeps.progress import Bar
+
+    last: list[Counts] = []
+    with Bar(sys.stderr) as bar:
+
+        def progress(counts: Counts) -> None:
+            last[:] = [counts]
+            _state["message"] = _farewell(folder, last)
+            bar(counts)
+
+        _state["message"] = _farewell(folder, last)
+        try:
+            yield progress
+        except KeyboardInterrupt:
+            bar.close()
+            print(_state["message"], file=sys.stderr)
+            sys.stderr.flush()
+            raise SystemExit(130) from None
+
+
+def _farewell(folder: str, last: list[Counts]) -> str:
+    kept = f"{last[0].done} of {last[0].total} runs are" if last else "finished runs are"
+    return f"assoc.sweep: interrupted; {kept} kept in {folder}; the same command goes on from there"
+
+
+_state: dict[str, str] = {"message": "assoc.sweep: interrupted"}
+
+
+def _stop_on_interrupt() -> None:
+    """Turn Ctrl-C into an orderly end, also while a library solves without Python; worker processes do not see it."""
+    import _thread
+    import signal
+    import threading
+    import time
+
+    if not hasattr(signal, "pthread_sigmask") or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        return
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+    def watch() -> None:
+        signal.sigwait({signal.SIGINT})
+        _thread.interrupt_main()
+        time.sleep(5.0)
+        os.write(2, f"{_state['message']}\n".encode())
+        os._exit(130)
+
+    threading.Thread(target=watch, name="interrupt", daemon=True).start()
+
+
+if __name__ == "__main__":
+    _stop_on_interrupt()
+    raise SystemExit(main())

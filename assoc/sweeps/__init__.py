@@ -1,0 +1,51 @@
+"""Parameter studies: a design of settings, run on one core, on all, or on a cluster, and kept as it comes.
+
+>>> import assoc.sweeps
+>>> frame = assoc.sweeps.load("study/")    # one row a run, doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from assoc.sweeps.design import grid, random_settings, settings_from
+    from assoc.sweeps.frame import load, load_traces
+    from assoc.sweeps.setting import Setting
+    from assoc.sweeps.study import Study
+    from assoc.sweeps.summary import summarize
+    from assoc.sweeps.tuning import tune
+
+_HOME = {
+    "Setting": "setting",
+    "Study": "study",
+    "grid": "design",
+    "load": "frame",
+    "load_traces": "frame",
+    "random_settings": "design",
+    "settings_from": "design",
+    "summarize": "summary",
+    "tune": "tuning",
+}
+
+__all__ = [
+    "Setting",
+    "Study",
+    "grid",
+    "load",
+    "load_traces",
+    "random_settings",
+    "settings_from",
+    "summarize",
+    "tune",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'assoc.sweeps' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"assoc.sweeps.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

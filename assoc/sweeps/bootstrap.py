@@ -1,0 +1,65 @@
+"""Intervals by the bootstrap, for runs that share problems and repeats."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+RESAMPLES = 2000
+
+
+def mean_interval(
+    values: Floats,
+    weights: Floats | None = None,
+    *,
+    level: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> tuple[float, float]:
+    """Interval of the mean over problems and repeats, both drawn anew with replacement.
+
+    Parameters
+    ----------
+    values : array, shape (problems, repeats)
+        NaN where a run is missing.
+    weights : array, shape (problems, repeats), optional
+        The mean is then ``sum(weights * values) / sum(weights)``; 1 each without it.
+    level : float, default 0.95
+    resamples : int, default 2000
+    seed : int, default 0
+        The same interval every time.
+
+    Returns
+    -------
+    (float, float)
+        NaN without values; the mean itself, twice, with a single one.
+
+    References
+    ----------
+    A. B. Owen, The pigeonhole bootstrap, Annals of Applied Statistics 1 (2007): resampling rows and columns
+    is on the safe side where runs of one problem, or of one repeat, are alike.
+    """
+    share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
+    if not share.any():
+        return np.nan, np.nan
+    rng = np.random.default_rng(seed)
+    rows, columns = values.shape
+    of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples).astype(float)
+    of_columns = rng.multinomial(columns, np.full(columns, 1 / columns), resamples).astype(float)
+    # from the middle of the values, so that large equal numbers give an interval of no width
+    middle = weighted_mean(values, weights)
+    away = np.where(share > 0, values - middle, 0.0)
+    total = ((of_rows @ (share * away)) * of_columns).sum(axis=1)
+    weight = ((of_rows @ share) * of_columns).sum(axis=1)
+    means = middle + total[weight > 0] / weight[weight > 0]
+    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
+
+
+def weighted_mean(values: Floats, weights: Floats | None = None) -> float:
+    """Mean of the values that are not NaN; NaN if there is none or the weights are all 0."""
+    known = ~np.isnan(values)
+    share = np.ones(int(known.sum())) if weights is None else weights[known]
+    return float(np.average(values[known], weights=share)) if share.sum() > 0 else float("nan")

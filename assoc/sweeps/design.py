@@ -1,0 +1,197 @@
+"""Designs: which settings a study runs. A grid takes every combination, a random design draws them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.solvers import registry
+from assoc.sweeps.setting import Setting, parameter
+from assoc.sweeps.space import Range, Space, read_text, read_value
+
+MOST_SETTINGS = 1_000_000
+"""A design of more settings is refused: it is a slip of the keyboard."""
+
+
+def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
+    """Every combination of the values of some parameters of a solver.
+
+    Parameters
+    ----------
+    solver : str
+        One of ``assoc.solvers.names()``.
+    space : mapping of str to list
+        Values of each parameter; the last one varies fastest. Without any it is the solver's defaults.
+
+    Returns
+    -------
+    list of Setting
+        No setting twice.
+
+    Raises
+    ------
+    InvalidInputError
+        Unknown solver or parameter, a value out of range, no values.
+    LimitExceededError
+        More than a million settings.
+    """
+    return _combinations(solver, _spaces(solver, space or {}), "grid")
+
+
+def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int = 0) -> list[Setting]:
+    """Settings drawn at random; the first n of a longer design are the design of length n.
+
+    Parameters
+    ----------
+    solver : str
+    space : mapping
+        For each parameter a list of values or ``{"low": .., "high": .., "log": True}``.
+    count : int
+        How many.
+    seed : int, default 0
+
+    Returns
+    -------
+    list of Setting
+        At most ``count``: a setting that was drawn twice is there once.
+    """
+    return _drawn(solver, _spaces(solver, space), count, seed)
+
+
+def _spaces(solver: str, space: Mapping[str, Any]) -> dict[str, Space]:
+    return {
+        name: read_value(parameter(solver, name), _plain(value), f"{solver}.{name}") for name, value in space.items()
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return list(value) if isinstance(value, (tuple, range)) else value
+
+
+def _combinations(solver: str, spaces: Mapping[str, Space], label: str) -> list[Setting]:
+    registry.parameters(solver)
+    lists = []
+    for name, space in spaces.items():
+        if isinstance(space, Range):
+            raise InvalidInputError(
+                f"{label}: {name} is a range, which only a random design takes (--random N); a grid needs values"
+            )
+        lists.append(space.values)
+    count = math.prod(map(len, lists))
+    if count > MOST_SETTINGS:
+        raise LimitExceededError(f"{label}: {count} settings, at most {MOST_SETTINGS}; a random design can be smaller")
+    made = (Setting(solver, dict(zip(spaces, chosen, strict=True))) for chosen in itertools.product(*lists))
+    return list(dict.fromkeys(made))
+
+
+def _drawn(solver: str, spaces: Mapping[str, Space], count: int, seed: int) -> list[Setting]:
+    if not spaces:
+        raise InvalidInputError(f"--random: no parameter of {solver} to draw; give its values or range in --grid")
+    if count > MOST_SETTINGS:
+        raise LimitExceededError(f"--random: {count} settings, at most {MOST_SETTINGS}")
+    made = []
+    for number in range(count):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+        made.append(Setting(solver, {name: space.draw(rng) for name, space in spaces.items()}))
+    return list(dict.fromkeys(made))
+
+
+def read_words(words: Sequence[str], solvers: Sequence[str], label: str = "--grid") -> dict[str, dict[str, Space]]:
+    """Read ``name=values`` or ``solver.name=values`` for each of the solvers.
+
+    A name without a solver counts for every solver that has this parameter.
+
+    Raises
+    ------
+    InvalidInputError
+        A word of another form, a parameter that no solver has or that is given twice, no values.
+    """
+    found: dict[str, dict[str, Space]] = {solver: {} for solver in solvers}
+    for word in words:
+        name, equals, text = word.partition("=")
+        name = name.strip()
+        if not equals or not name:
+            raise InvalidInputError(f"{label}: expected NAME=VALUE[,VALUE...], got {word!r}")
+        owner, dot, plain = name.rpartition(".")
+        if dot and owner not in solvers:
+            raise InvalidInputError(f"{label}: {name}: {owner!r} is no solver of the study: {', '.join(solvers)}")
+        plain = plain.replace("-", "_")
+        owners = _owners(plain, [owner] if dot else list(solvers), label)
+        for one in owners:
+            if plain in found[one]:
+                raise InvalidInputError(f"{label}: {plain} is given twice for {one}")
+            found[one][plain] = read_text(parameter(one, plain), text, f"{label}: {name}")
+    return found
+
+
+def _owners(name: str, solvers: list[str], label: str) -> list[str]:
+    owners, complaints = [], []
+    for solver in solvers:
+        try:
+            parameter(solver, name)
+            owners.append(solver)
+        except InvalidInputError as error:
+            complaints.append(str(error))
+    if not owners:
+        # the one that knows a near name says most
+        complaints.sort(key=lambda text: "did you mean" not in text)
+        raise InvalidInputError(f"{label}: {complaints[0]}")
+    return owners
+
+
+def settings_from(
+    tables: Mapping[str, Any], random: int | None = None, seed: int = 0, label: str = ""
+) -> list[Setting]:
+    """Settings of a study described by tables, as a TOML file holds them.
+
+    Parameters
+    ----------
+    tables : mapping
+        Solver to a table, or to a list of tables: parameter to a value, a list of values, or
+        ``{low, high, log}`` (drawn, with ``random``).
+    random : int, optional
+        Draw so many settings from each table that has a list or a range; without it every combination is taken.
+    seed : int, default 0
+    label : str
+        What errors begin with.
+    """
+    found: list[Setting] = []
+    for solver, given in tables.items():
+        for table in given if isinstance(given, list) else [given]:
+            if not isinstance(table, Mapping):
+                raise InvalidInputError(f"{label}[{solver}]: expected a table of parameters, got {table!r}")
+            try:
+                spaces = _spaces(solver, {key.replace("-", "_"): value for key, value in table.items()})
+                found += combine(solver, spaces, random, seed)
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{label}{error}") from None
+    return list(dict.fromkeys(found))
+
+
+def combine(solver: str, spaces: Mapping[str, Space], random: int | None, seed: int) -> list[Setting]:
+    """Every combination, or with ``random`` so many drawn ones where there is something to draw."""
+    open_ended = any(isinstance(space, Range) or len(space.values) > 1 for space in spaces.values())
+    if random is not None and open_ended:
+        return _drawn(solver, spaces, random, seed)
+    return _combinations(solver, spaces, "--grid")
+
+
+def designed(designs: Sequence[tuple[str, Mapping[str, Space]]], random: int | None, seed: int) -> list[Setting]:
+    """Settings of several solvers, none twice."""
+    found = [setting for solver, spaces in designs for setting in combine(solver, spaces, random, seed)]
+    if (
+        random is not None
+        and len(found)
+        and not any(
+            isinstance(space, Range) or len(space.values) > 1 for _, spaces in designs for space in spaces.values()
+        )
+    ):
+        raise InvalidInputError("--random: nothing to draw; give values or ranges in --grid")
+    return list(dict.fromkeys(found))

@@ -1,0 +1,85 @@
+"""Batches done on this machine: in this process, or by joblib in several."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import tempfile
+import threading
+import time
+from collections.abc import Generator, Iterable
+from pathlib import Path
+
+from assoc.errors import InvalidInputError
+from assoc.sweeps.work import Batch, Job, Result, run_batch
+
+SECONDS_OF_A_BATCH = 0.2
+
+
+def run_here(job: Job, batches: Iterable[Batch]) -> Generator[Result]:
+    """Do batches one after the other in this process."""
+    for batch in batches:
+        yield run_batch(job, batch)
+
+
+def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[Result]:
+    """Do batches in processes, and yield results as they come.
+
+    What all runs share goes through a file that each process reads once; a task carries its batch alone.
+
+    Raises
+    ------
+    InvalidInputError
+        A process was killed (by a lack of memory, say), or it raised this itself.
+    """
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    with tempfile.TemporaryDirectory(prefix="assoc-sweep-") as folder:
+        path = Path(folder) / "job"
+        path.write_bytes(pickle.dumps(job))
+        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
+        try:
+            yield from parallel(delayed(_run)(str(path), os.getpid(), batch) for batch in batches)
+        except BrokenProcessPool:
+            raise InvalidInputError(
+                "--jobs: a worker process was killed (is the memory used up?); fewer jobs need less; "
+                "finished runs are kept, and the same command goes on from there"
+            ) from None
+        finally:
+            stop_workers()
+
+
+def stop_workers() -> None:
+    """End the worker processes now, whatever they are at."""
+    from joblib.externals.loky import reusable_executor
+
+    executor = reusable_executor._executor
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
+
+
+_job: tuple[str, Job] | None = None
+
+
+def _run(path: str, parent: int, batch: Batch) -> Result:
+    global _job
+    if _job is None or _job[0] != path:
+        _watch(parent, Path(path).parent)
+        _job = path, pickle.loads(Path(path).read_bytes())
+    return run_batch(_job[1], batch)
+
+
+def _watch(parent: int, folder: Path) -> None:
+    """End with the parent, also when it was killed and could not say so or clean up."""
+    if os.getppid() != parent:
+        return
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        shutil.rmtree(folder, ignore_errors=True)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent", daemon=True).start()

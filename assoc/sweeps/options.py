@@ -1,0 +1,256 @@
+"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from assoc._program import one_line, seconds, whole_number
+from assoc.errors import InvalidInputError
+from assoc.solvers import registry
+from assoc.sweeps.design import designed, read_words, settings_from
+
+if TYPE_CHECKING:
+    from assoc.sweeps.setting import Setting
+    from assoc.sweeps.sources import Source
+    from assoc.sweeps.space import Space
+    from assoc.sweeps.study import Study
+    from assoc.sweeps.tuning import Report
+
+DEFAULT_SOLVER = "aco"
+
+_TEXTS = ("output", "scheduler", "scans", "target")
+_WHOLE = {"repeats": 1, "seed": 0, "random": 1, "max_tuples": 1, "tune": 1}
+_NUMBERS = ("time_limit", "gate_probability")
+_LISTS = ("files", "solver", "grid")
+_KNOWN = (*_LISTS, *_TEXTS, *_WHOLE, *_NUMBERS, "jobs")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a sweep was asked to do, checked.
+
+    Attributes
+    ----------
+    values : mapping
+        Options by name, in their types.
+    tables : mapping
+        The design as tables, if a file has it.
+    config : str
+        Name of that file.
+    """
+
+    values: Mapping[str, Any]
+    tables: Mapping[str, Any]
+    config: str
+
+    @property
+    def output(self) -> str:
+        """The study's folder."""
+        return str(self.values["output"])
+
+    @property
+    def jobs(self) -> int:
+        """Number of processes."""
+        return int(self.values.get("jobs", 1))
+
+    @property
+    def scheduler(self) -> str | None:
+        """Address of the dask scheduler."""
+        return self.values.get("scheduler")
+
+    @property
+    def tune(self) -> int | None:
+        """Number of trials, if parameters are to be searched."""
+        return self.values.get("tune")
+
+    @property
+    def solvers(self) -> list[str]:
+        """Names of the solvers of the command line."""
+        words = [name for word in self.values.get("solver", [DEFAULT_SOLVER]) for name in word.split(",") if name]
+        for name in words:
+            registry.parameters(name)
+        return list(dict.fromkeys(words))
+
+    @cached_property
+    def spaces(self) -> dict[str, dict[str, Space]]:
+        """Values and ranges of the command line for each solver."""
+        return read_words(self.values.get("grid", []), self.solvers)
+
+    @cached_property
+    def settings(self) -> list[Setting]:
+        """The design."""
+        random, seed = self.values.get("random"), self.values.get("seed", 0)
+        if self.tables:
+            return settings_from(self.tables, random, seed, f"{self.config}: ")
+        return designed(list(self.spaces.items()), random, seed)
+
+    @cached_property
+    def sources(self) -> tuple[Source, ...]:
+        """The scenes and problems."""
+        from assoc.sweeps.sources import load_sources
+
+        return load_sources(self.values["files"])
+
+    def study(self) -> Study:
+        """Return the study."""
+        from assoc.sweeps.study import Study
+
+        settings = self.settings  # a wrong design is told before scenes are read
+        return Study(sources=self.sources, settings=settings, repeats=self.values.get("repeats", 1), **self._common())
+
+    def tuning(self, progress: Callable[[Any], object]) -> Report:
+        """Search parameters."""
+        from assoc.sweeps.tuning import tune
+
+        if self.tables or len(self.solvers) != 1 or "random" in self.values:
+            raise InvalidInputError("--tune: searches one --solver in the ranges of --grid, without --random or tables")
+        solver = self.solvers[0]
+        return tune(
+            self.output,
+            self.sources,
+            solver,
+            self.spaces[solver],
+            self.values["tune"],
+            target=self.values.get("target", "gap"),
+            repeats=self.values.get("repeats", 3),
+            jobs=self.jobs,
+            scheduler=self.scheduler,
+            progress=progress,
+            **self._common(),
+        )
+
+    def _common(self) -> dict[str, Any]:
+        values = self.values
+        scans = None
+        if "scans" in values:
+            scans = [scan_range(values["scans"], source.num_scans, source.name) for source in self.sources]
+        return {
+            "seed": values.get("seed", 0),
+            "time_limit": values.get("time_limit"),
+            "gating": {name: values[name] for name in ("gate_probability", "max_tuples") if name in values},
+            "scans": scans,
+        }
+
+
+def read(given: Mapping[str, Any]) -> Options:
+    """Check the options of the command line and of the file that ``config`` names; the former come first.
+
+    Raises
+    ------
+    InvalidInputError
+        Anything that is not as ``--help`` says.
+    """
+    config = given.get("config", "")
+    content = _read_toml(config) if config else {}
+    tables = {key: content.pop(key) for key in [*content] if key in registry.names() and key not in _KNOWN}
+    values = {key: _of_file(config, key, value) for key, value in content.items()}
+    for name, value in given.items():
+        if name in _KNOWN and value != []:
+            values[name] = _of_text(name, value)
+    if tables:
+        for name in ("solver", "grid"):
+            if name in values:
+                raise InvalidInputError(f"--{name}: the design is in the tables of {config}; give one of the two")
+    if not values.get("files"):
+        raise InvalidInputError("no scene.npz or problem.npz is given")
+    if "output" not in values:
+        raise InvalidInputError("--output: missing, expected the folder that keeps the study")
+    if "scheduler" in values and "jobs" in values:
+        raise InvalidInputError("--jobs: the cluster has its own workers; give --jobs or --scheduler")
+    if values.get("target", "gap") not in ("gap", "time"):
+        raise InvalidInputError(f"--target: expected gap or time, got {values['target']!r}")
+    if "target" in values and "tune" not in values:
+        raise InvalidInputError("--target: goes only with --tune")
+    if not 0 < values.get("gate_probability", 1.0) <= 1:
+        raise InvalidInputError(f"--gate-probability: expected a number in (0, 1], got {values['gate_probability']}")
+    return Options(values, tables, config)
+
+
+def _of_text(name: str, value: Any) -> Any:
+    flag = "--" + name.replace("_", "-")
+    if name in _WHOLE:
+        return whole_number(value, flag, _WHOLE[name])
+    if name == "time_limit":
+        return seconds(value, flag)
+    if name == "gate_probability":
+        try:
+            return float(value)
+        except ValueError:
+            raise InvalidInputError(f"{flag}: expected a number, got {value!r}") from None
+    if name == "jobs":
+        return os.cpu_count() or 1 if value == "all" else whole_number(value, flag, 1)
+    return value
+
+
+def _of_file(file: str, key: str, value: Any) -> Any:
+    label = f"{file}: {key}"
+    if key not in _KNOWN:
+        if isinstance(value, (dict, list)):
+            raise InvalidInputError(f"{file}: [{key}] is no solver; known: {', '.join(registry.names())}")
+        raise InvalidInputError(f"{label}: unknown key; known: {', '.join(_KNOWN)}, and tables [solver]")
+    if key in _LISTS:
+        words = [value] if isinstance(value, str) else value
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            raise InvalidInputError(f"{label}: expected text or a list of texts, got {value!r}")
+        return words
+    if key == "jobs" and value == "all":
+        return _of_text(key, value)
+    kind: Any = str if key in _TEXTS else (int, float) if key in _NUMBERS else int
+    if not isinstance(value, kind) or isinstance(value, bool):
+        expected = "text" if key in _TEXTS else "a number" if key in _NUMBERS else "a whole number"
+        raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
+    if key in _WHOLE or key == "jobs":
+        least = _WHOLE.get(key, 1)
+        if value < least:
+            raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {value!r}")
+    if key == "time_limit" and not 0 < value < float("inf"):
+        raise InvalidInputError(f"{label}: expected seconds > 0, got {value!r}")
+    return float(value) if key in _NUMBERS else value
+
+
+def _read_toml(path: str) -> dict[str, Any]:
+    import tomllib
+
+    try:
+        with open(path, "rb") as file:
+            content = tomllib.load(file)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError and UnicodeDecodeError
+        raise InvalidInputError(f"{path}: is not a TOML file ({one_line(error)})") from None
+    return {key.replace("-", "_"): value for key, value in content.items()}
+
+
+def scan_range(text: str, count: int, name: str) -> range:
+    """Parse A:B or A, within the scans of a source.
+
+    Raises
+    ------
+    InvalidInputError
+        It is not of that form, or reaches beyond.
+    """
+    first, colon, last = text.partition(":")
+    try:
+        start = int(first) if first or not colon else 0
+        stop = (int(last) if last else count) if colon else start + 1
+    except ValueError:
+        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
+    if not 0 <= start < stop <= count:
+        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {name}")
+    return range(start, stop)
+
+
+def check_outputs(folder: str | None, csv: str | None) -> None:
+    """Refuse before the work what could not be written after it."""
+    if folder is not None and os.path.exists(folder) and not os.path.isdir(folder):
+        raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
+    if csv is not None:
+        if Path(csv).is_dir():
+            raise InvalidInputError(f"{csv}: is a folder, expected a file name to write")
+        if not Path(csv).parent.is_dir() and Path(csv).parent != Path(folder or "."):
+            raise InvalidInputError(f"{csv}: the folder {Path(csv).parent} does not exist")

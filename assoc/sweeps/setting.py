@@ -1,0 +1,94 @@
+"""A setting: a solver with all its parameters, and a key that stays the same on every machine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+from assoc._program import Option, options
+from assoc.errors import InvalidInputError
+from assoc.solvers import registry
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One solver and its parameters.
+
+    Parameters
+    ----------
+    solver : str
+        One of ``assoc.solvers.names()``.
+    parameters : mapping
+        Those that differ from the solver's defaults, or more; the others are filled in.
+
+    Raises
+    ------
+    InvalidInputError
+        Unknown solver or parameter (the near names are listed), or a value out of range.
+    """
+
+    solver: str
+    parameters: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        known = {option.name: option for option in options(registry.parameters(self.solver))}
+        values = {
+            name: known[name].check(value, f"{self.solver}.{name}") if name in known else value
+            for name, value in self.parameters.items()
+        }
+        try:
+            made: Any = registry.make_parameters(self.solver, values)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{self.solver}: {error}") from None
+        object.__setattr__(
+            self, "parameters", MappingProxyType({one.name: getattr(made, one.name) for one in fields(made)})
+        )
+
+    @cached_property
+    def key(self) -> str:
+        """Sixteen hexadecimal digits of the digest of solver and parameters."""
+        text = json.dumps([self.solver, dict(self.parameters)], sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @cached_property
+    def words(self) -> tuple[int, int]:
+        """The key as two words for seeds."""
+        return int(self.key[:8], 16), int(self.key[8:], 16)
+
+    @cached_property
+    def family(self) -> tuple[Any, ...]:
+        """Solver and the choices that are not numbers: settings of a family run the same code."""
+        chosen = ((k, v) for k, v in self.parameters.items() if isinstance(v, (str, bool)))
+        return (self.solver, *chosen)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Setting) and self.key == other.key
+
+    def __reduce__(self) -> Any:
+        return Setting, (self.solver, dict(self.parameters))
+
+
+def parameter(solver: str, name: str) -> Option:
+    """Return the parameter of a solver that text can give.
+
+    Raises
+    ------
+    InvalidInputError
+        The solver has none of this name; the near names are listed.
+    """
+    for option in options(registry.parameters(solver)):
+        if option.name == name:
+            return option
+    try:
+        registry.make_parameters(solver, {name: None})
+    except InvalidInputError as error:
+        raise error from None
+    raise InvalidInputError(f"{name}: cannot be given as text")

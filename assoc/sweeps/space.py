@@ -1,0 +1,116 @@
+"""What values a parameter of a design may take: a list, or a range to draw from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc._program import Option
+from assoc.errors import InvalidInputError
+
+
+@dataclass(frozen=True)
+class Values:
+    """A list of values, none of them twice."""
+
+    values: tuple[Any, ...]
+
+    def draw(self, rng: np.random.Generator) -> Any:
+        """Draw one of them."""
+        return self.values[int(rng.integers(len(self.values)))]
+
+
+@dataclass(frozen=True)
+class Range:
+    """Numbers from ``low`` to ``high``, both included.
+
+    Attributes
+    ----------
+    low, high : float
+    logarithmic : bool
+        Whether equal ratios are equally likely, rather than equal differences.
+    whole : bool
+        Only whole numbers.
+    """
+
+    low: float
+    high: float
+    logarithmic: bool = False
+    whole: bool = False
+
+    def draw(self, rng: np.random.Generator) -> Any:
+        """Draw a number."""
+        if self.whole and not self.logarithmic:
+            return int(rng.integers(int(self.low), int(self.high) + 1))
+        share = float(rng.random())
+        if self.logarithmic:
+            value = self.low * (self.high / self.low) ** share
+        else:
+            value = self.low + (self.high - self.low) * share
+        return round(value) if self.whole else value
+
+
+Space = Values | Range
+
+
+def read_text(option: Option, text: str, label: str) -> Space:
+    """Read ``1,2,3`` or ``0.1:0.9`` or ``1:1000:log``.
+
+    Raises
+    ------
+    InvalidInputError
+        No values, or one of the wrong type.
+    """
+    parts = text.split(":")
+    if option.kind in (int, float) and len(parts) in (2, 3):
+        if len(parts) == 3 and parts[2] != "log":
+            raise InvalidInputError(f"{label}: expected LOW:HIGH or LOW:HIGH:log, got {text!r}")
+        low, high = (_parse(option, part, label) for part in parts[:2])
+        return make_range(option, low, high, len(parts) == 3, label)
+    words = [word.strip() for word in text.split(",")]
+    if not any(words):
+        raise InvalidInputError(f"{label}: no values given, expected {option.name}=VALUE[,VALUE...]")
+    return values([_parse(option, word, label) for word in words])
+
+
+def read_value(option: Option, value: Any, label: str) -> Space:
+    """Read what a TOML file gives: one value, a list of them, or ``{low = .., high = .., log = true}``."""
+    if isinstance(value, dict):
+        unknown = sorted({*value} - {"low", "high", "log"})
+        if unknown or not {"low", "high"} <= {*value} or option.kind not in (int, float):
+            raise InvalidInputError(f"{label}: expected a value, a list or {{low, high, log}}, got {value!r}")
+        low, high = (option.check(value[end], f"{label}.{end}") for end in ("low", "high"))
+        return make_range(option, low, high, value.get("log", False) is True, label)
+    if not isinstance(value, list):
+        return Values((option.check(value, label),))
+    if not value:
+        raise InvalidInputError(f"{label}: the list is empty, expected at least one value")
+    return values([option.check(one, label) for one in value])
+
+
+def values(found: list[Any]) -> Values:
+    """Return the values without doubles, in the order given."""
+    return Values(tuple(dict.fromkeys(found)))
+
+
+def make_range(option: Option, low: float, high: float, logarithmic: bool, label: str) -> Range:
+    """Return a checked range."""
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise InvalidInputError(f"{label}: expected low < high, got {low}:{high}")
+    if logarithmic and low <= 0:
+        raise InvalidInputError(f"{label}: a logarithmic range needs low > 0, got {low}")
+    return Range(low, high, logarithmic, option.kind is int)
+
+
+def _parse(option: Option, text: str, label: str) -> Any:
+    try:
+        if option.kind is bool:
+            return {"true": True, "false": False}[text.lower()]
+        value = option.kind(text)
+    except (ValueError, KeyError):
+        expected = {int: "a whole number", float: "a number", bool: "true or false"}[option.kind]
+        raise InvalidInputError(f"{label}: expected {expected}, got {text!r}") from None
+    return option.check(value, label)

@@ -1,0 +1,300 @@
+"""The folder of a study: a manifest, and a log to which results are only ever appended.
+
+A line of the log is the checksum of what follows it, a blank, and JSON: a setting, or a batch of runs as columns.
+A line that was cut short (the power failed, the process was killed) fails its checksum and is passed over; the
+next line begins on a new line of the file. So whatever happens at whatever moment, finished batches stay.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from assoc._files import write_atomically
+from assoc.errors import InvalidInputError
+from assoc.sweeps.setting import Setting
+
+FORMAT = "assoc.study"
+VERSION = 1
+MANIFEST = "study.json"
+LOG = "runs.jsonl"
+
+COLUMNS = (
+    "setting",
+    "source",
+    "repeat",
+    "scan",
+    "seed",
+    "cost",
+    "lower_bound",
+    "iterations",
+    "time",
+    "stopped_by",
+    "true_tuples",
+    "correct_tuples",
+    "trace",
+)
+"""Of a batch, each a list with one entry a run. ``setting`` and ``source`` are keys."""
+
+RunKey = tuple[str, str, int, int]
+"""Key of the setting, fingerprint of the source, repeat, scan."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What all runs of a study have in common; another study cannot go on in its folder.
+
+    Attributes
+    ----------
+    package : str
+        Version of assoc.
+    seed : int
+    sources : mapping
+        Fingerprint to name.
+    time_limit : float or None
+    gating : mapping
+        Options of ``assoc.build_problem``.
+    """
+
+    package: str
+    seed: int
+    sources: Mapping[str, str]
+    time_limit: float | None
+    gating: Mapping[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the file holds."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "assoc": self.package,
+            "seed": self.seed,
+            "sources": [{"fingerprint": key, "name": name} for key, name in self.sources.items()],
+            "time_limit": self.time_limit,
+            "gating": dict(self.gating),
+        }
+
+    def check_same(self, new: Manifest, folder: Path) -> None:
+        """Refuse to go on with something else."""
+        elsewhere = "take another folder"
+        if self.package != new.package:
+            raise InvalidInputError(
+                f"{folder}: this study was made by version {self.package} of assoc, this is {new.package}; {elsewhere}"
+            )
+        if {*self.sources} != {*new.sources}:
+            strange = [name for key, name in new.sources.items() if key not in self.sources]
+            missing = [name for key, name in self.sources.items() if key not in new.sources]
+            what = f"{strange[0]} is not among its sources" if strange else f"{missing[0]} of it is not given"
+            raise InvalidInputError(f"{folder}: holds a study of other scenes or problems: {what}; {elsewhere}")
+        for name in ("seed", "time_limit", "gating"):
+            old, now = getattr(self, name), getattr(new, name)
+            if old != now:
+                raise InvalidInputError(f"{folder}: this study was begun with {name} {old}, not {now}; {elsewhere}")
+
+
+class Store:
+    """An open study folder; one process at a time may write to it.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if it is not there.
+    manifest : Manifest
+        Must be that of the study in the folder, if there is one.
+
+    Raises
+    ------
+    InvalidInputError
+        Another study, another process at work in it, something else than a study, or no permission.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest) -> None:
+        self.folder = Path(folder)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidInputError(f"{self.folder}: cannot be made ({error.strerror or error})") from None
+        if not (self.folder / MANIFEST).exists() and any(self.folder.glob("[!.]*")):
+            raise InvalidInputError(f"{self.folder}: holds other files and no study; take a new or an empty folder")
+        self._lock = _lock(self.folder)
+        try:
+            if (self.folder / MANIFEST).exists():
+                read_manifest(self.folder).check_same(manifest, self.folder)
+            else:
+                text = json.dumps(manifest.to_dict(), indent=1) + "\n"
+                write_atomically(self.folder / MANIFEST, lambda file: file.write(text.encode()))
+            self.settings: set[str] = set()
+            self.done: set[RunKey] = set()
+            self.damaged = 0
+            for entry in read_log(self.folder):
+                if entry is None:
+                    self.damaged += 1
+                elif "setting_key" in entry:
+                    self.settings.add(entry["setting_key"])
+                else:
+                    self.done.update(run_keys(entry))
+            self._log = self._open_log()
+        except BaseException:
+            self._lock.close()
+            raise
+
+    def _open_log(self) -> IO[bytes]:
+        path = self.folder / LOG
+        try:
+            log = open(path, "ab", buffering=0)
+            if log.tell() > 0:
+                with open(path, "rb") as written:
+                    written.seek(-1, os.SEEK_END)
+                    if written.read(1) != b"\n":
+                        log.write(b"\n")
+        except OSError as error:
+            raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        return log
+
+    def append(self, settings: Sequence[Setting], batch: Mapping[str, list[Any]]) -> int:
+        """Write a batch, with those of its settings that are new, and wait until the disk has it.
+
+        Parameters
+        ----------
+        settings : sequence of Setting
+            All that the batch refers to.
+        batch : mapping
+            The lists of `COLUMNS`; runs that are there already are left out.
+
+        Returns
+        -------
+        int
+            Number of runs that are new.
+
+        Raises
+        ------
+        InvalidInputError
+            The disk is full, say. What was there before stays.
+        """
+        keys = list(run_keys(batch))
+        fresh = [i for i, key in enumerate(keys) if key not in self.done]
+        if len(fresh) < len(keys):
+            batch = {name: [batch[name][i] for i in fresh] for name in COLUMNS}
+        if not fresh:
+            return 0
+        new = {setting.key: setting for setting in settings if setting.key not in self.settings}
+        entries: list[Mapping[str, Any]] = [
+            {"setting_key": key, "solver": one.solver, "parameters": dict(one.parameters)} for key, one in new.items()
+        ]
+        data = memoryview(b"".join(_line(entry) for entry in [*entries, batch]))
+        path = self.folder / LOG
+        try:
+            while data:
+                data = data[self._log.write(data) :]
+            os.fsync(self._log.fileno())
+        except OSError as error:
+            raise InvalidInputError(
+                f"{path}: cannot be written ({error.strerror or error}); {len(self.done)} finished runs are kept, "
+                "and the same command goes on from there"
+            ) from None
+        self.settings |= {*new}
+        self.done.update(keys)
+        return len(fresh)
+
+    def close(self) -> None:
+        """Close the files and let others in."""
+        self._log.close()
+        self._lock.close()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def run_keys(batch: Mapping[str, list[Any]]) -> Iterator[RunKey]:
+    """Keys of the runs of a batch."""
+    return zip(batch["setting"], batch["source"], batch["repeat"], batch["scan"], strict=True)
+
+
+def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
+    """Read the manifest of a study.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no study in the folder, or it is of a later version, or damaged.
+    """
+    path = Path(folder) / MANIFEST
+    if not Path(folder).is_dir():
+        raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InvalidInputError(f"{folder}: holds no study ({MANIFEST} is missing)") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}")
+    if content.get("version") != VERSION:
+        raise InvalidInputError(f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}")
+    try:
+        sources = {str(one["fingerprint"]): str(one["name"]) for one in content["sources"]}
+        limit = None if content["time_limit"] is None else float(content["time_limit"])
+        return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, dict(content["gating"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
+
+
+def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
+    """Yield the entries of the log in order; None for a line whose checksum is wrong."""
+    path = Path(folder) / LOG
+    if not path.exists():
+        return
+    try:
+        with open(path, "rb") as file:
+            for line in file:
+                if line != b"\n":
+                    yield _read_line(line)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def damaged_lines(folder: str | os.PathLike[str]) -> int:
+    """Count the lines of the log that were not finished, or were changed afterwards."""
+    return sum(entry is None for entry in read_log(folder))
+
+
+def _line(entry: Mapping[str, Any]) -> bytes:
+    body = json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
+    return b"%08x %s\n" % (zlib.crc32(body), body)
+
+
+def _read_line(line: bytes) -> dict[str, Any] | None:
+    body = line[9:-1]
+    if line[-1:] != b"\n" or line[:9] != b"%08x " % zlib.crc32(body):
+        return None
+    entry = json.loads(body)
+    return entry if isinstance(entry, dict) else None
+
+
+def _lock(folder: Path) -> IO[bytes]:
+    """Hold the folder against a second process; the lock goes with the process, however it ends."""
+    path = folder / ".lock"
+    try:
+        file = open(path, "ab")
+    except OSError as error:
+        raise InvalidInputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    try:
+        import fcntl
+    except ImportError:  # not a POSIX system: two processes at once are then the user's care
+        return file
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        raise InvalidInputError(f"{folder}: another sweep is at work in this folder") from None
+    except OSError:  # a file system without locks
+        pass
+    return file

@@ -1,0 +1,203 @@
+"""A study: settings, sources and repeats; what is done is kept, and only what is missing is run."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import assoc
+from assoc.errors import InvalidInputError
+from assoc.sweeps.batching import Batches, RunNumbers
+from assoc.sweeps.setting import Setting
+from assoc.sweeps.sources import Source
+from assoc.sweeps.store import Manifest, RunKey, Store
+from assoc.sweeps.work import Job, Result
+
+Progress = Callable[["Counts"], object]
+
+
+@dataclass
+class Counts:
+    """How far a study is.
+
+    Attributes
+    ----------
+    total : int
+        Runs of the design.
+    before : int
+        Those that were there already.
+    new : int
+        Those done since.
+    solving : float
+        Seconds that the new ones took in the solvers, summed.
+    """
+
+    total: int
+    before: int
+    new: int = 0
+    solving: float = 0.0
+
+    @property
+    def done(self) -> int:
+        """Runs of the design that are done."""
+        return self.before + self.new
+
+
+@dataclass(frozen=True)
+class Study:
+    """A design on its sources.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+        Scenes and problems. Each scan is a run of its own.
+    settings : sequence of Setting
+    repeats : int, or range
+        Number of runs of each setting on each scan, each with its own seed; or which ones.
+    seed : int, default 0
+        All seeds derive from it and from what a run is.
+    time_limit : float, optional
+        Seconds for each run.
+    gating : mapping
+        Options of ``assoc.build_problem``.
+    scans : sequence of range, optional
+        The scans of each source; all without it.
+
+    Raises
+    ------
+    InvalidInputError
+        No settings or no sources, or numbers out of range.
+    """
+
+    sources: Sequence[Source]
+    settings: Sequence[Setting]
+    repeats: int | range = 1
+    seed: int = 0
+    time_limit: float | None = None
+    gating: Mapping[str, Any] = field(default_factory=dict)
+    scans: Sequence[Sequence[int]] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.settings:
+            raise InvalidInputError("the design is empty: no settings to run")
+        if not self.sources:
+            raise InvalidInputError("the study has no scenes and no problems")
+        if isinstance(self.repeats, int):
+            if self.repeats < 1:
+                raise InvalidInputError(f"repeats: expected a whole number >= 1, got {self.repeats!r}")
+            object.__setattr__(self, "repeats", range(self.repeats))
+        if self.scans is None:
+            object.__setattr__(self, "scans", [range(source.num_scans) for source in self.sources])
+        object.__setattr__(self, "settings", tuple(dict.fromkeys(self.settings)))
+
+    @property
+    def manifest(self) -> Manifest:
+        """What a folder must say to hold this study."""
+        names = {source.fingerprint: source.name for source in self.sources}
+        return Manifest(assoc.__version__, self.seed, names, self.time_limit, dict(self.gating))
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        assert self.scans is not None and isinstance(self.repeats, range)
+        return len(self.settings) * len(self.repeats) * sum(map(len, self.scans))
+
+    def all_runs(self) -> Iterator[RunNumbers]:
+        """All runs, as (setting, source, repeat, scan): first all settings once, so that a part tells something."""
+        assert self.scans is not None and isinstance(self.repeats, range)
+        for repeat, (source, scans), setting in itertools.product(
+            self.repeats, enumerate(self.scans), range(len(self.settings))
+        ):
+            for scan in scans:
+                yield setting, source, repeat, scan
+
+    def missing(self, store: Store) -> Iterator[RunNumbers]:
+        """Those runs that the store does not have."""
+        # a copy: what is appended while we go on is not asked for again anyway
+        done = frozenset(store.done)
+        return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
+
+    def keys(self) -> Iterator[RunKey]:
+        """Keys of all runs, in their order."""
+        settings = [setting.key for setting in self.settings]
+        sources = [source.fingerprint for source in self.sources]
+        return ((settings[run[0]], sources[run[1]], run[2], run[3]) for run in self.all_runs())
+
+    def run(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        jobs: int = 1,
+        scheduler: str | None = None,
+        progress: Progress | None = None,
+    ) -> Counts:
+        """Run what is missing, and keep every result as it comes.
+
+        Results are the same on every backend and with any number of workers; only times differ.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made if it is not there; a study in it goes on if it is this one (the design may have changed).
+        jobs : int, default 1
+            Number of processes on this machine.
+        scheduler : str, optional
+            Address of a dask scheduler, whose workers then do the work.
+        progress : callable, optional
+            Called with the `Counts` at the start and after each batch.
+
+        Returns
+        -------
+        Counts
+
+        Raises
+        ------
+        InvalidInputError
+            The folder holds something else or cannot be written, or the scheduler does not answer.
+        """
+        with Store(folder, self.manifest) as store:
+            return self.run_in(store, jobs=jobs, scheduler=scheduler, progress=progress)
+
+    def run_in(
+        self,
+        store: Store,
+        *,
+        jobs: int = 1,
+        scheduler: str | None = None,
+        progress: Progress | None = None,
+        take: Callable[[Result], object] | None = None,
+    ) -> Counts:
+        """Do as `run` does, in a store that is open; ``take`` is called with each result that is kept."""
+        from assoc.sweeps import cluster, local
+
+        missing = sum(1 for _ in self.missing(store))
+        counts = Counts(self.size, self.size - missing)
+        if progress is not None:
+            progress(counts)
+        if missing == 0:
+            return counts
+        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, assoc.__version__)
+        seconds = local.SECONDS_OF_A_BATCH if scheduler is None else cluster.SECONDS_OF_A_BATCH
+        batches = Batches(self.settings, self.missing(store), seconds)
+        results: Generator[Result]
+        if scheduler is not None:
+            results = cluster.run_with_dask(job, batches, scheduler)
+        elif jobs > 1:
+            results = local.run_with_joblib(job, batches, jobs)
+        else:
+            results = local.run_here(job, batches)
+        try:
+            for result in results:
+                counts.new += store.append(result.batch.settings, result.columns)
+                counts.solving += sum(time or 0.0 for time in result.columns["time"])
+                batches.learn(result)
+                if take is not None:
+                    take(result)
+                if progress is not None:
+                    progress(counts)
+        finally:
+            results.close()
+        return counts

@@ -1,0 +1,158 @@
+"""A study in a table: one row a setting, means with intervals."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.sweeps.bootstrap import mean_interval, weighted_mean
+from assoc.sweeps.frame import RESULTS, load
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = NDArray[np.float64]
+
+MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
+"""What is averaged; "correct" is the share of the true tuples that were found."""
+
+
+def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
+    """Average the runs of each setting.
+
+    Parameters
+    ----------
+    study : DataFrame or path-like
+        What `load` returned, or the folder.
+
+    Returns
+    -------
+    DataFrame
+        One row for each setting: ``solver``, the parameters that differ, ``setting``, ``runs``, and for each of
+        ``cost``, ``gap``, ``optimal`` (the share certified optimal), ``iterations``, ``time`` (seconds) and
+        ``correct`` its mean and its 95 % interval (``_low``, ``_high``) by the bootstrap over problems and repeats.
+        ``infeasible`` counts the runs without a solution, which are in no mean.
+    """
+    import pandas as pd
+
+    frame = load(study) if isinstance(study, (str, os.PathLike)) else study
+    names = varied(frame)
+    rows: list[dict[str, Any]] = []
+    for key, runs in frame.groupby("setting", sort=False):
+        first = runs.iloc[0]
+        row: dict[str, Any] = {"solver": first["solver"], **{name: first[name] for name in names}, "setting": key}
+        row["runs"] = len(runs)
+        row["infeasible"] = int(runs["cost"].isna().sum())
+        for measure in MEASURES:
+            table = by_problem(runs, measured(runs, measure))
+            weights = by_problem(runs, _numbers(runs["true_tuples"])) if measure == "correct" else None
+            row[measure] = weighted_mean(table, weights)
+            row[f"{measure}_low"], row[f"{measure}_high"] = mean_interval(table, weights)
+        rows.append(row)
+    columns = ["solver", *names, "setting", "runs", "infeasible"]
+    columns += [f"{measure}{end}" for measure in MEASURES for end in ("", "_low", "_high")]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def varied(frame: pd.DataFrame) -> list[str]:
+    """Columns of the parameters of which a study has several values within one solver."""
+    last = list(frame.columns).index("repeat")
+    names = [str(name) for name in frame.columns[1:last] if name not in RESULTS]
+    groups = [part for _, part in frame.groupby("solver")]
+    return [name for name in names if any(part[name].nunique() > 1 for part in groups)]
+
+
+def by_problem(runs: pd.DataFrame, values: Floats) -> Floats:
+    """Values, one for each run, as an array (problems, repeats) with NaN where there is no run."""
+    problem = runs.groupby(["scene", "scan"], sort=True).ngroup().to_numpy()
+    repeats, column = np.unique(runs["repeat"].to_numpy(), return_inverse=True)
+    table = np.full((int(problem.max()) + 1, len(repeats)), np.nan)
+    table[problem, column] = values
+    return table
+
+
+def measured(runs: pd.DataFrame, measure: str) -> Floats:
+    """Values of a measure, one for each run; NaN where it has none.
+
+    ``correct`` is the share of the true tuples of one run; means of it are weighted by their number.
+    """
+    if measure == "correct":
+        true = _numbers(runs["true_tuples"])
+        return np.divide(_numbers(runs["correct_tuples"]), true, out=np.full(len(runs), np.nan), where=true > 0)
+    values = _numbers(runs[measure])
+    if measure == "optimal":
+        return np.where(runs["cost"].isna(), np.nan, values)
+    if measure == "gap":
+        # what rounding leaves of a closed gap says nothing
+        values = np.where(values <= 1e-9 * np.maximum(1.0, runs["cost"].abs()), 0.0 * values, values)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _numbers(column: pd.Series[Any]) -> Floats:
+    return column.to_numpy(dtype=float, na_value=np.nan)
+
+
+def print_summary(summary: pd.DataFrame, most: int | None = None) -> None:
+    """Print the table to stdout: drawn on a terminal, plain columns elsewhere."""
+    headers, cells = _cells(summary)
+    shown = cells if most is None else cells[:most]
+    if sys.stdout.isatty():
+        from rich import box
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        for header in headers:
+            table.add_column(header, justify="right")
+        for row in shown:
+            table.add_row(*row)
+        Console().print(table)
+    else:
+        widths = [max(len(row[i]) for row in [headers, *shown]) for i in range(len(headers))]
+        for row in [headers, *shown]:
+            print("  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)).rstrip())
+    if len(shown) < len(cells):
+        print(f"... and {len(cells) - len(shown)} more settings")
+
+
+def _cells(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
+    measures = [name for name in MEASURES if summary[name].notna().any()]
+    infeasible = ["infeasible"] if summary["infeasible"].any() else []
+    titles = {"gap": "mean gap", "cost": "mean cost", "optimal": "optimal %", "time": "ms", "correct": "correct %"}
+    headers = ["solver", *map(str, parameters), "runs", *infeasible]
+    for name in measures:
+        headers += [titles.get(name, name), "95 %"]
+    cells = []
+    for row in summary.to_dict("records"):
+        line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
+        line += [str(row[name]) for name in infeasible]
+        for name in measures:
+            factor = {"optimal": 100.0, "correct": 100.0, "time": 1e3}.get(name, 1.0)
+            line.append(_number(factor * row[name], name))
+            line.append(_interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
+        cells.append(line)
+    return headers, cells
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return "" if np.isnan(value) else f"{value:.6g}"
+    return "" if value is None else str(value)
+
+
+def _number(value: float, name: str) -> str:
+    if np.isnan(value):
+        return "-"
+    if name == "cost":
+        return f"{value:.4f}"
+    return f"{value:.2f}" if name in ("optimal", "correct", "iterations") else f"{value:.3g}"
+
+
+def _interval(ends: Sequence[float], name: str) -> str:
+    return "-" if np.isnan(ends[0]) else f"{_number(ends[0], name)} .. {_number(ends[1], name)}"

@@ -1,0 +1,371 @@
+"""A search for good parameters, and an honest report: on seeds and scans that the search never saw."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._files import write_atomically
+from assoc.errors import InvalidInputError
+from assoc.solution import OPTIMALITY_TOLERANCE
+from assoc.solvers import registry
+from assoc.sweeps.bootstrap import mean_interval
+from assoc.sweeps.frame import load
+from assoc.sweeps.setting import Setting, parameter
+from assoc.sweeps.sources import Source
+from assoc.sweeps.space import Range, Space, Values
+from assoc.sweeps.store import RunKey, Store, read_log, read_manifest, run_keys
+from assoc.sweeps.study import Counts, Study
+from assoc.sweeps.summary import by_problem
+from assoc.sweeps.work import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = NDArray[np.float64]
+
+TARGETS = ("gap", "time")
+REPORT = "tuning.json"
+PENALTY = 10.0
+"""A run that missed the optimum counts as so many times the cutoff in "time" (PAR10)."""
+
+_WIDTH = 4.0
+# more of these is never worse for the gap: they are a budget, not something to tune
+_BUDGETS = ("iterations", "patience", "nodes", "workers")
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a search found.
+
+    Attributes
+    ----------
+    solver, target : str
+    trials : int
+    tuned, default : Setting
+    training : tuple of float
+        Target of default and tuned where the search looked.
+    table : DataFrame
+        Both on what was held out: one row each with means and intervals.
+    difference : tuple of float
+        Tuned less default in the target, held out: mean, low and high end of the 95 % interval over pairs.
+    held_out : str
+        What was held out, in words.
+    """
+
+    solver: str
+    target: str
+    trials: int
+    tuned: Setting
+    default: Setting
+    training: tuple[float, float]
+    table: pd.DataFrame
+    difference: tuple[float, float, float]
+    held_out: str
+
+
+def tune(
+    folder: str | os.PathLike[str],
+    sources: Sequence[Source],
+    solver: str,
+    space: Mapping[str, Space] | None = None,
+    trials: int = 100,
+    *,
+    target: str = "gap",
+    repeats: int = 3,
+    seed: int = 0,
+    time_limit: float | None = None,
+    gating: Mapping[str, Any] | None = None,
+    scans: Sequence[Sequence[int]] | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Callable[[Counts], object] | None = None,
+) -> Report:
+    """Search the parameters of a solver with optuna's tree-structured Parzen estimator.
+
+    All runs are kept in the folder like those of a study; the same call again goes on where it was stopped.
+
+    Parameters
+    ----------
+    folder : path-like
+    sources : sequence of Source
+    solver : str
+    space : mapping, optional
+        Values or range of each parameter; without it the solver's numbers from a quarter of their default to
+        four times it, as far as the solver takes them.
+    trials : int, default 100
+        Settings to try, the default one first.
+    target : str, default "gap"
+        "gap": mean gap. "time": mean time, where a run without certified optimum counts ten times the cutoff,
+        which is the time limit, or without one the longest training run of the defaults.
+    repeats : int, default 3
+        Seeds a setting is trained with; as many others are held out. With four scans or more, the scans that
+        training sees (the even ones) are held out too.
+    seed, time_limit, gating, scans, jobs, scheduler, progress
+        As in `Study`.
+
+    Returns
+    -------
+    Report
+        Also written to ``tuning.json`` in the folder.
+
+    Raises
+    ------
+    InvalidInputError
+        Nothing to tune, optuna is missing, or what `Study` refuses.
+    """
+    optuna = _optuna()
+    if target not in TARGETS:
+        raise InvalidInputError(f"target: expected gap or time, got {target!r}")
+    ranges = dict(space) if space else default_space(solver)
+    if not any(isinstance(one, Range) or len(one.values) > 1 for one in ranges.values()):
+        raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
+    every = [list(one) for one in scans] if scans is not None else [list(range(one.num_scans)) for one in sources]
+    training, test, words = _split(every, repeats)
+
+    def study(settings: Sequence[Setting], scans: Sequence[Sequence[int]], repeats: range) -> Study:
+        return Study(sources, settings, repeats, seed, time_limit, gating or {}, scans)
+
+    fixed = {name: one.values[0] for name, one in ranges.items() if isinstance(one, Values) and len(one.values) == 1}
+    default = Setting(solver, fixed)
+    with Store(folder, study([default], training, range(repeats)).manifest) as store:
+        total = Counts(0, 0)
+
+        memory = _Memory(folder)
+
+        def evaluate(settings: Sequence[Setting], scans: Sequence[Sequence[int]], repeats: range) -> Study:
+            part = study(settings, scans, repeats)
+            before = Counts(total.total, total.before, total.new, total.solving)
+
+            def shown(counts: Counts) -> None:
+                total.total = max(before.done + counts.total, size)
+                total.before, total.new = before.before + counts.before, before.new + counts.new
+                if progress is not None:
+                    progress(total)
+
+            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, take=memory.take)
+            return part
+
+        length = sum(map(len, training)) * repeats
+        size = length * trials + 2 * sum(map(len, test)) * repeats
+        _, _, times = memory.of(evaluate([default], training, range(repeats)))
+        cutoff = time_limit if time_limit is not None else float(np.nanmax(times, initial=1e-6))
+        sampler = optuna.samplers.TPESampler(seed=seed)
+        search = optuna.create_study(sampler=sampler)
+        search.enqueue_trial(_point(default, ranges))
+        values: dict[Setting, float] = {}
+        for _ in range(trials):
+            trial = search.ask()
+            setting = Setting(solver, {name: _suggest(trial, name, one) for name, one in ranges.items()})
+            if setting not in values:
+                runs = memory.of(evaluate([setting], training, range(repeats)))
+                values[setting] = float(scores(*runs, target, cutoff).mean())
+            search.tell(trial, values[setting])
+        tuned = min(values, key=lambda one: values[one])
+        held = _frame(folder, evaluate([default, tuned], test, range(repeats, 2 * repeats)))
+    report = _report(solver, target, trials, tuned, default, values, held, cutoff, words)
+    _save(Path(folder) / REPORT, report)
+    return report
+
+
+def _optuna() -> Any:
+    try:
+        import optuna
+    except ImportError:
+        raise InvalidInputError(
+            "--tune: needs optuna, which is not installed: python -m pip install 'assoc[tune]'"
+        ) from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[list[int]], str]:
+    """Scans for training and for the report."""
+    if sum(map(len, scans)) < 4 or all(len(one) < 2 for one in scans):
+        return scans, scans, f"seeds {repeats} to {2 * repeats - 1} on the same problems"
+    parts = [one if len(one) < 2 else one[::2] for one in scans], [one if len(one) < 2 else one[1::2] for one in scans]
+    return (*parts, f"scans that training did not see, with seeds {repeats} to {2 * repeats - 1}")
+
+
+def default_space(solver: str) -> dict[str, Space]:
+    """Ranges around the defaults of a solver's numbers, as far as the solver takes them."""
+    found: dict[str, Space] = {}
+    kind: Any = registry.parameters(solver)
+    for one in fields(kind):
+        value: Any = one.default
+        if one.name in _BUDGETS or type(value) not in (int, float) or value <= 0:
+            continue
+        option = parameter(solver, one.name)
+        low = _furthest(solver, one.name, value, value / _WIDTH)
+        high = _furthest(solver, one.name, value, value * _WIDTH)
+        if option.kind is int:
+            low, high = max(1, round(low)), round(high)
+        if low < high:
+            found[one.name] = Range(low, high, logarithmic=True, whole=option.kind is int)
+    return found
+
+
+def _furthest(solver: str, name: str, good: float, wanted: float) -> float:
+    """The value nearest to the wanted one that the solver takes."""
+    whole = isinstance(good, int)
+
+    def taken(value: float) -> bool:
+        try:
+            Setting(solver, {name: round(value) if whole else value})
+        except InvalidInputError:
+            return False
+        return True
+
+    if taken(wanted):
+        return wanted
+    bad = wanted
+    for _ in range(20):
+        middle = (good + bad) / 2
+        good, bad = (middle, bad) if taken(middle) else (good, middle)
+    # four digits are enough, and not beyond the limit
+    rounded = float(f"{good:.4g}")
+    return rounded if taken(rounded) else good
+
+
+def _suggest(trial: Any, name: str, space: Space) -> Any:
+    if isinstance(space, Values):
+        return space.values[0] if len(space.values) == 1 else trial.suggest_categorical(name, list(space.values))
+    if space.whole:
+        return trial.suggest_int(name, int(space.low), int(space.high), log=space.logarithmic)
+    return trial.suggest_float(name, space.low, space.high, log=space.logarithmic)
+
+
+def _point(default: Setting, space: Mapping[str, Space]) -> dict[str, Any]:
+    """The defaults as the first trial, as far as the space holds them."""
+    point = {}
+    for name, one in space.items():
+        value = default.parameters[name]
+        if isinstance(one, Range):
+            if one.low <= value <= one.high:
+                point[name] = value
+        elif len(one.values) > 1 and value in one.values:
+            point[name] = value
+    return point
+
+
+class _Memory:
+    """Cost, bound and time of all runs in the folder, kept as they come."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self._runs: dict[RunKey, tuple[float | None, float | None, float | None]] = {}
+        for entry in read_log(folder):
+            if entry is not None and "setting_key" not in entry:
+                self._add(entry)
+
+    def take(self, result: Result) -> None:
+        self._add(result.columns)
+
+    def _add(self, columns: Mapping[str, list[Any]]) -> None:
+        values = zip(columns["cost"], columns["lower_bound"], columns["time"], strict=True)
+        for key, value in zip(run_keys(columns), values, strict=True):
+            self._runs.setdefault(key, value)
+
+    def of(self, study: Study) -> tuple[Floats, Floats, Floats]:
+        """Costs, bounds and times of the runs of a study, NaN where there is none."""
+        found = [self._runs[key] for key in study.keys()]
+        cost, bound, time = np.array(found, dtype=float).T
+        return cost, bound, time
+
+
+def _frame(folder: str | os.PathLike[str], study: Study) -> pd.DataFrame:
+    """The runs of a study as a table."""
+    frame = load(folder)
+    # the folder may know a scene under an earlier name of its file
+    names = read_manifest(folder).sources
+    keys = {(key[0], names[key[1]], *key[2:]) for key in study.keys()}
+    columns = (frame[name] for name in ("setting", "scene", "repeat", "scan"))
+    return frame[[key in keys for key in zip(*columns, strict=True)]].reset_index(drop=True)
+
+
+def scores(cost: Floats, bound: Floats, time: Floats, target: str, cutoff: float) -> Floats:
+    """Target of each run; less is better. A run without a solution counts as a very bad one."""
+    gap = cost - bound
+    if target == "gap":
+        return np.where(np.isfinite(gap), gap, 1e6)
+    optimal = gap <= OPTIMALITY_TOLERANCE * np.maximum(1.0, np.abs(cost))
+    return np.where(optimal, np.minimum(time, PENALTY * cutoff), PENALTY * cutoff)
+
+
+def _report(
+    solver: str,
+    target: str,
+    trials: int,
+    tuned: Setting,
+    default: Setting,
+    values: Mapping[Setting, float],
+    held: pd.DataFrame,
+    cutoff: float,
+    words: str,
+) -> Report:
+    from assoc.sweeps.summary import summarize
+
+    cost, bound, time = (held[name].to_numpy(dtype=float) for name in ("cost", "lower_bound", "time"))
+    held = held.assign(score=scores(cost, bound, time, target, cutoff))
+    held_by = {one: held[held["setting"] == one.key] for one in (default, tuned)}
+    tables = {one: by_problem(runs, runs["score"].to_numpy(dtype=float)) for one, runs in held_by.items()}
+    pairs = tables[tuned] - tables[default]
+    low, high = mean_interval(pairs)
+    summary = summarize(held).set_index("setting")
+    rows = summary.loc[[default.key, tuned.key]].reset_index()
+    rows.insert(0, "parameters", ["default", "tuned"])
+    rows["score"] = [float(np.nanmean(tables[one])) for one in (default, tuned)]
+    training = values.get(default, float("nan")), values[tuned]
+    difference = float(np.nanmean(pairs)), low, high
+    return Report(solver, target, trials, tuned, default, training, rows, difference, words)
+
+
+def _save(path: Path, report: Report) -> None:
+    def plain(values: Mapping[Any, Any]) -> dict[str, Any]:
+        return {str(key): value if value == value else None for key, value in values.items()}
+
+    content = {
+        "format": "assoc.tuning",
+        "version": 1,
+        "solver": report.solver,
+        "target": report.target,
+        "trials": report.trials,
+        "tuned": dict(report.tuned.parameters),
+        "default": dict(report.default.parameters),
+        "training": plain(dict(zip(("default", "tuned"), report.training, strict=True))),
+        "held_out": report.held_out,
+        "table": [plain(row) for row in report.table.to_dict("records")],
+        "difference": dict(zip(("mean", "low", "high"), report.difference, strict=True)),
+    }
+    text = json.dumps(content, indent=1) + "\n"
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def print_report(report: Report) -> None:
+    """Print what was found, and how it does on what was held out."""
+    unit, factor = ("cost", 1.0) if report.target == "gap" else ("ms", 1e3)
+    changed = {
+        name: value for name, value in report.tuned.parameters.items() if value != report.default.parameters[name]
+    }
+    words = ", ".join(
+        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in changed.items()
+    )
+    what = "mean gap" if report.target == "gap" else "time to optimum (PAR10)"
+    print(f"{report.solver}, {report.trials} trials: {words or 'the defaults are best'}")
+    print(f"training: {what} {factor * report.training[0]:.4g} -> {factor * report.training[1]:.4g} {unit}")
+    print(f"held out: {report.held_out}")
+    print(f"{'':>9}  {what:>24}  {'mean gap':>10}  {'optimal %':>9}  {'ms':>8}")
+    for row in report.table.to_dict("records"):
+        print(
+            f"{row['parameters']:>9}  {factor * row['score']:>24.4g}  {row['gap']:>10.3g}  "
+            f"{100 * row['optimal']:>9.2f}  {1e3 * row['time']:>8.3g}"
+        )
+    mean, low, high = (factor * value for value in report.difference)
+    verdict = "better" if high < 0 else "worse" if low > 0 else "no difference that shows"
+    print(f"tuned less default: {mean:.4g} {unit}, 95 % interval {low:.4g} .. {high:.4g}: {verdict}")
