@@ -68,7 +68,8 @@ class Search:
     @property
     def lower_bound(self) -> float:
         """No solution weighs less."""
-        proved = self.weight - self.tolerance
+        # whole-numbered weights: what is not better by the tolerance is not better at all
+        proved = self.weight if self._packing.granularity else self.weight - self.tolerance
         if self._open:
             proved = min(proved, float(self._bound[: self._open].min()))
         return proved

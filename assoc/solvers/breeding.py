@@ -2,7 +2,7 @@
 
 A child first takes the tuples that both parents have. The other tuples of both are then offered in an order
 drawn by their reduced costs, and taken where they fit; what mutation gives up and what then lies open is
-repaired by insertion with ejection (local_search.py) and exact sub-steps (neighbourhood.py). A child
+repaired by insertion with ejection (local_search.py) and exact sub-steps (cluster_search.py). A child
 replaces the worst member if it is better and no member costs the same.
 """
 
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from assoc._compiled import njit
 from assoc.solvers.local_search import _improve, penalised
 from assoc.solvers.max_min_ants import _walk
-from assoc.solvers.metaheuristic import Part, incomplete, weight_of
-from assoc.solvers.neighbourhood import ClusterSteps
+from assoc.solvers.metaheuristic import Part, incomplete
 
 if TYPE_CHECKING:
     from assoc.solvers.genetic import GeneticParameters
@@ -31,7 +30,6 @@ class Breeding:
     def __init__(self, part: Part, parameters: GeneticParameters) -> None:
         self.parameters = parameters
         self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
-        self.clusters = ClusterSteps(part.packing.num_rows)
         self.members = np.empty((0, part.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)
 
@@ -43,9 +41,9 @@ class Breeding:
         for _ in range(self.parameters.offspring):
             one, two = self._parent(rng), self._parent(rng)
             owner = self._child(part, one, two, rng)
-            weight = weight_of(part, owner)
+            weight = part.polish(owner)
             if weight - part.bound > part.tolerance:
-                weight += self.clusters.improve(part, owner, rng, self.parameters.clusters)
+                weight += part.improve(owner, rng, self.parameters.clusters)
             part.offer(owner, weight)
             self._admit(part, owner, weight)
             if part.closed:
@@ -83,7 +81,7 @@ class Breeding:
                 1,
                 rng,
             )
-            weight = weight_of(part, owner)
+            weight = part.polish(owner)
             part.offer(owner, weight)
             members.append(owner)
             fitness.append(weight + (np.inf if incomplete(part, owner) else 0.0))

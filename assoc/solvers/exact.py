@@ -20,7 +20,7 @@ class ExactParameters(Parameters):
     nodes : int
         Nodes of branch and bound at the most; what is then open keeps its gap.
     heuristic_steps : int
-        Exact sub-steps (neighbourhood.py) on an open part without improvement before branching starts.
+        Exact sub-steps (cluster_search.py) on an open part without improvement before branching starts.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})

@@ -40,7 +40,7 @@ class GeneticParameters(Parameters):
     mutation: float = field(default=0.05, metadata={"help": "share of a child's tuples that are given up"})
     iterations: int = field(default=1000, metadata={"help": "generations on one component at the most"})
     patience: int = field(default=60, metadata={"help": "generations without improvement before a component is left"})
-    clusters: int = field(default=4, metadata={"help": "exact sub-steps on each child"})
+    clusters: int = field(default=10, metadata={"help": "exact sub-steps on each child"})
 
     def __post_init__(self) -> None:
         self._require(2 <= self.population <= 100_000, "population", "a whole number from 2 to 100000")

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.local_search import _improve, penalised
-from assoc.solvers.metaheuristic import Part, weight_of
-from assoc.solvers.neighbourhood import ClusterSteps
+from assoc.solvers.metaheuristic import Part
 
 if TYPE_CHECKING:
     from assoc.solvers.aco import AcoParameters
@@ -39,7 +38,6 @@ class Colony:
         # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
         degree = part.packing.row_cols.size / max(part.packing.num_rows, 1)
         self.lowest = 1.0 / (2.0 * max(degree, 1.0))
-        self.clusters = ClusterSteps(part.packing.num_rows)
         if part.best is not None:
             self._deposit(part.packing.cols, part.best, 1.0 - parameters.rho)
 
@@ -62,9 +60,9 @@ class Colony:
             p.ants,
             rng,
         )
-        weight = weight_of(part, owner)
+        weight = part.polish(owner)
         if weight - part.bound > part.tolerance:
-            weight += self.clusters.improve(part, owner, rng, p.clusters)
+            weight += part.improve(owner, rng, p.clusters)
         part.offer(owner, weight)
         elite = part.best if part.best is not None and part.iterations % 3 == 2 else owner
         self._deposit(packing.cols, elite, 1.0 - p.rho)

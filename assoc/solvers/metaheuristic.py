@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc.errors import InfeasibleError
+from assoc.solvers import dimensionwise
 from assoc.solvers.bounds import component_bounds, dual_bound, hard_pass, reduced_costs
 from assoc.solvers.branch_and_bound import Search
+from assoc.solvers.cluster_steps import ClusterSteps
 from assoc.solvers.local_search import Cover
-from assoc.solvers.neighbourhood import ClusterSteps
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
 
@@ -64,8 +65,8 @@ class Part:
 
     @property
     def tolerance(self) -> float:
-        """Differences of weight that do not count."""
-        return TOLERANCE * max(1.0, abs(self.bound))
+        """Gains below this do not exist or do not count: rounding, or whole-numbered weights."""
+        return max(TOLERANCE * max(1.0, abs(self.bound)), 0.999 * self.packing.granularity)
 
     @property
     def closed(self) -> bool:
@@ -77,7 +78,7 @@ class Part:
         """Scale of the reduced costs that matter: a share of the gap, at most of the weights' spread."""
         widest = max(0.02 * float(np.ptp(self.packing.weights)), 1e-12)
         if self.weight < np.inf:
-            return min(max((self.weight - self.bound) / 4.0, self.tolerance), widest)
+            return min(max((self.weight - self.bound) / 4.0, TOLERANCE * max(1.0, abs(self.bound))), widest)
         return widest
 
     def offer_greedy(self) -> None:
@@ -87,15 +88,27 @@ class Part:
         cover.improve()
         self.offer(cover.owner, weight_of(self, cover.owner))
 
+    def improve(self, owner: Owner, rng: np.random.Generator, steps: int) -> float:
+        """Improve a complete cover in place by exact sub-steps; return the change of its weight."""
+        if steps == 0 or incomplete(self, owner):
+            return 0.0
+        if self.clusters is None:
+            self.clusters = ClusterSteps(self.packing, self.duals)
+        return self.clusters.improve(owner, rng, steps)
+
+    def polish(self, owner: Owner) -> float:
+        """Improve a complete cover in place by dimensionwise search; return its weight."""
+        if not incomplete(self, owner):
+            dimensionwise.improve(self.packing, owner)
+        return weight_of(self, owner)
+
     def refine(self, run: Run, steps: int) -> None:
         """Improve the best cover by exact sub-steps, ``steps`` for every 30 rows."""
         if self.best is None or steps == 0:
             return
-        if self.clusters is None:
-            self.clusters = ClusterSteps(self.packing.num_rows)
         left = steps * max(1, self.packing.num_rows // 30)
         while left > 0 and not self.closed and not run.should_stop():
-            self.weight += self.clusters.improve(self, self.best, run.rng, min(left, 10))
+            self.weight += self.improve(self.best, run.rng, min(left, 10))
             left -= 10
 
     def offer(self, owner: Owner, weight: float) -> bool:
@@ -192,13 +205,13 @@ def solve_by(
             for piece in pieces:
                 if piece.closed:
                     columns.append(piece.origin[_columns(piece)])
-                    total_bound += piece.bound
+                    total_bound += bound_of_part(piece, run)
                     done_weight += piece.weight
                 else:
                     queue.append((piece, make(piece, run.rng)))
         elif part.closed or over:
             columns.append(part.origin[_columns(part)])
-            total_bound += part.bound if part.closed else bound_of_part(part, run)
+            total_bound += bound_of_part(part, run)
             done_weight += part.weight
         else:
             queue.append((part, searcher))
@@ -234,7 +247,7 @@ def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
     """Drop the columns that no better solution can use; None unless at most ``share`` of them are left."""
     if part.best is None:
         return None
-    keep = part.reduced <= part.weight - part.bound
+    keep = part.reduced <= part.weight - part.bound - (part.tolerance if part.packing.granularity else 0.0)
     chosen = np.unique(part.best[part.best >= 0])
     keep[chosen] = True
     if np.count_nonzero(keep) > share * keep.size:
@@ -279,6 +292,9 @@ def complete(part: Part, run: Run) -> None:
 
 def bound_of_part(part: Part, run: Run) -> float:
     """Raise the bound of an open part by a short branch and bound."""
+    if part.closed:
+        # whole-numbered weights: nothing fits between the bound and the cover
+        return part.weight if part.packing.granularity else min(part.bound, part.weight)
     if run.should_stop():
         return part.bound
     search = Search(part.packing, part.duals, part.weight, part.tolerance)
@@ -311,5 +327,5 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
         own = owner[packing.row_start[c] : packing.row_start[c + 1]]
         part.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
         part.weight = float(part.packing.weights[_columns(part)].sum())
-        total += part.bound if part.closed else bound_of_part(part, run)
+        total += bound_of_part(part, run)
     return total, duals

@@ -39,6 +39,8 @@ class Packing:
         Each column's place in what this packing was made from.
     row_origin : int32 array, shape (R,)
         Each row's place in what this packing was made from.
+    granularity : float
+        1.0 where all weights are whole numbers, so that solutions differ by at least 1; else 0.0.
     """
 
     cols: NDArray[np.int32]
@@ -50,6 +52,7 @@ class Packing:
     row_cols: NDArray[np.int32]
     origin: NDArray[np.int32]
     row_origin: NDArray[np.int32]
+    granularity: float = 0.0
 
     @property
     def num_columns(self) -> int:
@@ -77,7 +80,7 @@ class Packing:
         Rows without slack are kept even if no column covers them any more.
         """
         chosen = np.flatnonzero(keep).astype(np.int32)
-        return assemble(self.cols[chosen], self.weights[chosen], self.slack, chosen)
+        return assemble(self.cols[chosen], self.weights[chosen], self.slack, chosen, self.granularity)
 
     def component(self, index: int) -> Packing:
         """Return one component as a packing of its own."""
@@ -96,6 +99,7 @@ class Packing:
             self.row_cols[pointer[0] : pointer[-1]] - np.int32(first),
             np.arange(first, last, dtype=np.int32),
             np.arange(top, end, dtype=np.int32),
+            self.granularity,
         )
 
 
@@ -139,17 +143,22 @@ def prepare(problem: AssignmentProblem) -> Prepared:
         origin = np.arange(problem.num_tuples, dtype=np.int32)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
         slack = np.repeat(sizes > sizes.min(), sizes)
-    packing = assemble(rows, weights, slack, origin)
+    whole = weights.size and float(np.abs(weights).max()) < 1e9 and bool((weights == np.rint(weights)).all())
+    packing = assemble(rows, weights, slack, origin, 1.0 if whole else 0.0)
     prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
     problem._prepared = prepared
     return prepared
 
 
 def assemble(
-    rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
+    rows: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    slack: NDArray[np.bool_],
+    origin: NDArray[np.int32],
+    granularity: float = 0.0,
 ) -> Packing:
     """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
-    return Packing(*_assemble(rows, weights, slack, origin))
+    return Packing(*_assemble(rows, weights, slack, origin), granularity=granularity)
 
 
 @njit

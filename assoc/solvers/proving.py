@@ -11,7 +11,6 @@ from assoc.errors import InfeasibleError
 from assoc.solvers.bounds import certified_bound, dual_bound, reduced_costs
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.metaheuristic import Part, split_part
-from assoc.solvers.neighbourhood import improve_clusters
 from assoc.solvers.packing import Packing
 from assoc.solvers.reduction import Reduction
 from assoc.solvers.run import Outcome, Run
@@ -24,8 +23,11 @@ class _Task:
 
     @property
     def bound(self) -> float:
-        bound = self.part.bound if self.search is None else max(self.part.bound, self.search.lower_bound)
-        return min(bound, self.part.weight)
+        part = self.part
+        if part.closed and part.packing.granularity:
+            return part.weight
+        bound = part.bound if self.search is None else max(part.bound, self.search.lower_bound)
+        return min(bound, part.weight)
 
 
 def prove(packing: Packing, node_limit: int, heuristic_steps: int, run: Run) -> Outcome:
@@ -80,34 +82,22 @@ def _sharpen(part: Part, run: Run) -> list[Part]:
 def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
     """Bring the incumbents of open parts near the optimum before any branching, and split what that allows."""
     result: list[_Task] = []
-    queue = [(task, 0, 24) for task in tasks]
+    queue = [(task, 0) for task in tasks]
     while queue:
-        task, stalled, size = queue.pop(0)
+        task, stalled = queue.pop(0)
         part = task.part
-        rows = part.packing.num_rows
         # small parts are branched at once, and without an incumbent there is nothing to improve
-        if part.closed or part.best is None or rows < 30 or stalled >= patience or run.should_stop():
+        if part.closed or part.best is None or part.packing.num_rows < 30 or stalled >= patience or run.should_stop():
             result.append(task)
             continue
-        change, solved = improve_clusters(
-            part.packing,
-            part.reduced,
-            part.duals,
-            part.best,
-            run.rng,
-            10,
-            min(size, rows),
-            part.temperature,
-            100,
-        )
+        change = part.improve(part.best, run.rng, 10)
         part.weight += change
-        size = size + 2 if solved > 0.9 else max(size - 6, 24)
-        stalled = 0 if change < -part.tolerance else stalled + 10
+        stalled = 0 if change < 0.0 else stalled + 10
         pieces = split_part(part) if stalled == 0 else None
         if pieces is None:
-            queue.append((task, stalled, size))
+            queue.append((task, stalled))
         else:
-            queue.extend((_Task(piece), 0, size) for piece in pieces)
+            queue.extend((_Task(piece), 0) for piece in pieces)
     # whatever the patience, branching should start on as few columns as the incumbents allow
     split: list[_Task] = []
     for task in result:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.local_search import Cover, insert, insertion_gain, penalised
-from assoc.solvers.metaheuristic import Part, weight_of
-from assoc.solvers.neighbourhood import ClusterSteps
+from assoc.solvers.metaheuristic import Part
 
 if TYPE_CHECKING:
     from assoc.solvers.tabu import TabuParameters
@@ -29,7 +28,6 @@ class TabuSearch:
     def __init__(self, part: Part, parameters: TabuParameters) -> None:
         self.parameters = parameters
         self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
-        self.clusters = ClusterSteps(part.packing.num_rows)
         self.until = np.zeros(part.packing.num_columns, dtype=np.int64)
         self.clock = 1
         self.owner: NDArray[np.int32] | None = None if part.best is None else part.best.copy()
@@ -58,10 +56,10 @@ class TabuSearch:
             part.temperature,
             rng,
         )
-        weight = weight_of(part, best)
+        weight = part.polish(best)
         part.offer(best, weight)
         if p.clusters and not part.closed:
-            weight += self.clusters.improve(part, best, rng, p.clusters)
+            weight += part.improve(best, rng, p.clusters)
             if part.offer(best, weight):
                 self.owner = best
 
