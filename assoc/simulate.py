@@ -12,6 +12,7 @@ _PURPOSE = {
     "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
     "crowd": "many targets at random in a box",
     "bearing-only": "bearing sensors whose lines of sight cross where nobody is",
+    "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
     "from-tracks": "recorded trajectories (CSV) seen by simulated radars",
 }
 

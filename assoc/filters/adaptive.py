@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
@@ -34,8 +34,8 @@ class Adaptive:
         Process noise of the last prediction, unscaled.
     innovations : (B, W, d)
         The last normalised innovations, newest last; d is 0 before the first measurement.
-    process_scale : (B,)
-        What the process noise is multiplied with, q.
+    process_scale : (B, n)
+        What the process noise of each component is multiplied with, q.
     """
 
     mean: Array
@@ -80,14 +80,20 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     Parameters
     ----------
     motion : Motion
-    process : FuzzyRules or None
-        Infers q; None leaves it at 1.
+    process : FuzzyRules, sequence of FuzzyRules, or None
+        Infer q; None leaves it at 1. Several scale groups of components each.
     measurement : FuzzyRules or None
         Infers r; None leaves it at 1.
     window : int
         W.
     logarithmic : bool
         Whether the rules' outputs are the logarithms (base 10) of q and r.
+    components : sequence of int, optional
+        Components of the innovation that are averaged; all if left out. A turn in the horizontal plane
+        leaves the elevation as it is.
+    groups : sequence of int, optional
+        For each component of the state the number of its rules in `process`; all 0 if left out. Q becomes
+        D Q D with the roots of the scales in D.
     immediate : bool
         Whether q already scales the noise of the prediction that the measurement corrects; otherwise, as in
         the paper, that of the next.
@@ -100,20 +106,28 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     def __init__(
         self,
         motion: Motion,
-        process: FuzzyRules | None,
+        process: FuzzyRules | Sequence[FuzzyRules] | None,
         measurement: FuzzyRules | None = None,
         *,
         window: int = 1,
         logarithmic: bool = False,
+        components: Sequence[int] | None = None,
+        groups: Sequence[int] | None = None,
         immediate: bool = False,
     ) -> None:
         super().__init__(motion)
         if isinstance(window, bool) or not isinstance(window, int) or window < 1:
             raise InvalidInputError(f"window must be a whole number of at least 1, got {window!r}")
-        for name, rules in (("process", process), ("measurement", measurement)):
-            if rules is not None and not logarithmic and rules.output.corners[:, 1].min() < 0:
+        several = (process,) if isinstance(process, FuzzyRules) else tuple(process or ())
+        for name, rules in (*(("process", one) for one in several), ("measurement", measurement)):
+            if rules is not None and not logarithmic and rules.output.corners[:, 0].min() < 0:
                 raise InvalidInputError(f"{name}: a scale must not be negative")
-        self.process, self.measurement = process, measurement
+        self.groups = np.zeros(motion.dim, np.int64) if groups is None else np.array(groups, np.int64)
+        known = max(len(several), 1)
+        if self.groups.shape != (motion.dim,) or (self.groups < 0).any() or (self.groups >= known).any():
+            raise InvalidInputError(f"groups must be {motion.dim} numbers from 0 to {known - 1}")
+        self.process, self.measurement = several, measurement
+        self.components = None if components is None else tuple(components)
         self.window, self.logarithmic, self.immediate = window, logarithmic, immediate
         self._ekf, self._bare = ExtendedKalmanFilter(motion), ExtendedKalmanFilter(_NoiseFree(motion))
 
@@ -125,21 +139,30 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         ----------
         motion : Motion
         data : mapping
-            "inputs" and "outputs": increasing centres and their log10 q, "window", "immediate".
+            "inputs" (increasing centres), "outputs" (their log10 q, or a list of those for each group),
+            "groups" if there are several, "components" if not all count, "window", "immediate".
         """
         inputs, outputs = data["inputs"], data["outputs"]
-        names = [f"level {i}" for i in range(1, len(inputs) + 1)]
-        rules = FuzzyRules(
-            FuzzyVariable.from_centres(names, inputs, 1.0),
-            FuzzyVariable.from_centres(names, outputs, float(data.get("reach", 0.05))),
-            [(name, name) for name in names],
-            points=int(data.get("points", 101)),
-        )
+        if not isinstance(outputs[0], list):
+            outputs = [outputs]
+        levels = [f"level {i}" for i in range(1, len(inputs) + 1)]
+        sets = FuzzyVariable.from_centres(levels, inputs, 1.0)
+        rules = [
+            FuzzyRules(
+                sets,
+                FuzzyVariable.from_centres(levels, centres, float(data.get("reach", 0.05))),
+                [(level, level) for level in levels],
+                points=int(data.get("points", 101)),
+            )
+            for centres in outputs
+        ]
         return cls(
             motion,
             rules,
             window=int(data["window"]),
             logarithmic=True,
+            components=data.get("components"),
+            groups=data.get("groups"),
             immediate=bool(data["immediate"]),
         )
 
@@ -149,14 +172,14 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         B = len(state)
         return Adaptive(
             state.mean, state.covariance, state.covariance, np.zeros((1, *state.covariance.shape[1:])),
-            np.zeros((B, self.window, 0)), np.ones(B),
+            np.zeros((B, self.window, 0)), np.ones((B, self.motion.dim)),
         )  # fmt: skip
 
     def predict(self, state: Adaptive, dt: float) -> Adaptive:
         """Return the state dt seconds later; see `Filter.predict`."""
         Q = self.motion.noise(state.mean, dt)
         moved = self._bare.predict(state.gaussian, dt)
-        scaled = state.process_scale[:, None, None] * Q
+        scaled = _scaled(state.process_scale, Q)
         return Adaptive(
             moved.mean, moved.covariance + scaled, moved.covariance, Q, state.innovations, state.process_scale
         )
@@ -178,12 +201,17 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             past = np.zeros((len(fresh), self.window, o.dim))
         recent = np.concatenate([past[:, 1:], fresh[:, None]], axis=1)
         known = np.maximum((recent != 0).any(axis=2).sum(axis=1), 1)
-        level = (recent.sum(axis=1) ** 2).mean(axis=1) / known
-        q = self._scale(self.process, level)
+        drift = recent.sum(axis=1)
+        if self.components is not None:
+            drift = drift[:, self.components]
+        level = (drift**2).mean(axis=1) / known
+        q = np.ones((len(level), self.motion.dim))
+        for group, rules in enumerate(self.process):
+            q[:, self.groups == group] = self._scale(rules, level)[:, None]
         r = self._scale(self.measurement, level)
         prior = state.covariance
         if self.immediate:
-            prior = state.without_noise + q[:, None, None] * state.process_noise
+            prior = state.without_noise + _scaled(q, state.process_noise)
         done = first
         if self.immediate or self.measurement is not None:
             done = self._ekf.correct(gaussian(state.mean, prior), measured, o, r[:, None, None] * o.covariance)
@@ -203,6 +231,13 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     def expected(self, state: Adaptive, sensor: Measurement) -> Expected:
         """Return the expected measurements and covariances at the present q; see `Filter.expected`."""
         return self._ekf.expected(state.gaussian, sensor)
+
+
+def _scaled(q: Array, Q: Array) -> Array:
+    """Process noise with each component's variance multiplied by its q (B, n)."""
+    root = np.sqrt(q)
+    scaled: Array = root[:, :, None] * Q * root[:, None, :]
+    return scaled
 
 
 class _NoiseFree(Motion):
@@ -252,7 +287,8 @@ def paper_rules() -> FuzzyRules:
 def tuned_data() -> dict[str, Any]:
     """Return the tuned parameters that come with the package, for `FuzzyAdaptiveEKF.from_data`.
 
-    They were tuned by experiments/filters/tune_fuzzy.py for constant velocity with `acceleration_noise`.
+    They were tuned by experiments/filters/tune_fuzzy.py for a coordinated turn with `acceleration_noise` and
+    `rate_noise`.
     """
     text = files("assoc.filters").joinpath("fuzzy_parameters.json").read_text(encoding="utf-8")
     data: dict[str, Any] = json.loads(text)

@@ -18,7 +18,7 @@ import numpy as np
 from assoc.errors import InfeasibleError, InvalidInputError, LimitExceededError
 from assoc.sensors.base import finite_array
 from assoc.simulation.dubins import Path, Pose, Segment, positive_radius
-from assoc.simulation.dubins_kernels import SENSES, WORDS, TURN, distance, free_word, free_words, pieces, turn
+from assoc.simulation.dubins_kernels import SENSES, TURN, WORDS, distance, free_word, free_words, pieces, turn
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -185,9 +185,7 @@ def _tighten(route: list[_Touch], radius: float, circles: Array, reach: float) -
         i = 1
         while i < len(route) - 1:
             direct = _link(route[i - 1], route[i + 1], radius, circles)
-            both = _link(route[i - 1], route[i], radius, circles) + _link(
-                route[i], route[i + 1], radius, circles
-            )
+            both = _link(route[i - 1], route[i], radius, circles) + _link(route[i], route[i + 1], radius, circles)
             if direct <= both:
                 del route[i]
             else:

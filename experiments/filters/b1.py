@@ -140,4 +140,3 @@ def ratio_interval(numerator: Array, denominator: Array, rng: np.random.Generato
     ratios = np.sqrt(top[index].mean(axis=1) / bottom[index].mean(axis=1))
     low, high = np.percentile(ratios, [2.5, 97.5])
     return float(low), float(high)
-

@@ -8,8 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from assoc.filters import ConstantVelocity, CoordinatedTurn, ExtendedKalmanFilter, FixedLagSmoother, Gaussian
-from assoc.filters import InteractingMultipleModel, Padded
+from assoc.filters import (
+    ConstantVelocity,
+    CoordinatedTurn,
+    ExtendedKalmanFilter,
+    FixedLagSmoother,
+    Gaussian,
+    InteractingMultipleModel,
+    Padded,
+)
 from assoc.filters.base import Filter
 from assoc.sensors import Radar3D
 from experiments.filters.b1 import converted

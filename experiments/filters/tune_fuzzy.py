@@ -30,15 +30,19 @@ OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy_para
 
 def fuzzy_data(x: Array, window: int) -> dict[str, Any]:
     """Parameters of the fuzzy filter from a free vector; inputs and outputs are kept increasing."""
-    noise, rate = np.exp(x[:2])
-    inputs = np.cumsum(np.exp(x[2 : 2 + LEVELS]))
-    steps = x[2 + LEVELS :]
-    outputs = np.cumsum(np.concatenate([steps[:1], np.exp(steps[1:])]))
+    inputs = np.cumsum(np.exp(x[:LEVELS]))
+    outputs = [
+        np.cumsum(np.concatenate([steps[:1], np.exp(steps[1:])])).tolist()
+        for steps in (x[LEVELS : 2 * LEVELS], x[2 * LEVELS :])
+    ]
     return {
-        "acceleration_noise": float(noise),
-        "rate_noise": float(rate),
+        "acceleration_noise": 1.0,
+        "rate_noise": 0.01,
+        "groups": [0, 0, 0, 0, 0, 0, 1],
         "inputs": inputs.tolist(),
-        "outputs": outputs.tolist(),
+        "outputs": outputs,
+        # range and azimuth: turns are horizontal
+        "components": [0, 1],
         "window": window,
         "immediate": True,
     }
@@ -96,7 +100,7 @@ def search(objective: Callable[[Array], float], start: Array, evaluations: int) 
 def main() -> None:
     """Tune and write."""
     parser = argparse.ArgumentParser(description="Tune the fuzzy rules and the IMM on random flights.")
-    parser.add_argument("--evaluations", type=int, default=500, help="of each search (default 500)")
+    parser.add_argument("--evaluations", type=int, default=1200, help="of each search (default 1200)")
     parser.add_argument("--flights", type=int, default=120, help="random flights (default 120)")
     parser.add_argument("--seed", type=int, default=20_000, help="of flights and noise (default 20000)")
     parser.add_argument("--output", type=Path, default=OUTPUT, help="the parameter file to write")
@@ -105,14 +109,14 @@ def main() -> None:
     batch = Batch.draw(random_flights(chosen.flights, rng), 1, rng)
 
     best: tuple[float, dict[str, Any]] | None = None
-    for window in (2, 3, 4):
+    for window in (3, 4):
         start = np.concatenate(
-            [np.log([1.0, 0.012]), np.log([0.8, 0.9, 1.4, 1.9]), [-0.7], np.log([0.6, 0.9, 0.9])]
+            [np.log([0.6, 0.7, 1.7, 2.5]), [-0.5], np.log([0.5, 0.5, 0.5]), [-2.0], np.log([1.5, 1.5, 1.5])]
         )
         x, value = search(
             lambda x, w=window: score(lambda: fuzzy_filter(fuzzy_data(x, w)), batch),  # type: ignore[misc]
             start,
-            chosen.evaluations // 3,
+            chosen.evaluations // 2,
         )
         print(f"fuzzy, window {window}: {np.exp(value):.2f} m")
         if best is None or value < best[0]:

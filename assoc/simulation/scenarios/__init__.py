@@ -17,6 +17,7 @@ _MODULES = {
     "three-radar": "assoc.simulation.scenarios.three_radar",
     "crowd": "assoc.simulation.scenarios.crowd",
     "bearing-only": "assoc.simulation.scenarios.bearing_only",
+    "dubins-uav": "assoc.simulation.scenarios.dubins_uav",
     "from-tracks": "assoc.simulation.scenarios.from_tracks",
 }
 
