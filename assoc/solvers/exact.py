@@ -19,18 +19,19 @@ class ExactParameters(Parameters):
     ----------
     nodes : int
         Nodes of branch and bound at the most; what is then open keeps its gap.
-    heuristic_steps : int
-        Exact sub-steps (cluster_search.py) on an open part without improvement before branching starts.
+    patience : int
+        Iterations of tabu search without improvement on an open part, for every 60 measurements, before
+        branching starts; while it is branched on, one more iteration follows every three turns.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
-    heuristic_steps: int = field(
-        default=150, metadata={"help": "exact sub-steps without improvement before branching starts"}
+    patience: int = field(
+        default=10, metadata={"help": "iterations of tabu search without improvement before branching starts"}
     )
 
     def __post_init__(self) -> None:
         self._require(self.nodes >= 0, "nodes", "a whole number >= 0")
-        self._require(self.heuristic_steps >= 0, "heuristic_steps", "a whole number >= 0")
+        self._require(self.patience >= 0, "patience", "a whole number >= 0")
 
 
 def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
@@ -45,7 +46,7 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
     """
     from assoc.solvers.proving import prove
 
-    return prove(packing, parameters.nodes, parameters.heuristic_steps, run)
+    return prove(packing, parameters.nodes, parameters.patience, run)
 
 
 parameters = ExactParameters

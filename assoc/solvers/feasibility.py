@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc.errors import InfeasibleError
 from assoc.solvers.bounds import dual_bound
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.packing import Packing
@@ -25,3 +26,11 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
             return None
         chosen.append(part.origin[search.columns])
     return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)
+
+
+def infeasible(packing: Packing) -> InfeasibleError:
+    """Return the error for a problem without dummies in which no solution was found."""
+    uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
+    if uncovered:
+        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

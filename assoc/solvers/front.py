@@ -16,7 +16,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.bounds import certified_bound, dual_bound
-from assoc.solvers.packing import Packing, Prepared, prepare
+from assoc.solvers.packing import Prepared, prepare
 from assoc.solvers.run import Callback, Outcome, Run
 
 
@@ -140,11 +140,3 @@ def _limit(time_limit: object) -> float | None:
     if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:
         return float(time_limit)
     raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
-
-
-def infeasible(packing: Packing) -> InfeasibleError:
-    """Return the error for a problem without dummies in which no solution was found."""
-    uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
-    if uncovered:
-        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
-    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

@@ -29,7 +29,7 @@ def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
     """
     import numpy as np
 
-    from assoc.solvers.front import infeasible
+    from assoc.solvers.feasibility import infeasible
     from assoc.solvers.local_search import Cover
 
     cover = Cover.empty(packing)

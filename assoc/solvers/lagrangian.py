@@ -93,7 +93,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
         There is no solution, or none was found.
     """
     from assoc.solvers.bounds import certified_bound, dual_bound, hard_pass
-    from assoc.solvers.front import infeasible
+    from assoc.solvers.feasibility import infeasible
     from assoc.solvers.local_search import Cover
 
     if packing.num_columns == 0:

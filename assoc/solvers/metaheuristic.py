@@ -21,6 +21,7 @@ from assoc.solvers import dimensionwise
 from assoc.solvers.bounds import component_bounds, dual_bound, hard_pass, reduced_costs
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.cluster_steps import ClusterSteps
+from assoc.solvers.feasibility import infeasible
 from assoc.solvers.local_search import Cover
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
@@ -230,8 +231,6 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
     """
     bounds = component_bounds(packing, duals)
     if np.isposinf(bounds).any():
-        from assoc.solvers.front import infeasible
-
         raise infeasible(packing)
     reduced = reduced_costs(packing, duals)
     parts: list[Part] = []
@@ -279,8 +278,6 @@ def _columns(part: Part) -> NDArray[np.int64]:
 
 def complete(part: Part, run: Run) -> None:
     """Last resort for a part in which no iteration covered all that must be covered."""
-    from assoc.solvers.front import infeasible
-
     cover = Cover.empty(part.packing)
     cover.add_greedily(np.argsort(part.reduced, kind="stable"))
     if not cover.complete(run):

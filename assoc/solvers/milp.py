@@ -78,7 +78,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         There is no solution, or none was found in the time.
     """
     from assoc.solvers.bounds import certified_bound, dual_bound
-    from assoc.solvers.front import infeasible
+    from assoc.solvers.feasibility import infeasible
 
     if packing.num_columns == 0:
         if packing.is_axial:

@@ -9,7 +9,7 @@ smallest dimension have no slack.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -158,7 +158,8 @@ def assemble(
     granularity: float = 0.0,
 ) -> Packing:
     """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
-    return Packing(*_assemble(rows, weights, slack, origin), granularity=granularity)
+    arrays: Any = _assemble(rows, weights, slack, origin)
+    return replace(Packing(*arrays), granularity=granularity)
 
 
 @njit

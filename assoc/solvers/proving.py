@@ -7,19 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.errors import InfeasibleError
 from assoc.solvers.bounds import certified_bound, dual_bound, reduced_costs
 from assoc.solvers.branch_and_bound import Search
-from assoc.solvers.metaheuristic import Part, split_part
+from assoc.solvers.feasibility import infeasible
+from assoc.solvers.metaheuristic import Part, complete, split_part
 from assoc.solvers.packing import Packing
 from assoc.solvers.reduction import Reduction
 from assoc.solvers.run import Outcome, Run
+from assoc.solvers.tabu import TabuParameters
+from assoc.solvers.tabu_moves import TabuSearch
+
+# rows from which a heuristic pays beside the branching, and turns of branching between its iterations
+_LARGE = 30
+_TURNS = 3
 
 
 @dataclass(slots=True)
 class _Task:
     part: Part
     search: Search | None = None
+    heuristic: TabuSearch | None = None
+    turns: int = 0
 
     @property
     def bound(self) -> float:
@@ -30,7 +38,7 @@ class _Task:
         return min(bound, part.weight)
 
 
-def prove(packing: Packing, node_limit: int, heuristic_steps: int, run: Run) -> Outcome:
+def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
     reduction = Reduction(packing, run)
     parts = reduction.reduce()
@@ -38,7 +46,7 @@ def prove(packing: Packing, node_limit: int, heuristic_steps: int, run: Run) -> 
     columns = reduction.closed_columns
     weight, bound = reduction.closed_weight, reduction.closed_bound
     _record(run, 0, weight, bound, tasks)
-    tasks = _improve(tasks, heuristic_steps, run)
+    tasks = _improve(tasks, patience, run)
     nodes = 0
     while tasks:
         task = tasks.pop(0)
@@ -55,10 +63,17 @@ def prove(packing: Packing, node_limit: int, heuristic_steps: int, run: Run) -> 
                 part.best = _owner(part.packing, task.search.columns)
                 _record(run, nodes, weight, bound, [task, *tasks])
             if not task.search.done:
+                task.turns += 1
+                if task.turns % _TURNS == 0 and _search_better(task, run):
+                    task.search.weight = part.weight
+                    _record(run, nodes, weight, bound, [task, *tasks])
                 tasks.append(task)
                 continue
         if part.best is None:
-            raise _no_solution(part, task, run)
+            if task.search is not None and task.search.done:
+                raise infeasible(part.packing)
+            complete(part, run)
+        assert part.best is not None
         columns.append(part.origin[np.unique(part.best[part.best >= 0])])
         weight += part.weight
         bound += task.bound
@@ -87,12 +102,18 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
         task, stalled = queue.pop(0)
         part = task.part
         # small parts are branched at once, and without an incumbent there is nothing to improve
-        if part.closed or part.best is None or part.packing.num_rows < 30 or stalled >= patience or run.should_stop():
+        if (
+            part.closed
+            or part.best is None
+            or part.packing.num_rows < _LARGE
+            or stalled * 60 >= patience * part.packing.num_rows
+        ):
             result.append(task)
             continue
-        change = part.improve(part.best, run.rng, 10)
-        part.weight += change
-        stalled = 0 if change < 0.0 else stalled + 10
+        if run.should_stop():
+            result.append(task)
+            continue
+        stalled = 0 if _search_better(task, run) else stalled + 1
         pieces = split_part(part) if stalled == 0 else None
         if pieces is None:
             queue.append((task, stalled))
@@ -106,6 +127,20 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
     return split
 
 
+def _search_better(task: _Task, run: Run) -> bool:
+    """One iteration of tabu search and exact sub-steps on the incumbent; whether it became better."""
+    part = task.part
+    if part.best is None or part.packing.num_rows < _LARGE:
+        return False
+    if task.heuristic is None:
+        task.heuristic = TabuSearch(part, TabuParameters())
+    before = part.weight
+    task.heuristic.iterate(part, run.rng)
+    part.refine(run, TabuParameters.clusters)
+    part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
+    return part.stalled == 0
+
+
 def _owner(packing: Packing, columns: NDArray[np.int32]) -> NDArray[np.int32]:
     owner = np.full(packing.num_rows, -1, dtype=np.int32)
     rows = packing.cols[columns]
@@ -116,11 +151,3 @@ def _owner(packing: Packing, columns: NDArray[np.int32]) -> NDArray[np.int32]:
 
 def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:
     run.record(nodes, weight + sum(task.part.weight for task in tasks), bound + sum(task.bound for task in tasks))
-
-
-def _no_solution(part: Part, task: _Task, run: Run) -> InfeasibleError:
-    from assoc.solvers.front import infeasible
-
-    if task.search is not None and task.search.done:
-        return infeasible(part.packing)
-    return InfeasibleError(f"no solution was found before the search was stopped ({run.stopped_by or 'node limit'})")
