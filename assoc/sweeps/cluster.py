@@ -13,6 +13,7 @@ from assoc.sweeps.work import Batch, Job, Result, run_batch
 
 SECONDS_OF_A_BATCH = 0.5
 _CONNECT_SECONDS = 10.0
+_LOST = "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
 _ATTEMPTS = 5
 _BATCHES_PER_THREAD = 3
 
@@ -133,9 +134,7 @@ class Cluster:
 
     def _check_scheduler(self) -> None:
         if self._client.status != "running":
-            raise InvalidInputError(
-                "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
-            )
+            raise InvalidInputError(_LOST)
 
     def _wait_for_workers(self) -> None:
         told = False
@@ -158,5 +157,7 @@ def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator
     client = connect(address)
     try:
         yield from Cluster(client, job).run(batches)
+    except OSError:  # timeouts and closed connections among them
+        raise InvalidInputError(_LOST) from None
     finally:
         client.close(timeout=2)

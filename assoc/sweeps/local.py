@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import pickle
 import shutil
+import signal
 import tempfile
 import threading
 import time
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from assoc.errors import InvalidInputError
@@ -41,7 +43,10 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[
         path.write_bytes(pickle.dumps(job))
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
-            yield from parallel(delayed(_run)(str(path), os.getpid(), batch) for batch in batches)
+            with _interrupts_ignored():
+                # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
+                results = parallel(delayed(_run)(str(path), os.getpid(), batch) for batch in batches)
+            yield from results
         except BrokenProcessPool:
             raise InvalidInputError(
                 "--jobs: a worker process was killed (is the memory used up?); fewer jobs need less; "
@@ -49,6 +54,18 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[
             ) from None
         finally:
             stop_workers()
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def stop_workers() -> None:

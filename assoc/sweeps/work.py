@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 TRACE_POINTS = 16
 _CACHED_TUPLES = 10_000_000
 _WARM_UP_SECONDS = 1.0
+_WARM_UP_PROBLEMS = 8
 
 Tuples = set[tuple[int, ...]]
 
@@ -77,7 +78,7 @@ class Job:
         default_factory=OrderedDict, compare=False
     )
     _held: list[int] = field(default_factory=lambda: [0], compare=False)
-    _warm: set[Any] = field(default_factory=set, compare=False)
+    _warm: dict[Any, set[int]] = field(default_factory=dict, compare=False)
     _busy: Any = field(default_factory=threading.Lock, compare=False)
 
     def __reduce__(self) -> Any:
@@ -123,17 +124,21 @@ class Job:
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
-        """Let a family of settings load its compiled code before the clock of a run starts."""
+        """Let a family of settings load its compiled code before the clock of a run starts.
+
+        Several problems, because not every one needs all of the code.
+        """
         from assoc.solvers.front import assign
 
-        if setting.family in self._warm:
+        met = self._warm.setdefault(setting.family, set())
+        if len(met) >= _WARM_UP_PROBLEMS or id(problem) in met:
             return
         limit = min(_WARM_UP_SECONDS, self.time_limit or _WARM_UP_SECONDS)
         try:
             assign(problem, setting.solver, time_limit=limit, **setting.parameters)
         except InfeasibleError:
             pass
-        self._warm.add(setting.family)
+        met.add(id(problem))
 
 
 def run_batch(job: Job, batch: Batch) -> Result:

@@ -1,0 +1,256 @@
+"""`python -m assoc.sweep` as a program: it goes on after every kind of end, and refuses in one line."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from assoc.simulation import simulate
+from assoc.sweeps import load
+
+GRID = ["--solver", "aco", "--grid", "mode=paper", "alpha=1,2", "rho=0.3,0.9"]
+
+
+def start(words, cwd, **how):
+    command = [sys.executable, "-W", "error", "-m", "assoc.sweep", *map(str, words)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=cwd, text=True, **{"stdout": pipe, "stderr": pipe, **how})
+
+
+def wait_for_runs(folder, process):
+    """Wait until some runs are kept."""
+    log = folder / "runs.jsonl"
+    deadline = time.monotonic() + 60
+    while not log.exists() or log.read_bytes().count(b"\n") < 4:
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def whole(run, scene_file, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sweep") / "study"
+    done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder, "--plot", "--csv", folder / "t.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    return folder, done.stdout
+
+
+def test_a_study_is_run_summarised_and_drawn(whole, run):
+    folder, out = whole
+    lines = out.splitlines()
+    assert lines[0].split()[:5] == ["solver", "alpha", "rho", "runs", "mean"] and lines[1].split()[0] == "aco"
+    assert "48 runs in" in lines[-1] and "48 new, 0 there before" in lines[-1]
+    assert {"study.json", "runs.jsonl", "heatmap.png", "convergence.png", "t.csv"} <= {*os.listdir(folder)}
+    for name in ("heatmap.png", "convergence.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG") and (folder / name).stat().st_size > 10_000
+    done = run("assoc.sweep", "--summary", folder)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.splitlines()[:5] == lines[:5]
+    rows = list(csv.DictReader((folder / "t.csv").read_text().splitlines()))
+    frame = load(folder)
+    assert len(rows) == 4 and float(rows[0]["cost"]) == pytest.approx(
+        frame[frame["setting"] == rows[0]["setting"]]["cost"].mean()
+    )
+
+
+def test_the_same_command_again_runs_nothing_and_a_larger_grid_the_rest(whole, run, scene_file):
+    folder, _ = whole
+    before = (folder / "runs.jsonl").read_bytes()
+    done = run("assoc.sweep", scene_file, *GRID, "--repeats", 2, "-o", folder)
+    assert "0 new, 48 there before" in done.stdout and (folder / "runs.jsonl").read_bytes() == before
+    done = run(
+        "assoc.sweep", scene_file, "--solver", "greedy", "aco", *GRID[2:], "beta=1,2", "--scans", "0:3", "-o", folder
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "27 runs in" in done.stdout and "15 new, 12 there before" in done.stdout
+
+
+def test_a_study_from_a_file(run, scene_file, tmp_path):
+    (tmp_path / "study.toml").write_text(
+        f'files = "{scene_file}"\noutput = "study"\nrepeats = 2\nscans = "0:2"\nrandom = 3\n'
+        '[[aco]]\nmode = "paper"\nalpha = { low = 1, high = 3 }\n[[aco]]\nrho = 0.5\n[greedy]\n'
+    )
+    done = run("assoc.sweep", "--config", "study.toml", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "") and "20 runs in study" in done.stdout
+    frame = load(tmp_path / "study")
+    assert set(frame["solver"]) == {"aco", "greedy"} and frame["alpha"].nunique() == 4
+
+
+@pytest.fixture(scope="module")
+def long_scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("long") / "scene.npz"
+    simulate("three-radar", 3, scans=40).save(path)
+    return path
+
+
+LONG = [*GRID, "ants=60", "--repeats", "20", "-o", "study"]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_killed_at_any_moment_it_goes_on(run, long_scene, tmp_path, jobs):
+    process = start([long_scene, *LONG, "--jobs", jobs], tmp_path)
+    wait_for_runs(tmp_path / "study", process)
+    process.send_signal(signal.SIGKILL)
+    process.communicate(timeout=30)
+    kept = len(load(tmp_path / "study"))
+    assert 0 < kept < 3200
+    short = [*GRID, "ants=60", "--repeats", 1, "-o", "study"]
+    done = run("assoc.sweep", long_scene, *short, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "") and "160 runs in study" in done.stdout
+    frame = load(tmp_path / "study")
+    assert len(frame[frame["repeat"] == 0]) == 160 and len(frame) >= kept
+    assert not frame.duplicated(["setting", "scene", "scan", "repeat"]).any()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interrupt_says_how_to_go_on(long_scene, tmp_path, jobs):
+    process = start([long_scene, *LONG, "--jobs", jobs], tmp_path, start_new_session=True)
+    wait_for_runs(tmp_path / "study", process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: all processes get it
+    out, err = process.communicate(timeout=30)
+    kept = len(load(tmp_path / "study"))
+    assert process.returncode == 130 and out == "" and 0 < kept < 3200
+    said = re.fullmatch(
+        r"assoc.sweep: interrupted; (\d+) of 3200 runs are kept in study; the same command goes on from there\n", err
+    )
+    # a batch may have been written while the message was on its way
+    assert said is not None and kept - 200 < int(said[1]) <= kept
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
+def test_on_a_terminal_there_is_a_rate_and_the_time_left(long_scene, tmp_path):
+    main, side = os.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "160"}
+    words = [long_scene, *GRID, "--repeats", 4, "-o", "study"]
+    process = start(words, tmp_path, stdout=subprocess.DEVNULL, stderr=side, env=environment)
+    os.close(side)
+    shown = b""
+    while True:
+        try:
+            part = os.read(main, 4096)
+        except OSError:  # Linux says so that the other side is closed
+            break
+        if not part:
+            break
+        shown += part
+    os.close(main)
+    assert process.wait(60) == 0
+    text = shown.decode()
+    assert "/640" in text and "runs/s" in text and "left" in text
+
+
+def test_a_full_disk_keeps_what_was_finished(run, long_scene, tmp_path):
+    # a limit on the size of files stands for the full disk
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
+    words = [long_scene, *GRID, "--repeats", 2, "-o", "study"]
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    process = start(words, tmp_path, preexec_fn=limit, env=environment)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (2, "") and err.count("\n") == 1
+    assert "runs.jsonl: cannot be written (File too large)" in err and "finished runs are kept" in err
+    kept = len(load(tmp_path / "study"))
+    assert kept > 0 and f" {kept} finished runs" in err
+    done = run("assoc.sweep", *words, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "") and f"{320 - kept} new, {kept} there before" in done.stdout
+
+
+def test_tuning_reports_on_what_was_held_out(run, scene_file, tmp_path):
+    words = [scene_file, "--solver", "aco", "--grid", "mode=paper", "alpha=0.5:3", "ants=3:30:log", "-o", "tuned"]
+    done = run("assoc.sweep", *words, "--tune", 4, "--target", "time", "--repeats", 2, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "held out: scans that training did not see, with seeds 2 to 3" in done.stdout
+    assert "default" in done.stdout and "95 % interval" in done.stdout
+    first = (tmp_path / "tuned" / "tuning.json").read_text()
+    again = run("assoc.sweep", *words, "--tune", 4, "--target", "time", "--repeats", 2, cwd=tmp_path)
+    assert again.stdout == done.stdout and (tmp_path / "tuned" / "tuning.json").read_text() == first
+
+
+BAD = [
+    (["--solver", "acoo"], "did you mean aco?"),
+    (["--solver", "aco", "--grid", "alhpa=1"], "did you mean alpha"),
+    (["--solver", "aco", "--grid", "rho=0.5,1.5"], "rho: expected a number between 0 and 1"),
+    (["--solver", "aco", "--grid", "alpha="], "no values given"),
+    (["--solver", "aco", "--grid", "alpha=x"], "expected a number, got 'x'"),
+    (["--solver", "aco", "--grid", "alpha=1:2"], "random design"),
+    (["--solver", "aco", "--random", "5"], "nothing to draw"),
+    (["--solver", "aco", "--repeats", "0"], "--repeats: expected a whole number >= 1"),
+    (["--solver", "aco", "--scans", "3:99"], "not within the scans"),
+    (["--solver", "aco", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], "--jobs or --scheduler"),
+    (["--solver", "aco", "--scheduler", "tcp://127.0.0.1:9"], "no scheduler answers at tcp://127.0.0.1:9"),
+    (["--solver", "greedy", "--tune", "3"], "nothing to tune"),
+    (["--target", "gap"], "only with --tune"),
+    (["--gate-probability", "2"], "--gate-probability"),
+    (["--config", "missing.toml"], "missing.toml: cannot be read"),
+    (["--summary", "study"], "--summary: runs nothing"),
+    (["--solver", "aco", "-o", "/proc/nowhere"], "/proc/nowhere: cannot be made"),
+    (["--solver", "aco", "-o", "a-file"], "is a file"),
+    (["--csv", "nowhere/t.csv"], "nowhere does not exist"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), BAD, ids=[" ".join(words) for words, _ in BAD])
+def test_bad_input_is_one_line(scene_file, tmp_path, monkeypatch, capsys, words, message):
+    from assoc.sweep import main
+    from assoc.sweeps import cluster
+
+    monkeypatch.setattr(cluster, "_CONNECT_SECONDS", 1.0)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a-file").write_text("")
+    assert main([str(scene_file), "-o", "study", *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1
+    assert captured.err.startswith("assoc.sweep: error: ") and message in captured.err
+
+
+TOML = [
+    ("alpha = ", "is not a TOML file"),
+    ("colour = 1", "colour: unknown key"),
+    ("[acoo]\nalpha = 1", "[acoo] is no solver"),
+    ("[aco]\nalhpa = 1", "did you mean alpha"),
+    ("[aco]\nalpha = []", "the list is empty"),
+    ("[aco]\nalpha = 'x'", "expected a number"),
+    ("repeats = 0", "expected a whole number >= 1"),
+    ("repeats = true", "expected a whole number"),
+    ("time_limit = -1", "expected seconds > 0"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), TOML)
+def test_bad_files_are_one_line(scene_file, tmp_path, monkeypatch, capsys, text, message):
+    from assoc.sweep import main
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(text)
+    assert main([str(scene_file), "-o", "study", "--config", "s.toml"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1 and "s.toml: " in captured.err and message in captured.err
+    assert not (tmp_path / "study").exists()
+
+
+def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeypatch, capsys):
+    from assoc.sweep import main
+
+    monkeypatch.chdir(tmp_path)
+    for package, words, extra in (
+        ("distributed", ["--scheduler", "tcp://127.0.0.1:9"], "assoc[dask]"),
+        ("optuna", ["--tune", "2"], "assoc[tune]"),
+        ("matplotlib.figure", ["--plot", "--scans", "0"], "assoc[plot]"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, package, None)
+            assert main([str(scene_file), "--solver", "aco", "-o", "study", *words]) == 2
+        assert f"pip install '{extra}'" in capsys.readouterr().err
+
+
+def test_nothing_and_help(run, tmp_path):
+    done = run("assoc.sweep", "--help")
+    assert (done.returncode, done.stderr) == (0, "") and "--tune" in done.stdout
+    for words, message in (([], "no scene.npz"), (["--summary", tmp_path], "holds no study")):
+        done = run("assoc.sweep", *words)
+        assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1

@@ -1,0 +1,232 @@
+"""Every backend and any number of workers give the same results, also when workers die."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.sweeps import Study, grid, load, load_traces
+from assoc.sweeps.batching import Batches
+from assoc.sweeps.store import Store
+
+DASK = [sys.executable, "-m", "dask"]
+
+
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch):
+    """Many batches, so that there is a middle to interrupt in."""
+    from assoc.sweeps import cluster, local
+
+    monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.04)
+    monkeypatch.setattr(cluster, "SECONDS_OF_A_BATCH", 0.04)
+
+
+def same(one, other):
+    traces = [load_traces(folder).drop(columns="seconds") for folder in (one, other)]
+    key = ["setting", "scene", "scan", "repeat", "iteration", "cost"]
+    traces = [table.sort_values(key, ignore_index=True) for table in traces]
+    frames = [load(folder).drop(columns="time") for folder in (one, other)]
+    return frames[0].equals(frames[1]) and traces[0].equals(traces[1])
+
+
+@pytest.fixture(scope="module")
+def slow(scene_of_module):
+    """Runs of some 10 ms, so that there is a middle to kill in."""
+    settings = grid("aco", {"mode": ["paper"], "ants": [60], "alpha": [1, 2], "beta": [1, 2]})
+    return Study([scene_of_module], settings, 8)
+
+
+@pytest.fixture(scope="module")
+def scene_of_module():
+    from assoc.simulation import simulate
+    from assoc.sweeps.sources import Source
+
+    return Source(simulate("three-radar", 2, scans=5), "scene")
+
+
+@pytest.fixture(scope="module")
+def expected(slow, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studies") / "expected"
+    slow.run(folder)
+    return folder
+
+
+class Address(str):
+    """Where a scheduler listens, and its process."""
+
+    def __new__(cls, text, process):
+        made = super().__new__(cls, text)
+        made.process = process
+        return made
+
+
+def start(words, folder, log):
+    with open(folder / log, "w") as file:
+        return subprocess.Popen([*DASK, *words], cwd=folder, stdout=file, stderr=file)
+
+
+def stop(process):
+    process.terminate()
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait(10)
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    process = start(
+        ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json"],
+        tmp_path,
+        "scheduler.log",
+    )
+    try:
+        deadline = time.monotonic() + 30
+        while not (tmp_path / "s.json").exists():
+            assert process.poll() is None and time.monotonic() < deadline, (tmp_path / "scheduler.log").read_text()
+            time.sleep(0.05)
+        time.sleep(0.2)
+        yield Address(json.loads((tmp_path / "s.json").read_text())["address"], process)
+    finally:
+        stop(process)
+
+
+@pytest.fixture
+def workers(scheduler, tmp_path):
+    words = ["worker", scheduler, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--host", "127.0.0.1"]
+    processes = [start(words, tmp_path, f"worker-{i}.log") for i in range(2)]
+    try:
+        yield processes
+    finally:
+        for process in processes:
+            stop(process)
+
+
+def test_batches_take_about_their_time_and_leave_nothing_out(study):
+    runs = list(study.all_runs())
+    batches = list(Batches(study.settings, iter(runs), 1.0))
+    found = []
+    for batch in batches:
+        assert len(batch.runs) <= 8
+        found += [(study.settings.index(batch.settings[run[0]]), *run[1:]) for run in batch.runs]
+    assert found == runs
+
+
+def test_the_job_is_small_and_shared_once(study):
+    import pickle
+
+    from assoc.sweeps.work import Batch
+
+    batch = Batch(study.settings, [(0, 0, 0, scan) for scan in range(5)])
+    assert len(pickle.dumps(batch)) < 3000
+
+
+def test_processes_give_the_same(slow, expected, tmp_path):
+    slow.run(tmp_path / "s", jobs=2)
+    assert same(tmp_path / "s", expected)
+
+
+def test_an_interrupted_study_goes_on_on_another_backend(slow, expected, tmp_path):
+    class EnoughError(Exception):
+        pass
+
+    def enough(counts):
+        if counts.new >= 30:
+            raise EnoughError
+
+    with pytest.raises(EnoughError):
+        slow.run(tmp_path / "s", progress=enough)
+    assert 30 <= len(load(tmp_path / "s")) < slow.size
+    counts = slow.run(tmp_path / "s", jobs=2)
+    assert counts.before >= 30 and same(tmp_path / "s", expected)
+
+
+def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp_path):
+    import psutil
+
+    def kill_one(counts):
+        if counts.new >= 20 and not killed:
+            children = psutil.Process().children()
+            worker = next(one for one in children if "LokyProcess" in " ".join(one.cmdline()))
+            killed.append(worker.pid)
+            worker.kill()
+
+    killed = []
+    with pytest.raises(InvalidInputError, match="a worker process was killed") as raised:
+        slow.run(tmp_path / "s", jobs=2, progress=kill_one)
+    assert "\n" not in str(raised.value)
+    assert 20 <= len(load(tmp_path / "s")) < slow.size
+    slow.run(tmp_path / "s", jobs=2)
+    assert same(tmp_path / "s", expected)
+
+
+def test_a_cluster_gives_the_same_and_survives_the_loss_of_a_worker(slow, expected, scheduler, workers, tmp_path):
+    def kill_one(counts):
+        if counts.new >= 20 and workers[0].poll() is None:
+            workers[0].kill()
+            workers[0].wait(10)
+
+    more = replace(slow, repeats=8)
+    with Store(tmp_path / "s", more.manifest) as store:
+        counts = more.run_in(store, scheduler=scheduler, progress=kill_one)
+    assert workers[0].poll() == -signal.SIGKILL and workers[1].poll() is None
+    # complete, without doubles, and the same
+    assert counts.new == slow.size == len(load(tmp_path / "s")) and same(tmp_path / "s", expected)
+
+
+def test_a_cluster_whose_every_worker_is_replaced(slow, expected, scheduler, workers, tmp_path):
+    words = ["worker", scheduler, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--host", "127.0.0.1"]
+    fresh = []
+
+    def replace_all(counts):
+        if counts.new >= 20 and not fresh:
+            for worker in workers:
+                worker.kill()
+            fresh.append(start(words, tmp_path, "worker-2.log"))
+
+    try:
+        slow.run(tmp_path / "s", scheduler=scheduler, progress=replace_all)
+    finally:
+        for worker in fresh:
+            stop(worker)
+    assert fresh and same(tmp_path / "s", expected)
+
+
+def test_the_job_travels_once_to_each_worker(slow, scheduler, workers, tmp_path, monkeypatch):
+    from assoc.sweeps.work import Job
+
+    packed = []
+    plain = Job.__reduce__
+    monkeypatch.setattr(Job, "__reduce__", lambda self: packed.append(1) or plain(self))
+    slow.run(tmp_path / "s", scheduler=scheduler)
+    # once for the scatter, whatever the number of batches (one more where it is measured first)
+    assert 1 <= len(packed) <= 2
+
+
+def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, workers):
+    def lose(counts):
+        if counts.new >= 20 and not lost:
+            lost.append(scheduler.process.kill())
+
+    lost = []
+    with pytest.raises(InvalidInputError, match="same command goes on"):
+        slow.run(tmp_path / "s", scheduler=scheduler, progress=lose)
+    assert len(load(tmp_path / "s")) >= 20
+
+
+def test_no_scheduler_is_one_clear_line(study, tmp_path, monkeypatch):
+    from assoc.sweeps import cluster
+
+    monkeypatch.setattr(cluster, "_CONNECT_SECONDS", 1.0)
+    for address in ("tcp://127.0.0.1:9", "nonsense://", "127.0.0.1:9"):
+        with pytest.raises(InvalidInputError, match="--scheduler: no scheduler answers at") as raised:
+            study.run(tmp_path / "s", scheduler=address)
+        assert "\n" not in str(raised.value)

@@ -1,0 +1,98 @@
+"""Designs: grids, random designs, TOML tables, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.sweeps import Setting, grid, random_settings, settings_from
+from assoc.sweeps.design import designed, read_words
+
+
+def test_a_grid_is_every_combination_and_the_last_varies_fastest():
+    found = grid("aco", {"alpha": [1, 2], "rho": [0.3, 0.5, 0.3]})
+    assert [(s.parameters["alpha"], s.parameters["rho"]) for s in found] == [(1, 0.3), (1, 0.5), (2, 0.3), (2, 0.5)]
+    assert all(s.parameters["ants"] == 15 for s in found)
+    assert grid("greedy") == [Setting("greedy", {})]
+
+
+def test_equal_settings_have_equal_keys_whatever_was_left_out():
+    assert Setting("aco", {}) == Setting("aco", {"alpha": 1}) == Setting("aco", {"rho": 0.9, "alpha": 1.0})
+    assert Setting("aco", {"alpha": 2}) != Setting("aco", {"beta": 2})
+    copy = pickle.loads(pickle.dumps(Setting("aco", {"alpha": 2})))
+    assert copy == Setting("aco", {"alpha": 2}) and copy.parameters == Setting("aco", {"alpha": 2}).parameters
+
+
+def test_keys_are_the_same_in_another_process():
+    code = "from assoc.sweeps import Setting; print(Setting('aco', {'alpha': 2}).key)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == Setting("aco", {"alpha": 2}).key
+
+
+def test_a_longer_random_design_begins_with_the_shorter_one():
+    space = {
+        "alpha": {"low": 0.5, "high": 3},
+        "ants": {"low": 2, "high": 200, "log": True},
+        "mode": ["paper", "mmas"],
+    }
+    short, long = random_settings("aco", space, 10, 4), random_settings("aco", space, 40, 4)
+    assert long[: len(short)] == short and len(long) > 30
+    assert all(0.5 <= s.parameters["alpha"] <= 3 and 2 <= s.parameters["ants"] <= 200 for s in long)
+    assert all(type(s.parameters["ants"]) is int for s in long)
+    assert {s.parameters["mode"] for s in long} == {"paper", "mmas"}
+    # logarithmic: about half of them lie below the geometric mean, 20
+    assert 10 < sum(s.parameters["ants"] < 20 for s in long) < 30
+    assert random_settings("aco", space, 10, 5) != short
+
+
+def test_words_of_the_command_line():
+    spaces = read_words(["clusters=1,2", "aco.alpha=1:3", "tabu.tenure=5"], ["aco", "tabu", "greedy"])
+    assert spaces["aco"]["clusters"] == spaces["tabu"]["clusters"] and spaces["greedy"] == {}
+    found = designed(list(spaces.items()), 3, 0)
+    assert list(dict.fromkeys(s.solver for s in found)) == ["aco", "tabu", "greedy"]
+    assert [s.solver for s in found].count("aco") == 3
+
+
+def test_tables_can_be_lists_of_designs():
+    tables = {"aco": [{"alpha": [1, 2], "rho": 0.3}, {"alpha": 3}], "milp": {"backend": ["scip", "highs"]}}
+    found = settings_from(tables)
+    assert [s.solver for s in found] == ["aco"] * 3 + ["milp"] * 2
+    assert found[2].parameters["rho"] == 0.9
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: grid("acoo"), "did you mean aco"),
+        (lambda: grid("aco", {"alhpa": [1]}), "did you mean alpha"),
+        (lambda: grid("aco", {"rho": [0.5, 1.5]}), "rho: expected a number between 0 and 1"),
+        (lambda: grid("aco", {"alpha": []}), "empty"),
+        (lambda: grid("aco", {"ants": [1.5]}), "whole number"),
+        (lambda: grid("aco", {"alpha": ["much"]}), "expected a number"),
+        (lambda: grid("aco", {"alpha": [float("nan")]}), "alpha"),
+        (lambda: grid("aco", {"alpha": {"low": 1, "high": 2}}), "random design"),
+        (lambda: random_settings("aco", {"alpha": {"low": 2, "high": 1}}, 3), "low < high"),
+        (lambda: random_settings("aco", {"alpha": {"low": 0, "high": 1, "log": True}}, 3), "low > 0"),
+        (lambda: random_settings("aco", {}, 3), "no parameter"),
+        (lambda: read_words(["alpha"], ["aco"]), "expected NAME=VALUE"),
+        (lambda: read_words(["alpha="], ["aco"]), "no values"),
+        (lambda: read_words(["alpha=1,,2"], ["aco"]), "expected a number, got ''"),
+        (lambda: read_words(["alpha=1:2:3"], ["aco"]), "LOW:HIGH"),
+        (lambda: read_words(["alpha=1", "alpha=2"], ["aco"]), "twice"),
+        (lambda: read_words(["milp.backend=scip"], ["aco"]), "no solver of the study"),
+        (lambda: settings_from({"aco": 3}), "expected a table"),
+    ],
+)
+def test_bad_designs_are_one_clear_line(make, message):
+    with pytest.raises(InvalidInputError, match=message) as raised:
+        make()
+    assert "\n" not in str(raised.value)
+
+
+def test_a_design_without_end_is_refused_before_it_is_made():
+    with pytest.raises(LimitExceededError, match="settings"):
+        grid("aco", {name: list(range(1, 2000)) for name in ("ants", "iterations", "patience")})

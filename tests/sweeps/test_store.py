@@ -1,0 +1,167 @@
+"""The store: nothing finished is lost, whatever happens; nothing is there twice."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scene
+from assoc.sweeps import Study, grid, load, load_traces
+from assoc.sweeps.sources import Source, named
+from assoc.sweeps.store import LOG, MANIFEST, Store, damaged_lines, run_keys
+
+
+def same(one, other):
+    return one.drop(columns="time").equals(other.drop(columns="time"))
+
+
+@pytest.fixture
+def whole(study, tmp_path):
+    study.run(tmp_path / "whole")
+    return tmp_path / "whole"
+
+
+def test_a_row_is_a_run_that_assign_gives_again(study, whole, scene):
+    import assoc
+
+    frame = load(whole)
+    assert len(frame) == study.size == 40 and frame["seed"].nunique() == 40
+    for row in frame.iloc[::7].to_dict("records"):
+        problem = assoc.build_problem(scene, scene.scan(row["scan"]))
+        solution = assoc.assign(
+            problem, row["solver"], seed=row["seed"], mode=row["mode"], alpha=row["alpha"], rho=row["rho"]
+        )
+        assert (row["cost"], row["lower_bound"]) == (solution.cost, solution.lower_bound)
+        assert (row["iterations"], row["gap"]) == (solution.iterations, solution.gap)
+        assert row["optimal"] == (solution.status == "optimal")
+    expected = assoc.associate(scene, "milp")
+    best = frame[frame["optimal"]].groupby("scan").first()
+    for scan, row in best.iterrows():
+        one = expected.scans[scan]
+        assert row["true_tuples"] == one.true_tuples and row["correct_tuples"] == one.correct_tuples
+
+
+def test_traces_end_at_the_cost_of_their_run(whole):
+    frame, traces = load(whole), load_traces(whole)
+    last = traces.groupby(["setting", "scene", "scan", "repeat"])["cost"].last()
+    costs = frame.set_index(["setting", "scene", "scan", "repeat"])["cost"]
+    assert np.allclose(last.reindex(costs.index), costs)
+    assert (traces.groupby(["setting", "scene", "scan", "repeat"])["cost"].diff().dropna() < 0).all()
+
+
+def test_a_log_cut_anywhere_keeps_what_was_finished_and_goes_on(study, whole, tmp_path):
+    expected = load(whole)
+    log = (whole / LOG).read_bytes()
+    lines = log.splitlines(keepends=True)
+    ends = np.cumsum([len(line) for line in lines])
+    cuts = [*range(0, len(log), max(1, len(log) // 40)), *ends, *(ends - 1), *(ends[:-1] + 1), ends[-1] - 2]
+    for cut in cuts:
+        folder = tmp_path / f"cut-{cut}"
+        folder.mkdir(exist_ok=True)
+        (folder / MANIFEST).write_bytes((whole / MANIFEST).read_bytes())
+        (folder / LOG).write_bytes(log[:cut])
+        with Store(folder, study.manifest) as store:
+            finished = [json.loads(line[9:]) for line, end in zip(lines, ends, strict=True) if end <= cut]
+            runs = {key for entry in finished if "scan" in entry for key in run_keys(entry)}
+            assert store.done == runs
+    for cut in (len(log) // 2, int(ends[-2]) + 3):
+        folder = tmp_path / f"cut-{cut}"
+        folder.mkdir(exist_ok=True)
+        (folder / MANIFEST).write_bytes((whole / MANIFEST).read_bytes())
+        (folder / LOG).write_bytes(log[:cut])
+        counts = study.run(folder)
+        assert counts.done == study.size and same(load(folder), expected)
+        assert damaged_lines(folder) == (cut not in ends)
+        assert study.run(folder).new == 0
+
+
+def test_a_changed_byte_costs_its_line_alone(study, whole):
+    expected = load(whole)
+    log = bytearray((whole / LOG).read_bytes())
+    log[len(log) - 30] ^= 1
+    (whole / LOG).write_bytes(log)
+    assert len(load(whole)) < study.size and damaged_lines(whole) == 1
+    study.run(whole)
+    assert same(load(whole), expected)
+
+
+def test_a_changed_design_adds(study, whole):
+    before = (whole / LOG).read_bytes()
+    more = replace(study, settings=[*study.settings, *grid("greedy")], repeats=3)
+    counts = more.run(whole)
+    assert (counts.before, counts.new) == (40, 4 * 5 + 3 * 5)
+    assert (whole / LOG).read_bytes().startswith(before)
+    frame = load(whole)
+    assert len(frame) == 75 and not frame.duplicated(["setting", "scene", "scan", "repeat"]).any()
+
+
+def test_a_run_is_kept_once(study, whole):
+    entries = [json.loads(line[9:]) for line in (whole / LOG).read_bytes().splitlines()]
+    batch = next(entry for entry in entries if "scan" in entry)
+    with Store(whole, study.manifest) as store:
+        assert store.append(study.settings, batch) == 0
+    # also if two processes should have written it
+    with open(whole / LOG, "ab") as file:
+        file.write((whole / LOG).read_bytes())
+    assert len(load(whole)) == study.size
+
+
+def test_another_study_is_refused(study, whole, scene, tmp_path):
+    other = Source(Scene(scene.sensors, scene.times + 1.0, scene.measurements, region=scene.region), "other")
+    for changed, message in [
+        (replace(study, sources=[other], scans=None), "other scenes or problems: other is not among"),
+        (replace(study, sources=[*study.sources, other], scans=None), "other is not among"),
+        (replace(study, seed=5), "seed 0, not 5"),
+        (replace(study, time_limit=1.0), "time_limit None, not 1.0"),
+        (replace(study, gating={"max_tuples": 9}), "gating"),
+    ]:
+        with pytest.raises(InvalidInputError, match=message):
+            changed.run(whole)
+    content = json.loads((whole / MANIFEST).read_text())
+    (whole / MANIFEST).write_text(json.dumps({**content, "assoc": "0.0.1"}))
+    with pytest.raises(InvalidInputError, match="made by version 0.0.1 of assoc, this is"):
+        study.run(whole)
+    (whole / MANIFEST).write_text(json.dumps({**content, "version": 2}))
+    with pytest.raises(InvalidInputError, match="has version 2"):
+        study.run(whole)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").write_text("mine")
+    with pytest.raises(InvalidInputError, match="holds other files and no study"):
+        study.run(tmp_path / "full")
+
+
+def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
+    scene.save(tmp_path / "b.npz")
+    again = Source(Scene.load(tmp_path / "b.npz"), "b.npz")
+    assert replace(study, sources=[again], scans=None).run(whole).new == 0
+    with pytest.raises(InvalidInputError, match="is the same as"):
+        named([scene, again.content], ["a.npz", "b.npz"])
+
+
+def test_one_sweep_at_a_time(study, whole):
+    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is at work"):
+        study.run(whole)
+    assert study.run(whole).new == 0
+
+
+def test_problems_and_problems_without_a_solution(tmp_path):
+    easy = AssignmentProblem([[1, 1], [1, 2]], [-3.0, -1.0], [1, 2])
+    none = AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False)
+    study = Study([Source(easy, "easy"), Source(none, "none")], [*grid("greedy"), *grid("milp")], 1)
+    study.run(tmp_path / "s")
+    frame = load(tmp_path / "s").set_index(["scene", "solver"])
+    assert frame.loc[("easy", "milp"), "cost"] == -3.0 and frame.loc[("easy", "milp"), "optimal"]
+    assert frame.loc["none", "cost"].isna().all() and (frame.loc["none", "stopped_by"] == "infeasible").all()
+    assert not frame.loc["none", "optimal"].any()
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{", '{"format": "assoc.study", "version": 1}', "\x00"])
+def test_a_damaged_manifest_is_one_clear_line(tmp_path, content):
+    (tmp_path / MANIFEST).write_text(content)
+    with pytest.raises(InvalidInputError, match=MANIFEST):
+        load(tmp_path)

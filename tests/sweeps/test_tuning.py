@@ -1,0 +1,56 @@
+"""Tuning: a search that finds what is there, goes on where it was stopped, and reports on what it never saw."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.sweeps import load, tune
+from assoc.sweeps.space import Range, Values
+from assoc.sweeps.tuning import default_space, scores
+
+
+def test_ranges_of_the_defaults_are_what_the_solver_takes():
+    space = default_space("aco")
+    assert space["alpha"] == Range(0.25, 4.0, logarithmic=True)
+    assert space["ants"] == Range(4, 60, logarithmic=True, whole=True)
+    assert space["rho"].low == 0.225 and 0.99 < space["rho"].high < 1.0
+    assert "iterations" not in space and "patience" not in space and "mode" not in space
+    assert default_space("greedy") == {}
+
+
+def test_scores():
+    cost, bound = np.array([-5.0, -4.0, np.nan]), np.array([-5.0, -5.0, np.nan])
+    time = np.array([0.1, 0.01, np.nan])
+    assert scores(cost, bound, time, "gap", 1.0).tolist() == [0.0, 1.0, 1e6]
+    assert scores(cost, bound, time, "time", 2.0).tolist() == [0.1, 20.0, 20.0]
+
+
+def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_path):
+    # one ant cannot disagree with itself: it stops after the greedy cycle, with a gap
+    space = {"mode": Values(("paper",)), "ants": Range(1, 20, whole=True), "iterations": Values((1,))}
+    report = tune(tmp_path / "t", study.sources, "aco", space, 8, repeats=2, seed=1)
+    assert report.default.parameters["mode"] == "paper" and report.default.parameters["ants"] == 15
+    assert report.training[1] <= report.training[0]
+    frame = load(tmp_path / "t")
+    held = frame[frame["repeat"] >= 2]
+    assert set(frame[frame["repeat"] < 2]["scan"]) == {0, 2, 4} and set(held["scan"]) == {1, 3}
+    assert set(held["setting"]) == {report.default.key, report.tuned.key}
+    for row in report.table.to_dict("records"):
+        assert row["score"] == pytest.approx(held[held["setting"] == row["setting"]]["gap"].mean())
+    saved = json.loads((tmp_path / "t" / "tuning.json").read_text())
+    assert saved["tuned"] == dict(report.tuned.parameters)
+    # the same again only reads
+    log = (tmp_path / "t" / "runs.jsonl").read_bytes()
+    again = tune(tmp_path / "t", study.sources, "aco", space, 8, repeats=2, seed=1)
+    assert again.tuned == report.tuned and (tmp_path / "t" / "runs.jsonl").read_bytes() == log
+
+
+def test_nothing_to_tune(study, tmp_path):
+    with pytest.raises(InvalidInputError, match="nothing to tune"):
+        tune(tmp_path / "t", study.sources, "greedy", trials=2)
+    with pytest.raises(InvalidInputError, match="target"):
+        tune(tmp_path / "t", study.sources, "aco", trials=2, target="cost")
