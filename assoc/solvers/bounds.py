@@ -58,7 +58,7 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     reduced, primal, slack_primal = work_arrays(packing)
     hard_pass(packing, duals, reduced, 1)
     for _ in range(levels):
-        if run is not None and run.should_stop():
+        if run is not None and run.remaining() <= 0.0:
             break
         smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, passes)
         temperature *= COOLING

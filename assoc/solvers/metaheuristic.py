@@ -1,6 +1,7 @@
 """What ant colony, genetic algorithm and tabu search share: parts, reduced-cost fixing, stopping, proof.
 
-The packing is taken apart into parts (first its components). A part is searched for some iterations; then
+The packing is taken apart into parts (first its components). The first iteration is the greedy one, which follows
+the reduced costs alone, and most parts need no other. An open part is searched for some iterations; then
 columns whose reduced cost exceeds the part's gap are dropped, since no better solution can use them, and
 what is left is taken apart again. A part whose gap is closed is done. Parts take turns, so that a time
 limit is shared between them. At the end a short branch and bound (branch_and_bound.py) raises the bounds
@@ -171,54 +172,59 @@ def solve_by(
     duals = dual_bound(
         packing, run=Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
     )
-    columns: list[NDArray[np.int64]] = []
-    total_bound = 0.0
-    done_weight = 0.0
-    total_iterations = 0
-    queue = [(part, make(part, run.rng)) for part in split_components(packing, duals, np.arange(packing.num_columns))]
-    for part, _ in queue:
+    parts = split_components(packing, duals, np.arange(packing.num_columns))
+    for part in parts:
         part.offer_greedy()
-    root_bound = sum(part.bound for part, _ in queue)
+    columns: list[NDArray[np.int64]] = []
+    bound, weight = 0.0, 0.0
+    done = len(parts)
+    root_bound = sum(part.bound for part in parts)
+    queue: list[tuple[Part, Searcher | None]] = [(part, None) for part in parts]
     while queue:
         part, searcher = queue.pop(0)
-        first = part.iterations == 0
-        turn = 0
-        while first or turn < 10:
-            before = part.weight
-            searcher.iterate(part, run.rng)
-            part.refine(run, refinement)
-            first = False
-            turn += 1
-            part.iterations += 1
-            part.stalled = 0 if part.weight < before else part.stalled + 1
-            if part.weight < before and len(queue) < 50:
-                known = done_weight + part.weight + sum(p.weight for p, _ in queue)
-                if known < np.inf:
-                    run.record(total_iterations + turn, known, root_bound)
-            if part.closed or part.stalled >= patience or part.iterations >= iterations or run.should_stop():
-                break
-        total_iterations += turn
-        over = part.stalled >= patience or part.iterations >= iterations or bool(run.stopped_by)
-        if part.best is None and over:
-            complete(part, run)
-        pieces = None if part.closed or over else split_part(part)
-        if pieces is not None:
-            for piece in pieces:
-                if piece.closed:
-                    columns.append(piece.origin[_columns(piece)])
-                    total_bound += bound_of_part(piece, run)
-                    done_weight += piece.weight
-                else:
-                    queue.append((piece, make(piece, run.rng)))
-        elif part.closed or over:
+        over = part.closed
+        if not over:
+            if searcher is None:
+                searcher = make(part, run.rng)
+            before, iterations_before = part.weight, part.iterations
+            over = _take_turn(part, searcher, run, iterations, patience, refinement)
+            done += part.iterations - iterations_before
+            if part.best is None and over:
+                complete(part, run)
+            pieces = None if over else split_part(part)
+            if pieces is not None:
+                queue.extend((piece, None) for piece in pieces)
+                continue
+            if part.weight < before:
+                _record_all(run, done, weight, root_bound, [part, *(other for other, _ in queue)])
+        if over:
             columns.append(part.origin[_columns(part)])
-            total_bound += bound_of_part(part, run)
-            done_weight += part.weight
+            bound += bound_of_part(part, run)
+            weight += part.weight
         else:
             queue.append((part, searcher))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    run.record(total_iterations, done_weight, total_bound)
-    return Outcome(chosen, total_iterations, total_bound, duals)
+    run.record(done, weight, bound)
+    return Outcome(chosen, done, bound, duals)
+
+
+def _take_turn(part: Part, searcher: Searcher, run: Run, iterations: int, patience: int, refinement: int) -> bool:
+    """Give a part up to ten iterations; whether its search is over."""
+    for _ in range(10):
+        before = part.weight
+        searcher.iterate(part, run.rng)
+        part.refine(run, refinement)
+        part.iterations += 1
+        part.stalled = 0 if part.weight < before else part.stalled + 1
+        if part.closed or part.stalled >= patience or part.iterations >= iterations or run.should_stop():
+            return True
+    return False
+
+
+def _record_all(run: Run, iterations: int, weight: float, bound: float, parts: list[Part]) -> None:
+    known = weight + sum(part.weight for part in parts)
+    if known < np.inf:
+        run.record(iterations, known, bound)
 
 
 def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
@@ -253,9 +259,6 @@ def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
         return None
     smaller = part.packing.restrict(keep)
     duals = np.where(smaller.slack, np.minimum(part.duals[smaller.row_origin], 0.0), part.duals[smaller.row_origin])
-    # multipliers of rows that lost all their columns bound nothing any more
-    lost = np.ones(part.packing.num_rows, dtype=bool)
-    lost[smaller.row_origin] = False
     duals = np.ascontiguousarray(duals)
     hard_pass(smaller, duals, np.empty(smaller.num_columns), 1)
     place = np.full(part.packing.num_columns, -1, dtype=np.int32)
