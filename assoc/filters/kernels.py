@@ -149,8 +149,12 @@ def correct(
             total += K[i, a] * v[a]
         new_mean[i] = total
     # M = (I - K H) P, then M (I - K H)' + K R K'
+    # (of M only the lower half and the columns that H reads are needed)
+    last = 0
+    for p in range(c):
+        last = max(last, columns[p] + 1)
     for i in range(n):
-        for j in range(n):
+        for j in range(max(i + 1, last)):
             total = P[i, j]
             for a in range(d):
                 total -= K[i, a] * X[j, a]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -73,7 +74,9 @@ class UnmannedAircraft(Motion):
     ) -> None:
         self.dim, self.position = 4, (2, 3)
         self.thrust = positive(thrust, "thrust", zero=True)
-        self.attack = float(finite(attack, "attack", 0))
+        if not math.isfinite(attack):
+            raise InvalidInputError(f"attack must be a finite number, got {attack!r}")
+        self.attack = float(attack)
         self.covariance = positive_definite(covariance, "covariance", (1, 4, 4))
         self.aerodynamics = aerodynamics if aerodynamics is not None else Aerodynamics()
 

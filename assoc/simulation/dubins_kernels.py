@@ -18,8 +18,10 @@ SENSES = np.array([[1.0, 0.0, 1.0], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [-1, 1,
 """Curvature of each piece of each word in units of 1 / radius."""
 
 TURN = 2.0 * math.pi
-# a full turn found where none is needed is a rounding error
-_TINY = 1e-9
+# a full turn found where none is needed is a rounding error, which a square root can have made large
+_TINY = 1e-7
+# circles that only just touch may seem not to
+_TOUCH = 1e-11
 
 
 @njit
@@ -41,29 +43,29 @@ def pieces(word: int, d: float, a: float, b: float) -> tuple[bool, float, float,
         return True, turn(a - t), math.hypot(d - sa + sb, ca - cb), turn(t - b)
     if word == 2:
         square = d * d - 2.0 + 2.0 * cab + 2.0 * d * (sa + sb)
-        if square < 0.0:
+        if square < -_TOUCH:
             return False, 0.0, 0.0, 0.0
-        p = math.sqrt(square)
+        p = math.sqrt(max(square, 0.0))
         t = math.atan2(-ca - cb, d + sa + sb) - math.atan2(-2.0, p)
         return True, turn(t - a), p, turn(t - b)
     if word == 3:
         square = d * d - 2.0 + 2.0 * cab - 2.0 * d * (sa + sb)
-        if square < 0.0:
+        if square < -_TOUCH:
             return False, 0.0, 0.0, 0.0
-        p = math.sqrt(square)
+        p = math.sqrt(max(square, 0.0))
         t = math.atan2(ca + cb, d - sa - sb) - math.atan2(2.0, p)
         return True, turn(a - t), p, turn(b - t)
     if word == 4:
         c = (6.0 - d * d + 2.0 * cab + 2.0 * d * (sa - sb)) / 8.0
-        if abs(c) > 1.0:
+        if abs(c) > 1.0 + _TOUCH:
             return False, 0.0, 0.0, 0.0
-        p = TURN - math.acos(c)
+        p = TURN - math.acos(max(min(c, 1.0), -1.0))
         t = turn(a - math.atan2(ca - cb, d - sa + sb) + 0.5 * p)
         return True, t, p, turn(a - b - t + p)
     c = (6.0 - d * d + 2.0 * cab + 2.0 * d * (sb - sa)) / 8.0
-    if abs(c) > 1.0:
+    if abs(c) > 1.0 + _TOUCH:
         return False, 0.0, 0.0, 0.0
-    p = TURN - math.acos(c)
+    p = TURN - math.acos(max(min(c, 1.0), -1.0))
     t = turn(math.atan2(cb - ca, d + sa - sb) - a + 0.5 * p)
     return True, t, p, turn(b - a - t + p)
 

@@ -41,8 +41,6 @@ def fuzzy_data(x: Array, window: int) -> dict[str, Any]:
         "groups": [0, 0, 0, 0, 0, 0, 1],
         "inputs": inputs.tolist(),
         "outputs": outputs,
-        # range and azimuth: turns are horizontal
-        "components": [0, 1],
         "window": window,
         "immediate": True,
     }
@@ -109,7 +107,7 @@ def main() -> None:
     batch = Batch.draw(random_flights(chosen.flights, rng), 1, rng)
 
     best: tuple[float, dict[str, Any]] | None = None
-    for window in (3, 4):
+    for window in (2, 3):
         start = np.concatenate(
             [np.log([0.6, 0.7, 1.7, 2.5]), [-0.5], np.log([0.5, 0.5, 0.5]), [-2.0], np.log([1.5, 1.5, 1.5])]
         )

@@ -1,0 +1,84 @@
+"""The experiments with filters as programs: their claims, JSON and figures, at their quick size."""
+
+from __future__ import annotations
+
+import pytest
+
+from experiments import dubins_enkf, filter_benchmark, filter_consistency, fuzzy_ekf, modified_ekf
+from experiments.claims import load_json
+from experiments.filters import manoeuvres
+from experiments.filters.b1 import Setting
+
+
+@pytest.mark.parametrize("module", [modified_ekf, dubins_enkf])
+def test_programs_whose_claims_hold(module, tmp_path, capsys):
+    files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
+    assert module.program(["--quick", "--json", files[0], "--figure", files[1], "--seed", "1"]) == 0
+    claims = load_json(files[0])
+    judged = [c for c in claims if c.band is not None]
+    assert len(judged) >= 5
+    # the small runs of --quick leave some room
+    loose = [c for c in judged if not c.holds and not c.quantity.startswith("B1")]
+    assert not loose
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    assert "holds" in capsys.readouterr().out
+
+
+def test_beta_of_b1():
+    assert Setting().beta == pytest.approx(100e3 * 0.0261799**2 / 30, rel=1e-4)
+
+
+def test_fuzzy_experiment(tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzzy_ekf, "SCENARIOS", {"C": manoeuvres.SCENARIOS["C"]})
+    file = str(tmp_path / "f.json")
+    assert fuzzy_ekf.program(["--quick", "--json", file, "--figure", str(tmp_path / "f.png")]) == 0
+    by_name = {c.quantity: c for c in load_json(file)}
+    assert by_name["C: tuned rules / best fixed EKF"].holds
+    assert by_name["C: RMSE, IMM"].ours < by_name["C: RMSE, raw measurements"].ours
+    assert by_name["C: RMSE, raw measurements"].ours == pytest.approx(89.7, rel=0.03)
+
+
+def test_scenarios_are_as_described():
+    import numpy as np
+
+    for name, g, speed in (("C", 1.0, 250.0), ("E", 4.0, 350.0)):
+        flight = manoeuvres.SCENARIOS[name]
+        track = flight.positions()
+        assert track.shape == (101, 3)
+        second = track[2:] - 2 * track[1:-1] + track[:-2]
+        k = int(flight.turns[0].start) + 5
+        assert np.linalg.norm(second[k]) == pytest.approx(g * 9.81, rel=0.01)
+        assert np.linalg.norm(np.diff(track, axis=0), axis=1) == pytest.approx(speed, rel=0.01)
+
+
+def test_tuning_never_sees_the_reports_flights():
+    import numpy as np
+
+    for flight in manoeuvres.random_flights(50, np.random.default_rng(20_000)):
+        assert all(
+            flight.position != one.position and flight.turns != one.turns for one in manoeuvres.SCENARIOS.values()
+        )
+
+
+def test_consistency_of_the_exact_filters(tmp_path, monkeypatch):
+    import numpy as np
+
+    monkeypatch.setattr(filter_consistency, "STEPS", 40)
+    rng = np.random.default_rng(0)
+    case = filter_consistency.linear_case(60, rng)
+    from assoc.filters import KalmanFilter, bounds
+
+    values, nis = filter_consistency.run(KalmanFilter(filter_consistency.ConstantVelocity(1.0)), case)
+    low, high = bounds(6, 60, 0.999)
+    assert low < values[-1].mean() < high
+    low, high = bounds(3, nis.size, 0.999)
+    assert low < nis.mean() < high
+
+
+def test_benchmark_times_all_three():
+    for kind in filter_benchmark.KINDS:
+        assert filter_benchmark.ours(kind, 3, 2) > 0
+    pytest.importorskip("filterpy")
+    pytest.importorskip("stonesoup")
+    assert filter_benchmark.filterpy("Kalman", 2) > 0
+    assert filter_benchmark.stonesoup("EKF", 1) > 0

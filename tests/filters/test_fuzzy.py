@@ -1,0 +1,132 @@
+"""Fuzzy inference against scikit-fuzzy, and the filter that it adapts."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.filters import (
+    ConstantVelocity,
+    CoordinatedTurn,
+    ExtendedKalmanFilter,
+    FuzzyAdaptiveEKF,
+    FuzzyRules,
+    FuzzyVariable,
+    paper_rules,
+    tuned_data,
+)
+from tests.filters.common import MOTION, RADAR, random_state
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    skfuzzy = pytest.importorskip("skfuzzy")
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_inference_against_scikit_fuzzy(case):
+    rng = np.random.default_rng(case)
+    if case == 0:
+        rules = paper_rules()
+    else:
+        corners = [np.sort(rng.uniform(0, 5, 4)) for _ in range(3)] + [np.array([0, 0, 5, 5.0])]
+        outs = [np.sort(rng.uniform(-2, 3, 4)) for _ in range(3)]
+        rules = FuzzyRules(
+            FuzzyVariable({f"i{k}": tuple(c) for k, c in enumerate(corners)}),
+            FuzzyVariable({f"o{k}": tuple(c) for k, c in enumerate(outs)}),
+            [("i0", "o1"), ("i1", "o0"), ("i2", "o2"), ("i3", "o1")],
+            points=77,
+        )
+    inputs = rng.uniform(0, 5, 40)
+    universe = rules.universe
+    expected = []
+    for x in inputs:
+        total = np.zeros_like(universe)
+        for i, o in rules.rules:
+            degree = skfuzzy.trapmf(np.array([x]), rules.input.sets[i])[0]
+            total = np.fmax(total, np.fmin(degree, skfuzzy.trapmf(universe, rules.output.sets[o])))
+        expected.append(skfuzzy.defuzz(universe, total, "centroid"))
+    np.testing.assert_allclose(rules(inputs), expected, rtol=1e-9)
+
+
+def test_centres_make_a_partition():
+    variable = FuzzyVariable.from_centres(["a", "b", "c"], [1.0, 2.0, 5.0], 0.5)
+    rules = FuzzyRules(variable, variable, [("a", "a"), ("b", "b"), ("c", "c")], points=1001)
+    assert rules(np.array([2.0]))[0] == pytest.approx(8 / 3, abs=1e-3)
+    assert rules(np.array([-10.0]))[0] == rules(np.array([0.5]))[0]
+
+
+def test_refusals():
+    good = FuzzyVariable({"a": (0.0, 1.0, 2.0, 3.0)})
+    with pytest.raises(InvalidInputError, match="corners in order"):
+        FuzzyVariable({"a": (0.0, 2.0, 1.0, 3.0)})
+    with pytest.raises(InvalidInputError, match="names no pair"):
+        FuzzyRules(good, good, [("a", "b")])
+    with pytest.raises(InvalidInputError, match="inputs must be finite"):
+        FuzzyRules(good, good, [("a", "a")])(np.array([np.nan]))
+    gap = FuzzyVariable({"a": (0.0, 0.0, 1.0, 1.0), "b": (2.0, 2.0, 3.0, 3.0)})
+    with pytest.raises(InvalidInputError, match="no rule speaks of 1.5"):
+        FuzzyRules(gap, good, [("a", "a"), ("b", "a")])(np.array([1.5]))
+    with pytest.raises(InvalidInputError, match="scale must not be negative"):
+        bad = FuzzyVariable({"a": (-1.0, 0.0, 1.0, 2.0)})
+        FuzzyAdaptiveEKF(MOTION, FuzzyRules(good, bad, [("a", "a")]))
+
+
+def test_without_rules_it_is_an_ekf():
+    state = random_state(5, np.random.default_rng(0))
+    plain, fuzzy = ExtendedKalmanFilter(MOTION), FuzzyAdaptiveEKF(MOTION, None)
+    a, b = state, fuzzy.start(state)
+    for _ in range(3):
+        z = RADAR.measure(state.mean[:, :3])
+        u, w = plain.update(plain.predict(a, 1.0), z, RADAR), fuzzy.update(fuzzy.predict(b, 1.0), z, RADAR)
+        a, b = u.state, w.state
+    np.testing.assert_allclose(a.mean, b.mean, rtol=1e-12)
+    np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-9)
+    assert len(b[1:3]) == 2
+
+
+def test_equations_32_to_36():
+    """One step with the paper's rules: q scales Q of the next prediction, r scales R of this correction."""
+    state = random_state(1, np.random.default_rng(1))
+    rules = paper_rules()
+    fuzzy = FuzzyAdaptiveEKF(MOTION, rules, rules)
+    F, Q = (one[0] for one in MOTION.matrices(1.0))
+    predicted = fuzzy.predict(fuzzy.start(state), 1.0)
+    z = RADAR.measure(predicted.mean[:, :3]) + 1.5 * RADAR.noise
+    done = fuzzy.update(predicted, z, RADAR)
+    plain = ExtendedKalmanFilter(MOTION)
+    first = plain.update(plain.predict(state, 1.0), z, RADAR)
+    alpha = np.mean(first.innovation[0] ** 2 / np.diag(first.covariance[0]))
+    scale = rules(np.array([alpha]))[0]
+    np.testing.assert_allclose(done.covariance[0], first.covariance[0] + (scale - 1) * RADAR.covariance, rtol=1e-9)
+    after = fuzzy.predict(done.state, 1.0)
+    P = done.state.covariance[0]
+    np.testing.assert_allclose(after.covariance[0], F @ P @ F.T + scale * Q, rtol=1e-9, atol=1e-9)
+
+
+def test_a_drift_of_the_innovations_raises_the_noise():
+    data = tuned_data()
+    motion = CoordinatedTurn(data["acceleration_noise"], data["rate_noise"])
+    fuzzy = FuzzyAdaptiveEKF.from_data(motion, data)
+    state = fuzzy.start(random_state(2, np.random.default_rng(2), 7))
+    for k in range(4):
+        state = fuzzy.predict(state, 1.0)
+        z = RADAR.measure(state.mean[:, :3])
+        if k == 3:
+            z[1] += 6 * np.sqrt(np.diag(fuzzy.expected(state, RADAR).covariance[1]))
+        state = fuzzy.update(state, z, RADAR).state
+    assert (state.process_scale[1] > 5 * state.process_scale[0]).all()
+    # turn rate and acceleration have rules of their own
+    assert state.process_scale[1, 6] != state.process_scale[1, 0]
+
+
+def test_two_sensors_in_turn():
+    fuzzy = FuzzyAdaptiveEKF(ConstantVelocity(1.0), paper_rules(), window=3)
+    state = fuzzy.start(random_state(1, np.random.default_rng(3)))
+    from tests.filters.common import BEARING
+
+    for sensor in (RADAR, BEARING, RADAR):
+        state = fuzzy.update(fuzzy.predict(state, 1.0), sensor.measure(state.mean[:, :3]), sensor).state
+    assert np.isfinite(state.mean).all()

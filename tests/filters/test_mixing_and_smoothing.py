@@ -1,0 +1,266 @@
+"""IMM, ensemble, smoother, motion models, the UAV and consistency: each against something independent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.stats import multivariate_normal
+
+from assoc.errors import InvalidInputError
+from assoc.filters import (
+    ConstantAcceleration,
+    ConstantVelocity,
+    CoordinatedTurn,
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    FixedLagSmoother,
+    FuzzyAdaptiveEKF,
+    Gaussian,
+    InteractingMultipleModel,
+    KalmanFilter,
+    LinearMeasurement,
+    ModifiedEKF,
+    Padded,
+    UnmannedAircraft,
+    UnscentedKalmanFilter,
+    bounds,
+    nees,
+    paper_rules,
+)
+from assoc.filters.motion import differences
+from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
+
+
+def test_one_cycle_of_the_imm_in_plain_numpy():
+    rng = np.random.default_rng(0)
+    models = [ConstantVelocity(0.5), ConstantVelocity(20.0)]
+    T = np.array([[0.9, 0.1], [0.3, 0.7]])
+    imm = InteractingMultipleModel([KalmanFilter(m) for m in models], T, [0.6, 0.4])
+    state = imm.start(random_state(1, rng))
+    z = state.mean[:, :3] + np.array([[80.0, -60.0, 30.0]])
+    H = np.eye(3, 6)
+    means, covs, weights = list(state.means[0]), list(state.covariances[0]), np.array([0.6, 0.4])
+    for _ in range(3):
+        predicted = imm.predict(state, 1.0)
+        table = imm.log_likelihood(predicted, z, PLACE)
+        done = imm.update(predicted, z, PLACE)
+        state = done.state
+        c = weights @ T
+        mixed = []
+        for j in range(2):
+            share = weights * T[:, j] / c[j]
+            m = sum(share[i] * means[i] for i in range(2))
+            P = sum(share[i] * (covs[i] + np.outer(means[i] - m, means[i] - m)) for i in range(2))
+            mixed.append((m, P))
+        density = []
+        for j, (m, P) in enumerate(mixed):
+            F, Q = (one[0] for one in models[j].matrices(1.0))
+            m, P = F @ m, F @ P @ F.T + Q
+            means[j], covs[j], v, S = kalman_update(m, P, z[0], H @ m, H, PLACE.covariance)
+            density.append(multivariate_normal.pdf(v, np.zeros(3), S))
+        weights = c * density
+        assert done.log_likelihood[0] == pytest.approx(np.log(weights.sum()))
+        assert table[0, 0] == pytest.approx(np.log(weights.sum()))
+        weights /= weights.sum()
+        np.testing.assert_allclose(state.weights[0], weights, rtol=1e-9)
+        np.testing.assert_allclose(state.mean[0], weights @ np.array(means), rtol=1e-9)
+        np.testing.assert_allclose(state.covariances[0], covs, rtol=1e-6, atol=1e-6)
+
+
+def test_an_imm_of_equal_models_is_one_model():
+    rng = np.random.default_rng(1)
+    start = random_state(4, rng)
+    one = ExtendedKalmanFilter(MOTION)
+    imm = InteractingMultipleModel([one, one], [[0.8, 0.2], [0.4, 0.6]])
+    np.testing.assert_allclose(imm.weights, [2 / 3, 1 / 3])
+    a, b = start, imm.start(start)
+    for k in range(4):
+        z = RADAR.measure(start.mean[:, :3] + k * start.mean[:, 3:]) + 1e-3
+        a, b = one.predict(a, 1.0), imm.predict(b, 1.0)
+        np.testing.assert_allclose(imm.expected(b, RADAR).covariance, one.expected(a, RADAR).covariance, rtol=1e-9)
+        u, w = one.update(a, z, RADAR), imm.update(b, z, RADAR)
+        np.testing.assert_allclose(u.nis, w.nis, rtol=1e-9)
+        a, b = u.state, w.state
+    np.testing.assert_allclose(b.mean, a.mean, rtol=1e-12)
+    np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-8, atol=1e-6)
+    assert np.array_equal(b[1:3].weights, b.weights[1:3])
+
+
+def batch_least_squares(start, motion, sensor, measured, dt):
+    """All states of one target from the whole normal equations, means and covariances."""
+    F, Q = (one[0] for one in motion.matrices(dt))
+    n, K = motion.dim, len(measured)
+    A, b = np.zeros((n * (K + 1), n * (K + 1))), np.zeros(n * (K + 1))
+    W, V, R = np.linalg.inv(start.covariance[0]), np.linalg.inv(Q), np.linalg.inv(sensor.covariance)
+    A[:n, :n] += W
+    b[:n] += W @ start.mean[0]
+    H = np.eye(sensor.dim, n)
+    for k in range(K):
+        i, j = slice(n * k, n * k + n), slice(n * k + n, n * k + 2 * n)
+        A[i, i] += F.T @ V @ F
+        A[i, j] -= F.T @ V
+        A[j, i] -= V @ F
+        A[j, j] += V + H.T @ R @ H
+        b[j] += H.T @ R @ measured[k]
+    P = np.linalg.inv(A)
+    return (P @ b).reshape(-1, n), P
+
+
+@pytest.mark.parametrize("kind", ["kalman", "ekf", "ukf", "imm", "fuzzy"])
+def test_smoothing_is_batch_least_squares(kind):
+    rng = np.random.default_rng(2)
+    motion = ConstantVelocity(2.0, kind="continuous")
+    filter_ = {
+        "kalman": lambda: KalmanFilter(motion),
+        "ekf": lambda: ExtendedKalmanFilter(motion),
+        "ukf": lambda: UnscentedKalmanFilter(motion),
+        "imm": lambda: InteractingMultipleModel([KalmanFilter(motion)] * 2, [[0.9, 0.1], [0.2, 0.8]]),
+        "fuzzy": lambda: FuzzyAdaptiveEKF(motion, None),
+    }[kind]()
+    start = random_state(1, rng)
+    z = start.mean[0, :3] + np.arange(1, 7)[:, None] * start.mean[0, 3:] + rng.normal(0, 40, (6, 3))
+    means, P = batch_least_squares(start, motion, PLACE, z, 1.0)
+    smoother = FixedLagSmoother(filter_, 10)
+    window = smoother.start(start)
+    for one in z:
+        window = smoother.predict(window, 1.0)
+        window, _ = smoother.update(window, one[None], PLACE)
+    smoothed = window.smoothed()
+    assert len(smoothed) == 7
+    for k, state in enumerate(smoothed):
+        np.testing.assert_allclose(state.mean[0], means[k], rtol=1e-7, atol=1e-5)
+        part = P[6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
+        np.testing.assert_allclose(state.covariance[0], part, rtol=1e-5, atol=1e-4)
+
+
+def test_smoothing_helps_every_filter_and_keeps_to_its_lag():
+    rng = np.random.default_rng(3)
+    runs = 60
+    F = MOTION.matrices(1.0)[0][0]
+    start = random_state(1, rng)[np.zeros(runs, dtype=int)]
+    truth = [start.mean + rng.standard_normal((runs, 6)) @ np.linalg.cholesky(start.covariance[0]).T]
+    root = np.kron(np.array([[0.5], [1.0]]), np.eye(3)) * 2.0
+    for _ in range(12):
+        truth.append(truth[-1] @ F.T + rng.standard_normal((runs, 3)) @ root.T)
+    z = [RADAR.measure(x[:, :3]) + rng.standard_normal((runs, 3)) * RADAR.noise for x in truth]
+    imm = InteractingMultipleModel(
+        [ExtendedKalmanFilter(Padded(MOTION, 0.01)), ExtendedKalmanFilter(CoordinatedTurn(2.0, 0.01))],
+        [[0.9, 0.1], [0.1, 0.9]],
+    )
+    for filter_ in (
+        ExtendedKalmanFilter(MOTION),
+        ModifiedEKF(MOTION),
+        EnsembleKalmanFilter(MOTION, 200, 5),
+        FuzzyAdaptiveEKF(MOTION, paper_rules(), immediate=True),
+        imm,
+    ):
+        first = start
+        if filter_.motion.dim == 7:
+            P = np.zeros((runs, 7, 7))
+            P[:, :6, :6], P[:, 6, 6] = start.covariance, 1e-4
+            first = Gaussian(np.concatenate([start.mean, np.zeros((runs, 1))], axis=1), P)
+        smoother = FixedLagSmoother(filter_, 3)
+        window = smoother.start(first)
+        past = []
+        for k in range(1, 13):
+            window = smoother.predict(window, 1.0)
+            # a step without a measurement belongs to it
+            if k != 6:
+                window, _ = smoother.update(window, z[k], RADAR)
+            past.append(window.state.mean[:, :3])
+        smoothed = window.smoothed()
+        assert len(smoothed) == 4
+        better = ((smoothed[0].mean[:, :3] - truth[9][:, :3]) ** 2).sum(axis=1).mean()
+        assert better < 0.9 * ((past[8] - truth[9][:, :3]) ** 2).sum(axis=1).mean()
+
+
+def test_a_large_ensemble_is_a_kalman_filter():
+    start = random_state(1, np.random.default_rng(4))
+    kalman, enkf = KalmanFilter(MOTION), EnsembleKalmanFilter(MOTION, 100_000, 7)
+    a, b = start, enkf.start(start)
+    z = start.mean[:, :3] + 30.0
+    a, b = kalman.predict(a, 1.0), enkf.predict(b, 1.0)
+    np.testing.assert_allclose(
+        enkf.expected(b, PLACE).covariance, kalman.expected(a, PLACE).covariance, rtol=0.05, atol=100
+    )
+    u, w = kalman.update(a, z, PLACE), enkf.update(b, z, PLACE)
+    scale = np.sqrt(np.diag(u.state.covariance[0]))
+    assert np.abs((u.state.mean - w.state.mean)[0] / scale).max() < 0.02
+    assert np.abs((u.state.covariance - w.state.covariance)[0] / np.outer(scale, scale)).max() < 0.03
+    assert w.log_likelihood[0] == pytest.approx(u.log_likelihood[0], abs=0.05)
+
+
+def test_one_seed_one_ensemble():
+    start = random_state(2, np.random.default_rng(5))
+    z = RADAR.measure(start.mean[:, :3])
+
+    def run(seed):
+        one = EnsembleKalmanFilter(MOTION, 50, seed)
+        return one.update(one.predict(one.start(start), 1.0), z, RADAR).state.members
+
+    assert np.array_equal(run(1), run(1))
+    assert not np.array_equal(run(1), run(2))
+
+
+def test_coordinated_turn_against_integration():
+    state = np.array([[1e3, 2e3, 3e3, 120.0, -80.0, 5.0, 0.07], [0, 0, 0, 10.0, 20.0, 1.0, 1e-7]])
+    turn = CoordinatedTurn(1.0, 0.01)
+    for row, moved in zip(state, turn.propagate(state, 3.0), strict=True):
+        w = row[6]
+        flow = solve_ivp(lambda _, y, w=w: [*y[3:6], -w * y[4], w * y[3], 0.0], (0, 3), row[:6], rtol=1e-11, atol=1e-9)
+        np.testing.assert_allclose(moved[:6], flow.y[:, -1], rtol=1e-8)
+    numeric = differences(lambda x: turn.propagate(x, 3.0), state)
+    np.testing.assert_allclose(turn.jacobian(state, 3.0), numeric, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("model", [ConstantVelocity, ConstantAcceleration])
+def test_continuous_noise_adds_up_over_steps(model):
+    motion = model(1.5, kind="continuous")
+    F, Q = (one[0] for one in motion.matrices(0.4))
+    both = F @ Q @ F.T + Q
+    np.testing.assert_allclose(motion.matrices(0.8)[1][0], both, rtol=1e-12, atol=1e-15)
+
+
+def test_discrete_noise_is_the_papers():
+    dt = 0.5
+    F, Q = (one[0] for one in ConstantAcceleration(2.0, dimensions=2).matrices(dt))
+    G = np.kron(np.array([[dt**2 / 2], [dt], [1.0]]), np.eye(2))
+    np.testing.assert_allclose(Q, 4.0 * G @ G.T)
+    assert F[0, 2] == dt and F[0, 4] == dt**2 / 2 and F[2, 4] == dt
+
+
+def test_the_aircraft_is_the_papers():
+    motion = UnmannedAircraft(3000.0, 0.03, np.eye(4))
+    state = np.array([[0.1, 272.0, 5.0, 150.0]])
+    g, v, _, h = state[0]
+    rho = 3.312e-9 * h**2 - 1.142e-4 * h + 1.224
+    a = 0.03
+    D = 0.5 * (-1.9431 * a**2 - 0.1499 * a + 0.2359) * rho * v**2 * 0.3376
+    L = 0.5 * rho * v**2 * 0.3376 * 21.9 * a
+    dt = 0.0167
+    expected = [
+        g + dt * (((3000 - D) * np.sin(a) + L * np.cos(a)) / (1005 * v) - 9.81 * np.cos(g) / v),
+        v + dt * (((3000 - D) * np.cos(a) - L * np.sin(a)) / 1005 - 9.81 * np.sin(g)),
+        5.0 + dt * v * np.cos(g),
+        h + dt * v * np.sin(g),
+    ]
+    np.testing.assert_allclose(motion.propagate(state, dt)[0], expected, rtol=1e-13)
+    numeric = differences(lambda x: motion.propagate(x, dt), state)
+    np.testing.assert_allclose(motion.jacobian(state, dt), numeric, rtol=1e-7, atol=1e-7)
+    with pytest.raises(InvalidInputError, match="attack"):
+        UnmannedAircraft(3000.0, float("nan"), np.eye(4))
+    seen = LinearMeasurement(np.eye(4)[[2]], np.eye(1))
+    done = ExtendedKalmanFilter(motion).update(Gaussian(state, np.eye(4)), np.array([[6.0]]), seen)
+    assert done.state.mean[0, 2] == pytest.approx(5.5)
+
+
+def test_consistency_of_an_exact_filter():
+    low, high = bounds(6, 200)
+    assert low < 6 < high
+    state = random_state(1, np.random.default_rng(8))[np.zeros(200, dtype=int)]
+    L = np.linalg.cholesky(state.covariance[0])
+    truth = state.mean + np.random.default_rng(9).standard_normal((200, 6)) @ L.T
+    assert low < nees(state, truth).mean() < high
+    with pytest.raises(InvalidInputError, match="truth must have shape"):
+        nees(state, truth[:3])
