@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
 RESAMPLES = 2000
+_MOST_NUMBERS = 10_000_000
 
 
 def mean_interval(
@@ -44,10 +47,7 @@ def mean_interval(
     share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
     if not share.any():
         return np.nan, np.nan
-    rng = np.random.default_rng(seed)
-    rows, columns = values.shape
-    of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples).astype(float)
-    of_columns = rng.multinomial(columns, np.full(columns, 1 / columns), resamples).astype(float)
+    of_rows, of_columns = _draws(*values.shape, resamples, seed)
     # from the middle of the values, so that large equal numbers give an interval of no width
     middle = weighted_mean(values, weights)
     away = np.where(share > 0, values - middle, 0.0)
@@ -72,11 +72,20 @@ def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0
     -------
     array, shape (resamples, settings)
     """
-    rng = np.random.default_rng(seed)
     _, rows, columns = tables.shape
-    of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples) / rows
-    of_columns = rng.multinomial(columns, np.full(columns, 1 / columns), resamples) / columns
-    return np.stack([((of_rows @ table) * of_columns).sum(axis=1) for table in tables], axis=1)
+    of_rows, of_columns = _draws(rows, columns, resamples, seed)
+    weights = of_columns / (rows * columns)
+    return np.stack([((of_rows @ table) * weights).sum(axis=1) for table in tables], axis=1)
+
+
+@lru_cache(maxsize=8)
+def _draws(rows: int, columns: int, resamples: int, seed: int) -> tuple[Floats, Floats]:
+    """How often each row and each column is drawn, for each resample."""
+    rng = np.random.default_rng(seed)
+    resamples = max(200, min(resamples, _MOST_NUMBERS // max(rows, columns)))
+    of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples).astype(float)
+    of_columns = rng.multinomial(columns, np.full(columns, 1 / columns), resamples).astype(float)
+    return of_rows, of_columns
 
 
 def weighted_mean(values: Floats, weights: Floats | None = None) -> float:
