@@ -150,7 +150,10 @@ def _watched(folder: str) -> Iterator[Any]:
         _state["message"] = _farewell(folder, last)
         try:
             yield progress
-        except KeyboardInterrupt:
+        except BaseException as error:
+            # a library may meet the interrupt with an error of its own
+            if not (isinstance(error, KeyboardInterrupt) or _state["interrupted"]):
+                raise
             bar.close()
             print(_state["message"], file=sys.stderr)
             sys.stderr.flush()
@@ -162,7 +165,7 @@ def _farewell(folder: str, last: list[Counts]) -> str:
     return f"assoc.sweep: interrupted; {kept} kept in {folder}; the same command goes on from there"
 
 
-_state: dict[str, str] = {"message": "assoc.sweep: interrupted"}
+_state: dict[str, str] = {"message": "assoc.sweep: interrupted", "interrupted": ""}
 
 
 def _stop_on_interrupt() -> None:
@@ -175,6 +178,14 @@ def _stop_on_interrupt() -> None:
     if not hasattr(signal, "pthread_sigmask") or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         return
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+    def interrupt(*_: object) -> None:
+        # once: a second one would come in the middle of cleaning up
+        if not _state["interrupted"]:
+            _state["interrupted"] = "yes"
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
 
     def watch() -> None:
         signal.sigwait({signal.SIGINT})
