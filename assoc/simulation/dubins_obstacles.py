@@ -158,7 +158,9 @@ def _shortest_route(touches: list[_Touch], radius: float, circles: Array) -> lis
                     if i != j:
                         lengths[i, j] = min(lengths[i, j], _arc(touches[i], touches[j], radius, circles)[0])
     lengths[~np.isfinite(lengths)] = 0.0
-    far, before = dijkstra(csr_matrix(lengths), indices=0, return_predecessors=True)
+    # one source as an array: the stubs know no scalar
+    distances, predecessors = dijkstra(csr_matrix(lengths), True, np.array([0]), return_predecessors=True)
+    far, before = distances[0], predecessors[0]
     if not np.isfinite(far[1]):
         return None
     order = [1]
