@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from statistics import median
 
+from experiments.benchmarks.families import cases
 from experiments.benchmarks.goals import Results, judge
 from experiments.benchmarks.rows import Row
 
@@ -53,11 +54,23 @@ def render(rows: Sequence[Row], minutes: float | None, command: str) -> str:
     command : str
         How to repeat it.
     """
-    parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW, "", "## Goals", "", _goals(rows)]
+    parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW]
+    missing = _missing(rows)
+    if missing:
+        parts += ["", f"**Not in these rows** (not run): {missing}."]
+    parts += ["", "## Goals", "", _goals(rows)]
     results = Results(rows)
     for family in dict.fromkeys(row.family for row in rows):
         parts += ["", f"## {family}", "", ABOUT.get(family, ""), "", _table(results, family)]
     return "\n".join(parts) + "\n"
+
+
+def _missing(rows: Sequence[Row]) -> str:
+    """Sizes of families of the full run that no row is about."""
+    there = {(row.family, row.size) for row in rows}
+    families = {row.family for row in rows}
+    absent = [f"{case.family} {case.size}" for case in cases() if (case.family, case.size) not in there]
+    return ", ".join(absent + [family for family in ("scale", "kbest") if family not in families])
 
 
 def _preface(minutes: float | None, command: str) -> str:
