@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from assoc.scene import Scene
     from assoc.solution import Solution
     from assoc.solvers.front import assign
+    from assoc.solvers.kbest import kbest
 
 __version__ = "0.1.0"
 
@@ -33,6 +34,7 @@ __all__ = [
     "assign",
     "associate",
     "build_problem",
+    "kbest",
     "solvers",
     "sweeps",
 ]
@@ -45,6 +47,7 @@ _HOME = {
     "assign": "assoc.solvers.front",
     "associate": "assoc.association",
     "build_problem": "assoc.costs",
+    "kbest": "assoc.solvers.kbest",
 }
 
 

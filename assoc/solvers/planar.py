@@ -1,0 +1,49 @@
+"""The k best of problems with two sensors, by Murty's algorithm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assoc.problem import AssignmentProblem
+from assoc.solvers.complete import Complete, distinct_columns, priced, slack_of
+from assoc.solvers.deepening import Found
+from assoc.solvers.feasibility import infeasible
+from assoc.solvers.murty import Murty
+from assoc.solvers.packing import prepare
+from assoc.solvers.run import Run
+
+
+def rank_planar(problem: AssignmentProblem, k: int, run: Run) -> tuple[Complete, Found]:
+    """Return the columns of a problem with two sensors and its k lightest solutions.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution.
+    """
+    rows, weights, origin = distinct_columns(problem)
+    slack = slack_of(problem)
+    n, m = (int(size) for size in problem.sizes)
+    # Murty's rows are the sensor with fewer measurements: they have fewer choices to split by
+    own, other = rows[:, 0], rows[:, 1] - np.int32(n)
+    own_alone, other_alone = slack[:n], slack[n:]
+    turned = n > m
+    if turned:
+        own, other, own_alone, other_alone = other, own, other_alone, own_alone
+    murty = Murty(
+        np.ascontiguousarray(own),
+        np.ascontiguousarray(other),
+        weights,
+        np.ascontiguousarray(own_alone),
+        np.ascontiguousarray(other_alone),
+        k,
+    )
+    prepared = prepare(problem)
+    if not murty.feasible:
+        raise infeasible(prepared.packing)
+    while not murty.done and not run.should_stop():
+        murty.run(2000)
+    u, v = murty.duals
+    duals = np.concatenate([v, u] if turned else [u, v])
+    columns = priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
+    return columns, Found([murty.edges(place) for place in range(murty.num_found)], murty.rest, murty.evaluations)
