@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from assoc.solvers.complete import Complete
 from assoc.solvers.feasibility import infeasible
+from assoc.solvers.merging import merge
 from assoc.solvers.packing import Packing
-from assoc.solvers.ranking import FIRST_BUDGET, ComponentRanking, merge, rank_components
+from assoc.solvers.ranking import FIRST_BUDGET, ComponentRanking, rank_components
 from assoc.solvers.run import Run
 
 Floats = NDArray[np.float64]
@@ -155,8 +156,8 @@ class Deepening:
             lists.weights.append(weights[own])
             lists.columns.append([columns[pointer[i] : pointer[i + 1]] for i in range(start[c], start[c + 1])])
             lists.proven.append(float(proven[c]))
-        for c in np.flatnonzero(np.isneginf(proven)):
-            self._branch(packing, duals, int(c), room, lists)
+        for index in np.flatnonzero(np.isneginf(proven)):
+            self._branch(packing, duals, int(index), room, lists)
         return lists
 
     def _branch(self, packing: Packing, duals: Floats, c: int, room: float, lists: _Lists) -> None:

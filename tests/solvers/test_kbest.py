@@ -14,8 +14,9 @@ from assoc.solvers.bounds import dual_bound
 from assoc.solvers.complete import complete
 from assoc.solvers.front import assign
 from assoc.solvers.kbest import kbest
+from assoc.solvers.merging import merge
 from assoc.solvers.murty import Murty
-from assoc.solvers.ranking import ComponentRanking, merge
+from assoc.solvers.ranking import ComponentRanking
 from assoc.solvers.run import Run
 from experiments.instances.synthetic import axial_random, planar_random
 from tests.oracles import (
