@@ -195,7 +195,9 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     """
     best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
     traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
-    traces = traces.assign(excess=traces["cost"] - traces["best"])
+    excess = traces["cost"] - traces["best"]
+    # what rounding leaves is no excess
+    traces = traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
     summary = summarize(frame).sort_values(["gap", "time"], kind="stable")
     names = varied(frame)
     several = frame["solver"].nunique() > 1
@@ -216,7 +218,8 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("mean cost above the best known")
     axes[0].set_yscale("symlog", linthresh=1e-3)
-    axes[0].set_ylim(bottom=0)
+    # where all settings find the best at once the curves lie on the axis, which still needs a height
+    axes[0].set_ylim(-1e-4, None if traces["excess"].max() > 0.0 else 1e-2)
     handles, labels = axes[1].get_legend_handles_labels()
     axes[1].legend(handles[::-1], labels[::-1], fontsize=7)
     return figure
