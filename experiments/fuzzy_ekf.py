@@ -94,7 +94,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
 
 def draw(figure: Any, shown: Any) -> None:
     """Draw the error over time for each scenario, turns shaded."""
-    panels = figure.subplots(1, len(shown), sharey=True)
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for panel, (name, results) in zip(panels, shown.items(), strict=True):
         for label, squared in results.items():
             panel.plot(np.arange(2, len(squared) + 2), np.sqrt(squared.mean(axis=1)), label=label, linewidth=1.2)
