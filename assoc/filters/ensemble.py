@@ -169,4 +169,6 @@ def _lower_roots(Q: Array) -> Array:
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     # Q = root root' = (R' R) with the triangular R of root' = q R
     lower: Array = np.linalg.qr(root.transpose(0, 2, 1))[1].transpose(0, 2, 1)
+    # entries that are rounding errors cost time in the kernel
+    lower[np.abs(lower) < 1e-14 * np.abs(lower).max(axis=(1, 2), keepdims=True)] = 0.0
     return np.ascontiguousarray(lower)

@@ -300,13 +300,15 @@ def ensemble_update(
             log_det += 2.0 * math.log(L[a, a])
         nis[b] = square
         ll[b] = -0.5 * (square + log_det + d * LOG_TURN)
+        # C becomes the gain
+        for i in range(n):
+            solve_in_place(L, d, C[i])
         for s in range(N):
             for a in range(d):
                 total = v[b, a] + mu[a] - h[s, a]
                 for e in range(a + 1):
                     total += LR[a, e] * shocks[b, s, e]
                 w[a] = total
-            solve_in_place(L, d, w)
             for i in range(n):
                 total = members[b, s, i]
                 for a in range(d):
