@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from assoc.solution import Solution
     from assoc.solvers.front import assign
     from assoc.solvers.kbest import kbest
+    from assoc.solvers.marginals import marginals
 
 __version__ = "0.1.0"
 
@@ -35,6 +36,7 @@ __all__ = [
     "associate",
     "build_problem",
     "kbest",
+    "marginals",
     "solvers",
     "sweeps",
 ]
@@ -48,6 +50,7 @@ _HOME = {
     "associate": "assoc.association",
     "build_problem": "assoc.costs",
     "kbest": "assoc.solvers.kbest",
+    "marginals": "assoc.solvers.marginals",
 }
 
 

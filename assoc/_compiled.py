@@ -23,15 +23,16 @@ _PACKAGE = Path(__file__).resolve().parent
 
 @cache
 def _source_stamp(solvers: bool) -> str:
-    """Digest of names, sizes and times of all files with kernels, of the solvers or of the other rooms.
+    """Digest of names and contents of all files with kernels, of the solvers or of the other rooms.
 
-    The solvers know no other room, so that a change elsewhere leaves their kernels as they are.
+    The solvers know no other room, so that a change elsewhere leaves their kernels as they are. Contents
+    rather than times: a copied or checked-out tree keeps its compiled kernels.
     """
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*.py")):
-        if (path.parent.name == "solvers") == solvers and b"njit" in path.read_bytes():
-            status = path.stat()
-            digest.update(f"{path.relative_to(_PACKAGE)} {status.st_size} {status.st_mtime_ns}\n".encode())
+        content = path.read_bytes()
+        if (path.parent.name == "solvers") == solvers and b"njit" in content:
+            digest.update(f"{path.relative_to(_PACKAGE)} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

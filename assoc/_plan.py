@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.solution import Solution
 from assoc.solvers.front import assign
+from assoc.solvers.kbest import checked_k, kbest
 from assoc.solvers.registry import make_parameters
 
 
@@ -31,6 +32,8 @@ class Plan:
         As in ``associate``.
     gating : mapping
         Options of ``assoc.build_problem``.
+    kbest : int, optional
+        Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
     """
 
     sources: Sequence[Scene | AssignmentProblem]
@@ -39,15 +42,20 @@ class Plan:
     time_limit: float | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     gating: Mapping[str, Any] = field(default_factory=dict)
+    kbest: int | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
             raise InvalidInputError(f"seed: expected a whole number >= 0, got {self.seed!r}")
+        if self.kbest is not None:
+            checked_k(self.kbest)
         self.all_parameters  # noqa: B018  (refuses what is wrong now, not in the first scan)
 
     @property
     def all_parameters(self) -> dict[str, Any]:
         """The parameters given and the defaults of the others."""
+        if self.kbest is not None:
+            return {"k": self.kbest}
         chosen: Any = make_parameters(self.solver, self.parameters)
         return {one.name: getattr(chosen, one.name) for one in fields(chosen)}
 
@@ -55,15 +63,17 @@ class Plan:
         """Associate scan ``item[1]`` of source ``item[0]``."""
         source = self.sources[item[0]]
         if isinstance(source, AssignmentProblem):
-            return _of_problem(source, self._assign(source, self.seed))
+            return _best([_of_problem(source, one) for one in self._solve(source, self.seed)], self.kbest)
         # a seed of its own for each scan, whichever process solves it and whatever was solved before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(item[1],))
         scan = source.scan(item[1])
         problem = build_problem(source, scan, **self.gating)
-        return _of_scan(source, scan, problem, self._assign(problem, seed))
+        return _best([_of_scan(source, scan, problem, one) for one in self._solve(problem, seed)], self.kbest)
 
-    def _assign(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> Solution:
-        return assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)
+    def _solve(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> list[Solution]:
+        if self.kbest is not None:
+            return kbest(problem, self.kbest, time_limit=self.time_limit)
+        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)]
 
     def items(self) -> list[tuple[int, int]]:
         """All scans of all sources, as (source, scan)."""
@@ -78,7 +88,13 @@ class Plan:
 
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""
-        return Association(tuple(scans), self.solver, self.all_parameters, int(self.seed))
+        name = self.solver if self.kbest is None else "kbest"
+        return Association(tuple(scans), name, self.all_parameters, int(self.seed))
+
+
+def _best(scans: list[ScanAssociation], k: int | None) -> ScanAssociation:
+    """Return the first of ranked associations, which carries all of them where they were asked for."""
+    return scans[0] if k is None else replace(scans[0], ranked=tuple(scans))
 
 
 def _targets(problem: AssignmentProblem, solution: Solution) -> NDArray[np.int32]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from assoc.association import ScanAssociation
 
@@ -23,14 +23,18 @@ def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[s
         The file of each scan; shown only if there are several.
     """
     several = len(set(files)) > 1
+    ranked = any(scan.ranked for scan in scans)
     truth = any(scan.true_tuples is not None for scan in scans)
     headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
+    if ranked:
+        headers.insert(headers.index("scan") + 1, "rank")
     cells = []
-    for scan, file in zip(scans, files, strict=True):
+    for scan, file, rank in _lines(scans, files):
         solution = scan.solution
         row = [file] if several else []
         row += [
             str(scan.scan),
+            *([str(rank)] if ranked else []),
             " ".join(map(str, scan.sizes)),
             str(len(scan.targets)),
             str(scan.false_alarms),
@@ -44,6 +48,15 @@ def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[s
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
     return headers, cells
+
+
+def _lines(
+    scans: Sequence[ScanAssociation], files: Sequence[str]
+) -> Iterator[tuple[ScanAssociation, str, int]]:
+    """One line for each scan, or for each of its ranked associations: association, file, rank."""
+    for scan, file in zip(scans, files, strict=True):
+        for place, one in enumerate(scan.ranked or (scan,), start=1):
+            yield one, file, place
 
 
 def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
@@ -72,18 +85,19 @@ def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
 
 def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
+    ranked = any(scan.ranked for scan in scans)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
-        ["file", "scan", "time", "sizes", "targets", "false_alarms", "cost", "lower_bound", "gap", "status"]
-        + ["runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
+        ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
+        + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
     )
-    for scan, file in zip(scans, files, strict=True):
+    for scan, file, rank in _lines(scans, files):
         solution = scan.solution
         sizes = " ".join(map(str, scan.sizes))
         writer.writerow(
-            [file, scan.scan, scan.time, sizes, len(scan.targets), scan.false_alarms, solution.cost]
-            + [solution.lower_bound, solution.gap, solution.status, solution.runtime, solution.stopped_by]
-            + [solution.iterations, scan.true_tuples, scan.correct_tuples]
+            [file, scan.scan, *([rank] if ranked else []), scan.time, sizes, len(scan.targets), scan.false_alarms]
+            + [solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
+            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples]
         )
     return text.getvalue()

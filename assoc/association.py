@@ -47,6 +47,8 @@ class ScanAssociation:
         Targets that at least two sensors detected; None where the truth is not known.
     correct_tuples : int or None
         Those of them whose measurements, all of them and no other, form a chosen tuple.
+    ranked : tuple of ScanAssociation
+        The k best associations of the scan, this one first; empty where they were not asked for.
     """
 
     scan: int
@@ -58,6 +60,7 @@ class ScanAssociation:
     covariances: NDArray[np.float64] | None = None
     true_tuples: int | None = None
     correct_tuples: int | None = None
+    ranked: tuple[ScanAssociation, ...] = ()
 
     @property
     def false_alarms(self) -> int:
@@ -81,7 +84,7 @@ class ScanAssociation:
         if self.positions is not None and self.covariances is not None:
             for entry, place, spread in zip(targets, self.positions, self.covariances, strict=True):
                 entry.update(position=place.tolist(), covariance=spread.tolist())
-        return {
+        content = {
             "scan": self.scan,
             "time": self.time,
             "sizes": list(self.sizes),
@@ -93,6 +96,11 @@ class ScanAssociation:
             "targets": targets,
             "runtime": solution.runtime,
         }
+        if self.ranked:
+            content["ranked"] = [
+                {"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)
+            ]
+        return content
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from assoc.scene import Scene
 
 DEFAULT_SOLVER = "exact"
-_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples")
+_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,6 +53,8 @@ def _solve(words: list[str]) -> None:
     settings = {**{key: config[key] for key in _SETTINGS if key in config}, **_common(parsed)}
     parameters = {**_section(config, solver, choices), **given(choices, parsed)}
     registry.make_parameters(solver, parameters)
+    if "kbest" in settings and (explicit or parameters):
+        raise InvalidInputError("--kbest: ranks by itself and takes no --solver and no parameters of solvers")
     files = parsed["files"]
     _check_outputs([path for path in (parsed["json"], parsed["csv"]) if path], files)
 
@@ -101,6 +103,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--time-limit", metavar="S", help="seconds for each scan; then the best solution found is taken")
     add("--jobs", metavar="N", help="number of processes (default 1)")
     add("--scans", metavar="A:B", help="scans A to B-1, counted from 0; A alone is one scan")
+    add("--kbest", metavar="K", help="the K best associations of each scan, truly ranked")
     add("--json", metavar="FILE", help="write the result as JSON")
     add("--csv", metavar="FILE", help="write the table as CSV")
     add(
@@ -145,6 +148,8 @@ def _common(parsed: dict[str, Any]) -> dict[str, Any]:
             raise InvalidInputError(
                 f"--gate-probability: expected a number, got {parsed['gate_probability']!r}"
             ) from None
+    if parsed["kbest"] is not None:
+        found["kbest"] = whole_number(parsed["kbest"], "--kbest", 1)
     if parsed["max_tuples"] is not None:
         found["max_tuples"] = whole_number(parsed["max_tuples"], "--max-tuples", 1)
     return found
@@ -251,7 +256,13 @@ def _plan(
         key: settings[key] for key in ("gate_probability", "max_tuples") if key in settings
     }
     plan = Plan(
-        tuple(sources), solver, settings.get("seed", 0), settings.get("time_limit"), parameters, gating
+        tuple(sources),
+        solver,
+        settings.get("seed", 0),
+        settings.get("time_limit"),
+        parameters,
+        gating,
+        settings.get("kbest"),
     )
     items = plan.items()
     if "scans" in settings:

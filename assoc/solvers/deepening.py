@@ -84,7 +84,7 @@ class Deepening:
         while True:
             excess = float(steps[place]) if place < steps.size else np.inf
             found = self._round(excess)
-            if len(found.chosen) > len(best.chosen) or (not best.chosen and found.rest > best.rest):
+            if (len(found.chosen), found.rest) > (len(best.chosen), best.rest):
                 best = found
             best.nodes = self._nodes
             if len(best.chosen) >= self._k or excess == np.inf or self._run.should_stop():

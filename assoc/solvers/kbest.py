@@ -91,14 +91,13 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
     started = time.perf_counter()
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
-    if not isinstance(k, (int, np.integer)) or isinstance(k, bool) or k < 1:
-        raise InvalidInputError(f"k: expected a whole number >= 1, got {k!r}")
+    k = checked_k(k)
     run = Run(np.random.default_rng(0), time_limit=_limit(time_limit), started=started)
     if problem.num_sensors == 2:
-        columns, found = rank_planar(problem, int(k), run)
+        columns, found = rank_planar(problem, k, run)
     else:
         columns = complete(problem, run)
-        found = Deepening(columns, int(k), run).run()
+        found = Deepening(columns, k, run).run()
     # weights are differences of costs: what they lose to rounding is taken off the bounds
     rounding = 8.0 * float(
         np.finfo(float).eps
@@ -110,7 +109,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
     )
     rest = found.rest + columns.offset - rounding
     if not found.chosen:
-        return Ranking([_unproved(problem, rest, int(k), run)], rest, columns)
+        return Ranking([_unproved(problem, rest, k, run)], rest, columns)
     answers = _in_order(problem, [columns.indices(own) for own in found.chosen])
     runtime = run.elapsed()
     solutions = [
@@ -123,11 +122,24 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
             iterations=found.nodes,
             runtime=runtime,
             stopped_by=run.stopped_by or "converged",
-            parameters={"k": int(k), "rank": place + 1},
+            parameters={"k": k, "rank": place + 1},
         )
         for place, (cost, indices) in enumerate(answers)
     ]
     return Ranking(solutions, rest, columns)
+
+
+def checked_k(k: object) -> int:
+    """Return a number of solutions wanted as an int.
+
+    Raises
+    ------
+    InvalidInputError
+        It is not a whole number >= 1.
+    """
+    if not isinstance(k, (int, np.integer)) or isinstance(k, bool) or k < 1:
+        raise InvalidInputError(f"k: expected a whole number >= 1, got {k!r}")
+    return int(k)
 
 
 def _in_order(problem: AssignmentProblem, chosen: list[NDArray[np.intp]]) -> list[tuple[float, NDArray[np.intp]]]:

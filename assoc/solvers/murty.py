@@ -363,9 +363,9 @@ def _advance(
             if exact == 0:
                 continue
         counts[0] += 1
-        if counts[0] < k:
-            worst = min(limits[1], -best[0] if counts[2] >= k else np.inf)
-            counts[1] = open_children(
-                node, worst, costs, rows, columns, index, row_alone, column_alone, edge_of, u, v, order, fixed,
-                node_cost, taboo_row, taboo_column, heap_key, heap_item, counts[1], limits,
-            )  # fmt: skip
+        # also those of the k-th solution: what they cost bounds the rest
+        worst = min(limits[1], -best[0] if counts[2] >= k else np.inf)
+        counts[1] = open_children(
+            node, worst, costs, rows, columns, index, row_alone, column_alone, edge_of, u, v, order, fixed,
+            node_cost, taboo_row, taboo_column, heap_key, heap_item, counts[1], limits,
+        )  # fmt: skip

@@ -13,7 +13,7 @@ from assoc.solvers import deepening
 from assoc.solvers.bounds import dual_bound
 from assoc.solvers.complete import complete
 from assoc.solvers.front import assign
-from assoc.solvers.kbest import kbest
+from assoc.solvers.kbest import kbest, rank
 from assoc.solvers.merging import merge
 from assoc.solvers.murty import Murty
 from assoc.solvers.ranking import ComponentRanking
@@ -37,7 +37,12 @@ def check(problem, k):
         with pytest.raises(InfeasibleError):
             kbest(problem, k)
         return 0
-    found = kbest(problem, k)
+    ranking = rank(problem, k, None)
+    found = ranking.solutions
+    if k < len(expected):
+        assert expected[k - 1].cost - 1e-9 <= ranking.rest <= expected[k].cost + 1e-12
+    elif k > len(expected):
+        assert ranking.rest == np.inf
     costs = [check_answer(problem, solution.tuples) for solution in found]
     scale = max(1.0, float(np.abs(problem.costs).sum()))
     assert len(found) == min(k, len(expected))
