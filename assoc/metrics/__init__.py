@@ -1,0 +1,36 @@
+"""How good tracks and associations are, against the truth."""
+
+from __future__ import annotations
+
+from assoc.metrics.association_accuracy import AssociationAccuracy, association_accuracy
+from assoc.metrics.ct_mt_it import CtMtIt, ct_mt_it
+from assoc.metrics.gospa import Gospa, gospa, gospa_over_time, mean_gospa
+from assoc.metrics.identity import Identity, identity, label_switches
+from assoc.metrics.ospa import Ospa, ospa, ospa_over_time
+from assoc.metrics.ospa2 import ospa2
+from assoc.metrics.rmse import rmse, track_rmse
+from assoc.metrics.summary import Summary, summarise
+from assoc.metrics.trajectories import Trajectories
+
+__all__ = [
+    "AssociationAccuracy",
+    "CtMtIt",
+    "Gospa",
+    "Identity",
+    "Ospa",
+    "Summary",
+    "Trajectories",
+    "association_accuracy",
+    "ct_mt_it",
+    "gospa",
+    "gospa_over_time",
+    "identity",
+    "label_switches",
+    "mean_gospa",
+    "ospa",
+    "ospa2",
+    "ospa_over_time",
+    "rmse",
+    "summarise",
+    "track_rmse",
+]

@@ -1,0 +1,114 @@
+"""Correct, maintained and non-existing target rates of radar plots: CT, MT and IT."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MEMORY = 6
+"""A track's identity is the majority of its last plots, of this many."""
+
+
+@dataclass(frozen=True, eq=False)
+class CtMtIt:
+    """Rates of each window and their means, in percent.
+
+    Attributes
+    ----------
+    ct, mt, it : float
+        Means over the windows that have such plots; NaN if none has.
+    windows : int array (K,)
+        The windows, ascending.
+    per_window : array (K, 3)
+        CT, MT, IT of each; NaN where there is nothing to divide by.
+    """
+
+    ct: float
+    mt: float
+    it: float
+    windows: Array
+    per_window: Array
+
+
+def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) -> CtMtIt:
+    """CT, MT and IT of plots that a tracker has given to tracks.
+
+    CT: aircraft plots given to a confirmed track whose identity is that aircraft / aircraft plots. MT: aircraft
+    plots in a confirmed track that also took that aircraft's previous plot / aircraft plots. IT: plots that were
+    given to a track, but not to a confirmed one of their own identity / plots given to a track. A track's identity
+    is the aircraft of most of its last 6 plots, this one included; false plots have no vote, of equals the most
+    recent counts.
+
+    Parameters
+    ----------
+    windows : array_like of int (n,)
+        The window of each plot, in the order in which the tracker took them.
+    sources : array_like of int (n,)
+        The aircraft behind each plot, -1 for a false plot.
+    tracks : array_like of int (n,)
+        The track that took it, -1 if none did.
+    confirmed : array_like of bool (n,)
+        Whether that track was confirmed then, the plot included.
+
+    Returns
+    -------
+    CtMtIt
+    """
+    columns = [np.asarray(value) for value in (windows, sources, tracks, confirmed)]
+    if any(column.shape != (len(columns[0]),) for column in columns):
+        shapes = ", ".join(str(column.shape) for column in columns)
+        raise InvalidInputError(
+            f"windows, sources, tracks and confirmed must have one shape (n,), got {shapes}"
+        )
+    window, source, track, sure = columns
+    recent: dict[int, deque[int]] = {}
+    previous: dict[int, int] = {}
+    correct = np.zeros(len(window), dtype=bool)
+    kept = np.zeros(len(window), dtype=bool)
+    for row in range(len(window)):
+        aircraft, taker = int(source[row]), int(track[row])
+        if taker >= 0:
+            plots = recent.setdefault(taker, deque(maxlen=MEMORY))
+            plots.append(aircraft)
+            correct[row] = aircraft >= 0 and bool(sure[row]) and _majority(plots) == aircraft
+            kept[row] = aircraft >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
+        if aircraft >= 0:
+            previous[aircraft] = taker
+    real, given = source >= 0, track >= 0
+    names, index = np.unique(window, return_inverse=True)
+
+    def count(chosen: Array) -> Array:
+        return np.bincount(index, weights=chosen, minlength=len(names))
+
+    with np.errstate(invalid="ignore"):
+        rates = np.stack(
+            [
+                count(correct) / count(real),
+                count(kept) / count(real),
+                count(given & ~correct) / count(given),
+            ],
+            axis=1,
+        )
+    ct, mt, it = (100.0 * _mean(rate) for rate in rates.T)
+    return CtMtIt(ct, mt, it, names, 100.0 * rates)
+
+
+def _mean(rate: Array) -> float:
+    known = rate[~np.isnan(rate)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _majority(plots: deque[int]) -> int:
+    """The aircraft of most plots, of equals the most recent; -1 if there are only false plots."""
+    votes = Counter(aircraft for aircraft in plots if aircraft >= 0)
+    if not votes:
+        return -1
+    most = max(votes.values())
+    return next(aircraft for aircraft in reversed(plots) if votes.get(aircraft, 0) == most)

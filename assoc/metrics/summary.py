@@ -1,0 +1,70 @@
+"""The metrics of tracks against a truth in one go."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from assoc.metrics.gospa import gospa_over_time, mean_gospa
+from assoc.metrics.identity import Identity, identity
+from assoc.metrics.ospa import ospa_over_time
+from assoc.metrics.ospa2 import ospa2
+from assoc.metrics.rmse import track_rmse
+from assoc.metrics.trajectories import Trajectories
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Means over all instants, metres, and what the identities did.
+
+    Attributes
+    ----------
+    gospa, gospa_localisation, gospa_missed, gospa_false : float
+        Order 2; the parts as distances (see `mean_gospa`).
+    ospa, ospa2 : float
+        Order 1; OSPA(2) over windows of 10 instants.
+    rmse : float
+        Of tracks closer to their target than the cutoff; NaN without any.
+    identity : Identity
+    """
+
+    gospa: float
+    gospa_localisation: float
+    gospa_missed: float
+    gospa_false: float
+    ospa: float
+    ospa2: float
+    rmse: float
+    identity: Identity
+
+    def to_dict(self) -> dict[str, float]:
+        """All values, those of `identity` included, by name."""
+        values = asdict(self)
+        return {**{name: value for name, value in values.items() if name != "identity"}, **values["identity"]}
+
+
+def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summary:
+    """Compare tracks with the truth.
+
+    Parameters
+    ----------
+    truth, tracks : Trajectories
+    cutoff : float
+        Metres: beyond this a track has nothing to do with a target.
+    """
+    _, values = gospa_over_time(truth, tracks, cutoff)
+    parts = mean_gospa(values)
+    means = []
+    for _, distances in (ospa_over_time(truth, tracks, cutoff), ospa2(truth, tracks, cutoff)):
+        means.append(float(np.mean([one.distance for one in distances])) if distances else 0.0)
+    return Summary(
+        gospa=parts["distance"],
+        gospa_localisation=parts["localisation"],
+        gospa_missed=parts["missed"],
+        gospa_false=parts["false"],
+        ospa=means[0],
+        ospa2=means[1],
+        rmse=track_rmse(truth, tracks, cutoff)[0],
+        identity=identity(truth, tracks, cutoff),
+    )

@@ -1,0 +1,131 @@
+"""Truth and tracks in the one form that the metrics take: rows of time, identity and position."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.scene import Scene
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SAME_TIME = 1e-6
+"""Two time stamps that differ by less than about this (s) are one epoch."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectories:
+    """Targets, or tracks, over time.
+
+    Parameters
+    ----------
+    times : array_like (n,)
+        Seconds, in any order.
+    ids : array_like of int (n,)
+        The target or track of each row; each at most once at an instant.
+    positions : array_like (n, d)
+        Metres, in two or three dimensions.
+
+    Raises
+    ------
+    InvalidInputError
+        Shapes that do not agree, values that are not finite, or an identity twice at one instant.
+    """
+
+    times: Array
+    ids: Array
+    positions: Array
+
+    def __post_init__(self) -> None:
+        times = _numbers(self.times, "times")
+        ids = np.asarray(self.ids)
+        if ids.size == 0:
+            ids = ids.astype(np.int64)
+        if times.ndim != 1 or ids.shape != times.shape:
+            raise InvalidInputError(f"times and ids must both have shape (n,), got {times.shape} and {ids.shape}")
+        if ids.dtype.kind not in "iu":
+            raise InvalidInputError(f"ids must be integers, got {ids.dtype}")
+        positions = _numbers(self.positions, "positions")
+        if len(times) == 0 and positions.size == 0:
+            positions = positions.reshape(0, positions.shape[1] if positions.ndim == 2 else 3)
+        if positions.ndim != 2 or len(positions) != len(times) or positions.shape[1] not in (2, 3):
+            raise InvalidInputError(
+                f"positions must have shape ({len(times)}, 2) or ({len(times)}, 3), got {positions.shape}"
+            )
+        order = np.lexsort((ids, times))
+        for name, value in (("times", times), ("ids", ids.astype(np.int64)), ("positions", positions)):
+            value = np.ascontiguousarray(value[order])
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        keys = np.stack([np.round(self.times / SAME_TIME), self.ids.astype(np.float64)], axis=1)
+        unique, counts = np.unique(keys, axis=0, return_counts=True)
+        if len(unique) < len(keys):
+            row = unique[int(np.argmax(counts > 1))]
+            raise InvalidInputError(f"ids: {int(row[1])} is there twice at {row[0] * SAME_TIME:.6g} s")
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Trajectories:
+        """Take the truth of a scene.
+
+        Raises
+        ------
+        InvalidInputError
+            The scene has no truth.
+        """
+        truth = scene.truth
+        if truth is None:
+            raise InvalidInputError("the scene has no truth to compare with")
+        counts = [len(ids) for ids in truth.target_ids]
+        return cls(
+            np.repeat(scene.times, counts), np.concatenate(truth.target_ids), np.concatenate(truth.positions)
+        )
+
+    @property
+    def dim(self) -> int:
+        """Dimensions of a position, 2 or 3."""
+        return int(self.positions.shape[1])
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        span = f", {self.times[0]:g} to {self.times[-1]:g} s" if len(self) else ""
+        return f"Trajectories({len(np.unique(self.ids))} identities, {len(self)} rows{span})"
+
+
+def _numbers(value: object, name: str) -> Array:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{name} must be numbers, got {type(value).__name__}") from error
+    if not np.isfinite(array).all():
+        raise InvalidInputError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+    return array
+
+
+def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, Array, Array]]:
+    """Each instant that either of two knows: its time and the rows of both, earliest first.
+
+    Parameters
+    ----------
+    truth, tracks : Trajectories
+        Of the same dimension (an empty one goes with any).
+
+    Yields
+    ------
+    time : float
+    truth_rows, track_rows : int arrays
+    """
+    if len(truth) and len(tracks) and truth.dim != tracks.dim:
+        raise InvalidInputError(f"positions: the truth has {truth.dim} dimensions, the tracks have {tracks.dim}")
+    ticks = np.round(np.concatenate([truth.times, tracks.times]) / SAME_TIME)
+    order = np.argsort(ticks, kind="stable")
+    for group in np.split(order, np.flatnonzero(np.diff(ticks[order])) + 1):
+        if group.size:
+            own = group < len(truth)
+            time = truth.times[group[0]] if own[0] else tracks.times[group[0] - len(truth)]
+            yield float(time), group[own], group[~own] - len(truth)

@@ -1,0 +1,212 @@
+"""Identity switches, fragmentation, CT/MT/IT and association accuracy on cases small enough to count by hand."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import assoc
+from assoc.errors import InvalidInputError
+from assoc.metrics import (
+    Trajectories,
+    association_accuracy,
+    ct_mt_it,
+    identity,
+    label_switches,
+    rmse,
+    summarise,
+    track_rmse,
+)
+
+
+def along_lines(spans):
+    """Trajectories from (id, line, first, last): on line y = 1000 * line, at x = 100 t."""
+    rows = [(t, one, (100.0 * t, 1000.0 * line, 0.0)) for one, line, first, last in spans for t in range(first, last)]
+    return Trajectories([float(t) for t, _, _ in rows], [i for _, i, _ in rows], [p for _, _, p in rows])
+
+
+def test_a_switch_a_gap_and_a_false_track():
+    truth = along_lines([(0, 0, 0, 10), (1, 1, 0, 10)])
+    # target 0: track 5, lost at 4 and 5, found again as the same; target 1: track 6, then track 7
+    tracks = along_lines([(5, 0, 0, 4), (5, 0, 6, 10), (6, 1, 0, 5), (7, 1, 5, 10), (8, 5, 2, 4)])
+    found = identity(truth, tracks, 300.0)
+    assert (found.switches, found.fragmentations) == (1, 1)
+    assert (found.matches, found.missed, found.false) == (18, 2, 2)
+    assert found.mota == pytest.approx(1 - 5 / 20)
+    assert found.motp == 0.0
+    # one to one throughout: 8 instants of target 0 with track 5, 5 of target 1 with either
+    assert found.idf1 == pytest.approx(2 * 13 / (20 + 20))
+    assert (found.mostly_tracked, found.mostly_lost, found.targets) == (2, 0, 2)
+
+
+def test_a_target_keeps_its_track_while_that_is_near():
+    truth = along_lines([(0, 0, 0, 3)])
+    places = np.concatenate([truth.positions + [0, 200.0, 0], (truth.positions + [0, 10.0, 0])[1:]])
+    tracks = Trajectories([0, 1, 2, 1, 2], [1, 1, 1, 2, 2], places)
+    found = identity(truth, tracks, 300.0)
+    assert (found.switches, found.matches, found.false) == (0, 3, 2)
+    assert found.motp == pytest.approx(200.0)
+
+
+def test_as_many_pairs_as_possible():
+    # the closest pair first would leave one target without a track
+    truth = Trajectories([0, 0], [0, 1], [[0, 0, 0], [10, 0, 0]])
+    tracks = Trajectories([0, 0], [0, 1], [[9, 0, 0], [-9.5, 0, 0]])
+    assert identity(truth, tracks, 9.9).matches == 2
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10_000))
+def test_pairs_are_as_many_as_brute_force_finds(seed):
+    rng = np.random.default_rng(seed)
+    m, n = rng.integers(1, 5, 2)
+    x, y = rng.uniform(0, 10, (m, 2)), rng.uniform(0, 10, (n, 2))
+    found = identity(Trajectories(np.zeros(m), np.arange(m), x), Trajectories(np.zeros(n), np.arange(n), y), 3.0)
+    best = (0, 0.0)
+    for size in range(min(m, n) + 1):
+        for rows in itertools.combinations(range(m), size):
+            for columns in itertools.permutations(range(n), size):
+                far = [math.dist(x[i], y[j]) for i, j in zip(rows, columns, strict=True)]
+                if all(one <= 3.0 for one in far):
+                    best = max(best, (size, -sum(far)))
+    assert found.matches == best[0]
+    if found.matches:
+        assert found.motp == pytest.approx(-best[1] / best[0])
+
+
+def test_nothing_to_compare():
+    none = Trajectories([], [], [])
+    some = along_lines([(0, 0, 0, 3)])
+    assert math.isnan(identity(none, none, 1.0).mota)
+    assert identity(none, some, 1.0).false == 3
+    assert identity(some, none, 1.0).mota == 0.0
+    assert math.isnan(track_rmse(some, none, 1.0)[0])
+    assert summarise(none, none, 1.0).gospa == 0.0
+
+
+def test_label_switches():
+    #           a  b  a  -  a  b  a
+    sources = [0, 1, 0, -1, 0, 1, 0]
+    assert label_switches(sources, [7, 8, 7, 9, 7, 8, 7]) == 0
+    assert label_switches(sources, [7, 8, 8, 9, 8, 7, 8]) == 2
+    assert label_switches(sources, [7, 8, -1, 9, 7, -1, 6]) == 1
+    with pytest.raises(InvalidInputError, match="one shape|both have shape"):
+        label_switches([0, 1], [0])
+
+
+def test_ct_mt_it_by_hand():
+    # two windows, aircraft 0 and 1, one false plot in each; track 5 is confirmed from its second plot on
+    windows = [0, 0, 0, 1, 1, 1, 1]
+    sources = [0, 1, -1, 0, 1, -1, 1]
+    tracks = [5, 6, 7, 5, -1, 6, 5]
+    confirmed = [False, False, False, True, False, True, True]
+    found = ct_mt_it(windows, sources, tracks, confirmed)
+    # window 1: aircraft 0 is right; the second plot of aircraft 1 is in a track that is aircraft 0's;
+    # the false plot is in a confirmed track of aircraft 1
+    assert found.per_window == pytest.approx(np.array([[0, 0, 100], [100 / 3, 100 / 3, 200 / 3]]))
+    assert (found.ct, found.mt, found.it) == pytest.approx((100 / 6, 100 / 6, 250 / 3))
+
+
+def test_ct_mt_it_against_a_plain_reading():
+    """Written once more, from the words of the definition, without sharing a line."""
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        n = 80
+        windows = np.sort(rng.integers(0, 9, n))
+        sources, tracks = rng.integers(-1, 3, n), rng.integers(-1, 4, n)
+        confirmed = rng.random(n) < 0.7
+        history: list[list[int]] = []
+        expected: dict[int, list[list[bool]]] = {}
+        for k in range(n):
+            history.append([int(sources[k]), int(tracks[k])])
+            cell = expected.setdefault(int(windows[k]), [[], [], []])
+            good = maintained = False
+            if tracks[k] >= 0:
+                last = [s for s, t in history if t == tracks[k]][-6:]
+                votes = Counter(s for s in last if s >= 0).most_common()
+                leaders = {s for s, count in votes if count == votes[0][1]}
+                latest = next((s for s in reversed(last) if s in leaders), None)
+                good = bool(confirmed[k]) and sources[k] >= 0 and latest == sources[k]
+                own = [t for s, t in history[:-1] if s == sources[k]]
+                maintained = bool(confirmed[k]) and sources[k] >= 0 and bool(own) and own[-1] == tracks[k]
+                cell[2].append(not good)
+            if sources[k] >= 0:
+                cell[0].append(good)
+                cell[1].append(maintained)
+        found = ct_mt_it(windows, sources, tracks, confirmed)
+        for axis, mean in enumerate((found.ct, found.mt, found.it)):
+            rates = [np.mean(cell[axis]) for cell in expected.values() if cell[axis]]
+            assert mean == pytest.approx(100 * np.mean(rates))
+
+
+def test_association_accuracy():
+    #            group 0      group 1   none
+    labels = [0, 0, 0, 1, 1, -1, -1]
+    sources = [4, 4, 5, 5, -1, -1, 4]
+    found = association_accuracy(sources, labels)
+    assert found.pair_precision == pytest.approx(1 / 4)
+    assert found.pair_recall == pytest.approx(1 / 4)
+    assert found.purity == pytest.approx(3 / 5)
+    assert found.false_alarms_recognised == pytest.approx(1 / 2)
+    assert found.targets_recognised == pytest.approx(4 / 5)
+    split = association_accuracy(sources, labels, instants=[0, 1, 0, 0, 0, 0, 0])
+    assert split.pair_precision == 0.0
+    assert math.isnan(association_accuracy([], []).purity)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.integers(-1, 2), st.integers(-1, 2), st.integers(0, 1)), max_size=10))
+def test_association_accuracy_counts_pairs(rows):
+    sources, labels, instants = np.array(rows, dtype=int).reshape(-1, 3).T
+    found = association_accuracy(sources, labels, instants)
+    together = right = real = 0
+    for (s, g, k), (t, h, m) in itertools.combinations(rows, 2):
+        if k == m:
+            grouped, same = g == h and g >= 0, s == t and s >= 0
+            together, real, right = together + grouped, real + same, right + (grouped and same)
+    for value, part, whole in ((found.pair_precision, right, together), (found.pair_recall, right, real)):
+        assert math.isnan(value) if not whole else value == pytest.approx(part / whole)
+
+
+def test_rmse():
+    assert rmse([[0, 0], [0, 0]], [[3, 4], [0, 0]]) == pytest.approx(12.5**0.5)
+    with pytest.raises(InvalidInputError, match="expected as many"):
+        rmse([[0, 0]], [[0, 0], [1, 1]])
+    truth = along_lines([(0, 0, 0, 4), (1, 1, 0, 4)])
+    tracks = Trajectories(truth.times, truth.ids + 3, truth.positions + [0, 30.0, 0])
+    overall, by_target = track_rmse(truth, tracks, 100.0)
+    assert overall == pytest.approx(30.0)
+    assert by_target == pytest.approx({0: 30.0, 1: 30.0})
+
+
+def test_the_truth_of_a_scene():
+    scene = assoc.Scene(
+        sensors=_sensors(),
+        times=[0.0, 1.0],
+        measurements=[[np.zeros((0, 3))]] * 2,
+        truth=_truth(),
+    )
+    truth = Trajectories.from_scene(scene)
+    assert truth.times.tolist() == [0.0, 1.0, 1.0]
+    assert truth.ids.tolist() == [4, 2, 4]
+    assert summarise(truth, truth, 10.0).gospa == 0.0
+    with pytest.raises(InvalidInputError, match="no truth"):
+        Trajectories.from_scene(assoc.Scene(_sensors(), [0.0], [[np.zeros((0, 3))]]))
+
+
+def _sensors():
+    from assoc.sensors import PositionSensor
+
+    return [PositionSensor(position=np.zeros(3), noise=np.ones(3), field_of_view=[[-9, 9]] * 3)]
+
+
+def _truth():
+    from assoc.scene import Truth
+
+    return Truth([np.array([4]), np.array([4, 2])], [np.zeros((1, 3)), np.ones((2, 3))])
