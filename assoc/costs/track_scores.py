@@ -1,0 +1,99 @@
+"""Track scores: log likelihood ratios of "these measurements are one target" against "all are false alarms".
+
+One code for all trackers. In the notation of Blackman and Popoli, a track's score is its log likelihood ratio,
+
+    L = ln(beta_NT / beta_FA)                      when it starts (beta: densities in measurement space)
+      + ln(P_D N(z; expected, S) / beta_FA)        for each detection
+      + ln(1 - P_D)                                for each miss,
+
+and the cost of a tuple that contains a track is the negative of what the tuple adds to it. Summed over the
+tracks of a hypothesis it is, up to a constant, the logarithm of the hypothesis' probability (equation 2.1 of
+the thesis on clustering time windows, with P_FA = beta_FA and P_NT = beta_NT, N_d the detected targets).
+
+References
+----------
+S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems, 1999, section 6.2.
+R. W. Sittler, An optimal data association problem in surveillance theory, IEEE Trans. Military Electronics 8, 1964.
+D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Control 24, 1979.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc.sensors.base import Sensor
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class ScoreTerms(NamedTuple):
+    """What a scan of each of S sensors adds to a score, before the likelihood of the measurement."""
+
+    detection: Array
+    """ln(P_D / beta_FA) with beta_FA = r / V, (S,)."""
+    miss: Array
+    """ln(1 - P_D), (S,)."""
+    birth: Array
+    """ln(P_D beta_NT / beta_FA) of a single measurement, (S,); beta_NT = birth rate / V."""
+
+
+def score_terms(sensors: Sequence[Sensor], birth_rate: float) -> ScoreTerms:
+    """Terms of the score.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    birth_rate : float
+        Mean number of new targets in a scan, all over the region.
+    """
+    P = np.array([sensor.detection_probability for sensor in sensors])
+    density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in sensors])
+    rate = np.array([sensor.false_alarm_rate for sensor in sensors])
+    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P * birth_rate / rate))
+
+
+def log_birth(covariances: Array, volume: float, birth_rate: float) -> Array:
+    """Logarithm of the birth density integrated over the places where a new target may be.
+
+    The cost of a tuple of several sensors is taken at the most likely position. A target is born anywhere
+    in the region with density birth rate / volume; integrated over the position (Laplace's approximation,
+    exact for linear sensors) the likelihood is the one at the best position times this.
+
+    Parameters
+    ----------
+    covariances : array (K, 3, 3)
+        Of the fused positions, m^2.
+    volume : float
+        Of the region, m^3.
+    birth_rate : float
+        As in `score_terms`.
+
+    Returns
+    -------
+    array (K,)
+        To be added to the score, at most ln(birth rate).
+    """
+    log_det = np.linalg.slogdet(2.0 * math.pi * covariances)[1]
+    limited: Array = np.minimum(0.5 * log_det, math.log(volume)) + math.log(birth_rate / volume)
+    return limited
+
+
+def sequential_threshold(false_probability: float, missed_probability: float = 0.0) -> float:
+    """Score at which a track is confirmed: ln((1 - beta) / alpha), the upper limit of Wald's sequential test.
+
+    Parameters
+    ----------
+    false_probability : float
+        alpha, the share of false tracks that may be confirmed.
+    missed_probability : float
+        beta, the share of true tracks that may be given up.
+
+    References
+    ----------
+    A. Wald, Sequential Analysis, 1947, section 3.2.
+    """
+    return math.log((1.0 - missed_probability) / false_probability)

@@ -1,0 +1,103 @@
+"""Batches of targets joined, moved on by different times, and turned into plain arrays and back.
+
+They work for the state of any filter: what a state holds are arrays whose first axis is the target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Filter
+from assoc.filters.state import Gaussian, gaussian
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def arrays_of(state: Any) -> dict[str, Array]:
+    """Return the arrays that a state holds, each with the targets along its first axis."""
+    found = {}
+    for field in fields(state):
+        value = getattr(state, field.name)
+        # what is alike for all targets may be stored once
+        if len(value) != len(state):
+            value = np.broadcast_to(value, (len(state), *value.shape[1:]))
+        found[field.name] = value
+    return found
+
+
+def state_from(kind: type, arrays: Mapping[str, Array]) -> Any:
+    """Make a state of this class from its arrays, without checking them again."""
+    made: Any = object.__new__(kind)
+    for name, value in arrays.items():
+        made.__dict__[name] = np.ascontiguousarray(value)
+    return made
+
+
+def concatenate(states: Sequence[Any]) -> Any:
+    """Return one batch with the targets of several.
+
+    Parameters
+    ----------
+    states : sequence of states of one filter
+        At least one. Histories that one of them does not have yet are filled with zeros.
+    """
+    present = [state for state in states if len(state)] or list(states[:1])
+    if len(present) == 1:
+        return present[0]
+    if isinstance(present[0], Gaussian):
+        means = np.concatenate([state.mean for state in present])
+        return gaussian(means, np.concatenate([state.covariance for state in present]))
+    parts = [arrays_of(state) for state in present]
+    joined = {}
+    for name in parts[0]:
+        values = [part[name] for part in parts]
+        shape = np.max([value.shape[1:] for value in values], axis=0, initial=0)
+        joined[name] = np.concatenate([_padded(value, shape) for value in values])
+    return state_from(type(present[0]), joined)
+
+
+def _padded(value: Array, shape: Array) -> Array:
+    missing = shape - value.shape[1:]
+    if not missing.any():
+        return value
+    return np.pad(value, [(0, 0), *((0, int(width)) for width in missing)])
+
+
+def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
+    """Predict each target by a time step of its own.
+
+    Parameters
+    ----------
+    filter : Filter
+    state
+        B targets.
+    dt : array (B,)
+        Seconds, 0 or more.
+
+    Raises
+    ------
+    InvalidInputError
+        A time step is negative.
+    """
+    if not len(dt):
+        return state
+    low, high = float(dt.min()), float(dt.max())
+    if low < 0:
+        raise InvalidInputError(f"dt must be a number >= 0, got {low!r}")
+    if low == high:
+        return filter.predict(state, low) if low > 0 else state
+    steps, which = np.unique(dt, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    bounds = np.searchsorted(which[order], np.arange(len(steps) + 1))
+    parts = []
+    for number, step in enumerate(steps):
+        rows = state[order[bounds[number] : bounds[number + 1]]]
+        parts.append(filter.predict(rows, float(step)) if step > 0 else rows)
+    back = np.empty(len(order), dtype=np.int64)
+    back[order] = np.arange(len(order))
+    return concatenate(parts)[back]

@@ -1,0 +1,84 @@
+"""How a track begins: a position with its covariance, and a prior for what a position does not tell."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Filter
+from assoc.filters.motion import Motion
+from assoc.filters.state import gaussian
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True)
+class Initiation:
+    """Prior of a new track.
+
+    The second detection then gives the velocity, as two-point differencing does, but weighed with what
+    speeds are likely.
+
+    Parameters
+    ----------
+    speed : float or sequence of float
+        Standard deviation of the velocity along each axis, m/s.
+    rest : float
+        Standard deviation of every further component: acceleration, m/s^2, or turn rate, rad/s.
+    birth_rate : float
+        Mean number of new targets in a scan.
+    widest : float
+        A single measurement starts a track only if it tells the position to this standard deviation, as a
+        share of the region's diagonal; a bearing alone does not.
+    """
+
+    speed: float | tuple[float, ...] = 300.0
+    rest: float = 0.1
+    birth_rate: float = 0.1
+    widest: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("rest", "birth_rate", "widest"):
+            _positive(getattr(self, name), name)
+        speeds = self.speed if isinstance(self.speed, (tuple, list)) else (self.speed,)
+        if not speeds:
+            raise InvalidInputError("speed must be one number, or one for each axis")
+        for one in speeds:
+            _positive(one, "speed")
+
+    def start(self, filter: Filter[Any], positions: Array, covariances: Array) -> Any:
+        """States of new tracks, of the filter's own kind.
+
+        Parameters
+        ----------
+        filter : Filter
+        positions, covariances : arrays (K, 3), (K, 3, 3)
+        """
+        motion = filter.motion
+        axes = len(motion.position)
+        place = np.array(motion.position)
+        mean = np.zeros((len(positions), motion.dim))
+        mean[:, place] = positions[:, :axes]
+        covariance = np.zeros((len(positions), motion.dim, motion.dim))
+        covariance[:, np.arange(motion.dim), np.arange(motion.dim)] = self.rest**2
+        velocity = velocity_components(motion)
+        speed = np.broadcast_to(np.asarray(self.speed, dtype=np.float64), (axes,))
+        covariance[:, velocity, velocity] = (speed**2)[: len(velocity)]
+        covariance[:, place[:, None], place[None, :]] = covariances[:, :axes, :axes]
+        return filter.start(gaussian(mean, covariance))
+
+
+def velocity_components(motion: Motion) -> Array:
+    """Where the velocities stand in a state: after the positions."""
+    places = np.array(motion.position) + len(motion.position)
+    return places[places < motion.dim]
+
+
+def _positive(value: object, name: str) -> None:
+    good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
+    if not good or not 0 < float(value) < math.inf:  # type: ignore[arg-type]
+        raise InvalidInputError(f"{name} must be a number above 0, got {value!r}")

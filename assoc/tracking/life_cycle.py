@@ -1,0 +1,108 @@
+"""The life of a track: when it is confirmed, and when it is given up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from assoc.costs.track_scores import sequential_threshold
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+Confirmation = Literal["score", "m-of-n"]
+Deletion = Literal["time", "count", "score"]
+
+HISTORY = 62
+"""Scans whose detections are remembered, one a bit."""
+
+
+@dataclass(frozen=True)
+class LifeCycle:
+    """When tracks are confirmed and deleted.
+
+    Parameters
+    ----------
+    confirmation : "score" or "m-of-n"
+        "score": the score reaches ln((1 - beta) / alpha), Sittler's and Blackman's use of Wald's test.
+        "m-of-n": detected in `m` of the last `n` scans.
+    false_probability, missed_probability : float
+        alpha and beta of the test: the share of false tracks confirmed, of true ones given up. A tentative
+        track is given up when its score has fallen by -ln(missed_probability) since its best.
+    m, n : int
+    deletion : "time", "count" or "score"
+        What ends a confirmed track: `deletion_time` seconds without a detection (whatever the
+        scans do), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
+    deletion_time : float
+        Seconds; it ends tentative tracks under "time" as well.
+    deletion_count : int
+    deletion_drop : float
+    """
+
+    confirmation: Confirmation = "score"
+    false_probability: float = 1e-6
+    missed_probability: float = 2e-3
+    m: int = 3
+    n: int = 4
+    deletion: Deletion = "time"
+    deletion_time: float = 30.0
+    deletion_count: int = 5
+    deletion_drop: float = 25.0
+
+    def __post_init__(self) -> None:
+        if self.confirmation not in get_args(Confirmation):
+            raise InvalidInputError(f"confirmation must be 'score' or 'm-of-n', got {self.confirmation!r}")
+        if self.deletion not in get_args(Deletion):
+            raise InvalidInputError(f"deletion must be 'time', 'count' or 'score', got {self.deletion!r}")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(field.default, float):
+                good = isinstance(value, (int, float, np.floating)) and not isinstance(value, bool)
+                if not good or not 0 < value < math.inf:
+                    raise InvalidInputError(f"{field.name} must be a number above 0, got {value!r}")
+                if field.name.endswith("probability") and value >= 1:
+                    raise InvalidInputError(f"{field.name} must be below 1, got {value!r}")
+            elif isinstance(field.default, int) and (
+                not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1
+            ):
+                raise InvalidInputError(f"{field.name} must be a whole number above 0, got {value!r}")
+        if not self.m <= self.n <= HISTORY:
+            raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
+
+    def confirms(self, score: Array, detections: Array) -> Array:
+        """Which tracks are to be confirmed; `detections` has one bit a scan, the last one lowest."""
+        if self.confirmation == "score":
+            reached: Array = score >= sequential_threshold(self.false_probability, self.missed_probability)
+            return reached
+        window = (detections & np.int64((1 << self.n) - 1)).astype(np.uint64)
+        return np.asarray(count_bits(window) >= self.m)
+
+    def deletes(self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array) -> Array:
+        """Which tracks are to be deleted.
+
+        Parameters
+        ----------
+        confirmed : bool array (T,)
+        score, best : arrays (T,)
+            The score now and its largest value so far.
+        silent : array (T,)
+            Seconds since the last detection.
+        missed : int array (T,)
+            Scans in a row without a detection.
+        """
+        if self.deletion == "time":
+            gone = silent > self.deletion_time * (1 + 1e-9)
+        elif self.deletion == "count":
+            gone = missed >= self.deletion_count
+        else:
+            gone = best - score > self.deletion_drop
+        tentative: Array = ~confirmed & (best - score > -math.log(self.missed_probability))
+        return np.asarray(gone | tentative)
+
+
+def count_bits(values: Array) -> Array:
+    """Number of bits that are set in each of an array of uint64."""
+    return np.unpackbits(values[:, None].view(np.uint8), axis=1).sum(axis=1)

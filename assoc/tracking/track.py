@@ -1,0 +1,96 @@
+"""What trackers hand out: tracks, and what a step decided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Track:
+    """One target as a tracker sees it at one time.
+
+    Attributes
+    ----------
+    track_id : int
+        From 1, never used again.
+    time : float
+        To which the state belongs, seconds.
+    mean, covariance : arrays (n,), (n, n)
+        In the order of the motion model.
+    position, velocity : arrays (3,)
+        Metres, m/s; what the motion model does not have is 0.
+    confirmed : bool
+    score : float
+        Log likelihood ratio against false alarms.
+    hits : int
+        Scans (of any sensor) in which it was detected.
+    started, last_detection : float
+        Seconds.
+    """
+
+    track_id: int
+    time: float
+    mean: Array
+    covariance: Array
+    position: Array
+    velocity: Array
+    confirmed: bool
+    score: float
+    hits: int
+    started: float
+    last_detection: float
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{x:.6g}" for x in self.position)
+        kind = "confirmed" if self.confirmed else "tentative"
+        return f"Track({self.track_id}, {kind}, ({place}) m at {self.time:g} s, score {self.score:.4g})"
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """Which track each measurement of one scan went to.
+
+    Attributes
+    ----------
+    scan : int
+        Number of the step, from 0.
+    time : float
+        Its time, seconds.
+    assigned : tuple over sensors of int64 arrays (n_s,)
+        Track of each measurement; 0 is a false alarm.
+    confirmed : tuple over sensors of bool arrays (n_s,)
+        Whether that track was confirmed when this was said.
+    """
+
+    scan: int
+    time: float
+    assigned: tuple[Array, ...]
+    confirmed: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Decision):
+    """What one step of a tracker did; for a tracker that defers decisions, its opinion so far.
+
+    Attributes
+    ----------
+    final : tuple of Decision
+        Scans decided for good in this step: this one, for trackers that decide at once; for multiple
+        hypothesis trackers the scan that left the window, if any.
+    ended : int64 array
+        Confirmed tracks deleted in this step.
+    """
+
+    final: tuple[Decision, ...] = ()
+    ended: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+
+def decision(scan: int, time: float, assigned: list[Array], confirmed_ids: Array) -> Decision:
+    """Make a decision from track ids and the ids that are confirmed."""
+    ids = tuple(np.asarray(one, dtype=np.int64) for one in assigned)
+    return Decision(scan, time, ids, tuple(np.isin(one, confirmed_ids) & (one > 0) for one in ids))

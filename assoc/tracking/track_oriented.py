@@ -1,0 +1,229 @@
+"""Track-oriented multiple hypothesis tracking: a tree of branches for each possible target.
+
+Every measurement may start a tree; every branch grows by each measurement in its gate and by a miss. The best
+global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
+an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
+of the oldest scan of the window is then final (N-scan pruning).
+
+References
+----------
+T. Kurien, Issues in the design of practical multitarget tracking algorithms, in Y. Bar-Shalom (ed.),
+Multitarget-Multisensor Tracking: Advanced Applications, 1990.
+A. Poore, Multidimensional assignment formulation of data association problems arising from multitarget and
+multisensor tracking, Computational Optimization and Applications 3, 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.filters.batches import predict_each
+from assoc.problem import AssignmentProblem
+from assoc.tracking.bank import Bank
+from assoc.tracking.frames import look
+from assoc.tracking.pruning import decide, keep_best
+from assoc.tracking.track import Decision, Step, decision
+from assoc.tracking.tracker import Tracker
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class TrackOrientedMHT(Tracker):
+    """Multiple hypothesis tracker with track trees.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`. Sensors of a scan are taken in one after the other; with a single sensor each
+        measurement may have its own time.
+    depth : int
+        Scans in the window, N: a measurement's track is final N - 1 scans later. 1 decides at once.
+    max_branches : int
+        The most branches of a tree.
+    branch_drop : float
+        A branch whose score is this far below its tree's best is cut.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "mht"
+
+    def __init__(
+        self, *arguments: Any, depth: int = 3, max_branches: int = 30, branch_drop: float = 15.0, **options: Any
+    ) -> None:
+        super().__init__(*arguments, **options)
+        for value, what in ((depth, "depth"), (max_branches, "max_branches")):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise InvalidInputError(f"{what} must be a whole number above 0, got {value!r}")
+        if not isinstance(branch_drop, (int, float)) or not branch_drop > 0:
+            raise InvalidInputError(f"branch_drop must be a number above 0, got {branch_drop!r}")
+        self.depth, self.max_branches, self.branch_drop = int(depth), int(max_branches), float(branch_drop)
+        self._history = np.zeros((0, self.depth * len(self.sensors)), dtype=np.int32)
+        """Measurements of each branch (1-based, 0 missed): the sensors of this scan, of the last, ..."""
+        self._born = np.zeros(0, dtype=np.int64)
+        """Scan in which each branch's tree began."""
+        self._chosen = np.zeros(0, dtype=np.bool_)
+        """Branches of the best global hypothesis."""
+        self._window: list[tuple[float, Array]] = []
+        """Times and sizes of the scans that are not yet final, the last one first."""
+
+    def _current(self) -> Bank:
+        rows = np.flatnonzero(self._chosen)
+        return self._bank[rows[np.argsort(self._bank.track_id[rows], kind="stable")]]
+
+    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+        if times is not None and len(self.sensors) > 1:
+            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
+        self._grow(time, measurements, times)
+        self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
+        self._chosen = self._best_hypothesis()
+        self._confirm()
+        now = self._opinion(0, self._chosen)
+        final = self._prune() if len(self._window) == self.depth else ()
+        ended = self._end(time)
+        return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
+
+    def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
+        """Grow every branch by the measurements in its gate and by misses, and start trees."""
+        count = len(self.sensors)
+        bank, before = self._bank, time if self._time is None else self._time
+        history = np.zeros_like(self._history)
+        history[:, count:] = self._history[:, : history.shape[1] - count]
+        born = self._born
+        scan = self._scan_of(time, measurements)
+        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+            stamps = None if times is None else times[s]
+            frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
+            pairs = frame.pairs
+            hit = bank[pairs.track].scored(pairs.states, pairs.log_likelihood + self.terms.detection[s], frame.when)
+            hit_history = history[pairs.track]
+            hit_history[:, s] = pairs.measurement + 1
+            roots, root_history = self._roots(s, scan, z, time, stamps)
+            bank = Bank.concatenate([bank.scored(frame.predicted, self.terms.miss[s]), hit, roots])
+            history = np.concatenate([history, hit_history, root_history])
+            born = np.concatenate([born, born[pairs.track], np.full(len(roots), self._scan, dtype=np.int64)])
+            before = time
+            kept = keep_best(bank.track_id, bank.score, self.max_branches, self.branch_drop)
+            bank, history, born = bank[kept], history[kept], born[kept]
+            if len(bank) > self.max_tuples:
+                raise LimitExceededError(
+                    f"scan {self._scan}: {len(bank)} branches, more than max_tuples = {self.max_tuples}; "
+                    "lower gate_probability, depth or max_branches, or raise max_tuples"
+                )
+        self._bank = bank.counted(np.asarray((history[:, :count] > 0).any(axis=1)))
+        self._history, self._born = history, born
+
+    def _roots(self, s: int, scan: Any, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array]:
+        """New trees, one for each measurement that tells a position."""
+        numbers = np.arange(len(z))
+        states, fit, positions = self._singles(s, scan, numbers)
+        numbers = numbers[fit]
+        when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
+        # numbered by place, so that the order of the measurements does not matter
+        ids = np.empty(len(numbers), dtype=np.int64)
+        ids[np.lexsort((*positions.T, when))] = self._new_ids(len(numbers))
+        score = np.full(len(numbers), self.terms.birth[s] + self.terms.miss[:s].sum())
+        bank = Bank.new(predict_each(self.filter, states, time - when), ids, score, when)
+        history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
+        history[:, s] = numbers + 1
+        return bank, history
+
+    def _best_hypothesis(self) -> Array:
+        """Branches of the best global hypothesis, as a mask."""
+        chosen = np.zeros(len(self._bank), dtype=np.bool_)
+        # a branch of no positive score is better left to false alarms
+        rows = np.flatnonzero(self._bank.score > 0)
+        if not len(rows):
+            return chosen
+        tuples = np.empty((len(rows), 1 + self._history.shape[1]), dtype=np.int64)
+        sizes = np.zeros(tuples.shape[1], dtype=np.int64)
+        trees, tuples[:, 0] = np.unique(self._bank.track_id[rows], return_inverse=True)
+        tuples[:, 0] += 1
+        sizes[0] = len(trees)
+        for c in range(self._history.shape[1]):
+            # only measurements that some branch uses take part
+            column = self._history[rows, c]
+            used = np.zeros(int(column.max()) + 1, dtype=np.int64)
+            used[column] = 1
+            used[0] = 0
+            sizes[c + 1] = used.sum()
+            number = np.cumsum(used) * used
+            tuples[:, c + 1] = number[column]
+        solution = self._assign(AssignmentProblem(tuples, -self._bank.score[rows], sizes))
+        picked = solution.indices[solution.indices < len(rows)]
+        chosen[rows[picked]] = True
+        return chosen
+
+    def _confirm(self) -> None:
+        bank = self._bank
+        good = bank.confirm(self.life_cycle).confirmed & self._chosen
+        trees = np.unique(bank.track_id[good])
+        self._bank = replace(bank, confirmed=bank.confirmed | np.isin(bank.track_id, trees))
+
+    def _opinion(self, age: int, rows: Array) -> Decision:
+        """Which tracks the measurements of the scan `age` scans ago went to, by these branches."""
+        count = len(self.sensors)
+        time, sizes = self._window[age]
+        bank, history = self._bank[rows], self._history[rows]
+        assigned = []
+        for s in range(count):
+            ids = np.zeros(int(sizes[s]) + 1, dtype=np.int64)
+            ids[history[:, age * count + s]] = bank.track_id
+            assigned.append(ids[1:])
+        return decision(self._scan - age, time, assigned, bank.track_id[bank.confirmed])
+
+    def _prune(self) -> tuple[Decision, ...]:
+        """Decide the oldest scan of the window and cut what contradicts."""
+        count = len(self.sensors)
+        oldest = self._history[:, -count:]
+        kept, speakers = decide(
+            self._bank.track_id,
+            self._bank.score,
+            self._chosen,
+            self._born <= self._scan - self.depth + 1,
+            oldest,
+            self._window[-1][1],
+        )
+        final = self._opinion(self.depth - 1, speakers)
+        self._window.pop()
+        self._select(kept)
+        return (final,)
+
+    def _end(self, time: float) -> Array:
+        before = np.unique(self._bank.track_id[self._bank.confirmed])
+        self._select(~self._bank.doomed(self.life_cycle, time))
+        return np.setdiff1d(before, self._bank.track_id)
+
+    def _select(self, mask: Array) -> None:
+        if not mask.all():
+            self._bank, self._history = self._bank[mask], self._history[mask]
+            self._born, self._chosen = self._born[mask], self._chosen[mask]
+
+    def flush(self) -> tuple[Decision, ...]:
+        """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
+        self._scan -= 1
+        try:
+            return tuple(self._opinion(age, self._chosen) for age in reversed(range(len(self._window))))
+        finally:
+            self._scan += 1
+
+    def _settings(self) -> dict[str, str]:
+        own = {"depth": str(self.depth), "max_branches": str(self.max_branches), "branch_drop": repr(self.branch_drop)}
+        return super()._settings() | own
+
+    def _arrays(self) -> dict[str, Array]:
+        times = np.array([time for time, _ in self._window], dtype=np.float64)
+        sizes = np.array([sizes for _, sizes in self._window], dtype=np.int64).reshape(-1, len(self.sensors))
+        own: dict[str, Array] = {"history": self._history, "born": self._born, "chosen": self._chosen}
+        own |= {"window_times": times, "window_sizes": sizes}
+        return super()._arrays() | own
+
+    def _take(self, arrays: dict[str, Array]) -> None:
+        super()._take(arrays)
+        self._history = arrays["history"].astype(np.int32)
+        self._born, self._chosen = arrays["born"], arrays["chosen"]
+        self._window = [(float(t), n) for t, n in zip(arrays["window_times"], arrays["window_sizes"], strict=True)]

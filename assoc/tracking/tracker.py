@@ -1,0 +1,328 @@
+"""What all trackers have in common: sensors, filter, settings, checked input, saved state."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from assoc._files import Field, load_npz, save_npz
+from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances
+from assoc.costs.guard import MAX_TUPLES
+from assoc.costs.track_scores import score_terms
+from assoc.errors import InvalidInputError
+from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
+from assoc.filters.base import Filter
+from assoc.filters.batches import predict_each
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scan, Scene
+from assoc.sensors import Sensor
+from assoc.sensors.base import finite_array
+from assoc.solution import Solution
+from assoc.solvers.front import assign
+from assoc.solvers.registry import make_parameters
+from assoc.tracking.bank import Bank, empty_bank
+from assoc.tracking.initiation import Initiation
+from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.track import Step, Track
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+FORMAT = "assoc.tracker"
+VERSION = 1
+
+PROCESS_NOISE = 10.0
+"""Default process noise: root of the acceleration's spectral density, m/s^1.5."""
+
+
+class Tracker(ABC):
+    """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    filter : Filter, optional
+        Any filter of `assoc.filters`; by default an extended Kalman filter with nearly constant velocity.
+    region : array_like (3, 2), optional
+        Bounds of x, y, z in metres, where targets are; see `assoc.Scene`.
+    solver : str
+        One of ``assoc.solvers.names()``; solves the assignment problems.
+    solver_parameters : mapping, optional
+    seed : int
+        Of the solver's randomness; the same seed gives the same tracks.
+    time_limit : float, optional
+        Seconds for each assignment problem.
+    life_cycle : LifeCycle, optional
+    initiation : Initiation, optional
+    gate_probability : float
+        Share of true measurements that a gate lets through, above 0 and below 1.
+    max_tuples : int
+        The most candidate tuples in a scan.
+
+    Raises
+    ------
+    InvalidInputError
+        An argument is not as described.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(
+        self,
+        sensors: Sequence[Sensor],
+        filter: Filter[Any] | None = None,
+        *,
+        region: Array | None = None,
+        solver: str = "exact",
+        solver_parameters: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        time_limit: float | None = None,
+        life_cycle: LifeCycle | None = None,
+        initiation: Initiation | None = None,
+        gate_probability: float = GATE_PROBABILITY,
+        max_tuples: int = MAX_TUPLES,
+    ) -> None:
+        empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
+        self._place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
+        self.sensors = tuple(self._place.sensors)
+        self.filter = filter or ExtendedKalmanFilter(ConstantVelocity(PROCESS_NOISE, kind="continuous"))
+        if not isinstance(self.filter, Filter):
+            raise InvalidInputError(f"filter must be a filter of assoc.filters, got {type(filter).__name__}")
+        for sensor in self.sensors:
+            self.filter.observe(sensor)
+        self.life_cycle = life_cycle or LifeCycle()
+        self.initiation = initiation or Initiation()
+        self.solver = solver
+        self.solver_parameters = dict(solver_parameters or {})
+        make_parameters(solver, self.solver_parameters)
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+            raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
+        self.seed = int(seed)
+        self.time_limit = time_limit
+        good = isinstance(gate_probability, (int, float, np.floating)) and not isinstance(gate_probability, bool)
+        if not good or not 0 < gate_probability < 1:
+            raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {gate_probability!r}")
+        self.gate_probability = float(gate_probability)
+        self.max_tuples = max_tuples
+        self.terms = score_terms(self.sensors, self.initiation.birth_rate)
+        self._time: float | None = None
+        self._scan = 0
+        self._next_id = 1
+        self._bank = empty_bank(self.filter)
+
+    @classmethod
+    def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
+        """A tracker for the sensors and the region of a scene; further arguments as for the class."""
+        return cls(scene.sensors, *arguments, region=scene.region, **options)
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last step, seconds; None before the first."""
+        return self._time
+
+    @property
+    def num_steps(self) -> int:
+        """Number of scans so far."""
+        return self._scan
+
+    @property
+    def tracks(self) -> list[Track]:
+        """The tracks that live now, confirmed or not, by their ids."""
+        if self._time is None:
+            return []
+        return self._current().tracks(self.filter, self._time)
+
+    def _current(self) -> Bank:
+        return self._bank
+
+    def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
+        """Take one scan in.
+
+        Parameters
+        ----------
+        time : float
+            Seconds, not before that of the last scan. Tracks are given for this time.
+        measurements : sequence over sensors of arrays (n_s, d_s)
+            n_s may be 0.
+        times : sequence over sensors of arrays (n_s,), optional
+            Each measurement's own time, after the last scan's and not after `time`; for trackers that take
+            measurements one sensor after the other.
+
+        Returns
+        -------
+        Step
+
+        Raises
+        ------
+        InvalidInputError
+            The time runs backwards, or measurements have the wrong shape or are not finite.
+        """
+        when = self._checked_time(time)
+        checked = self._checked_measurements(measurements)
+        stamps = None if times is None else self._checked_stamps(times, checked, when)
+        step = self._step(when, checked, stamps)
+        self._time = when
+        self._scan += 1
+        return step
+
+    @abstractmethod
+    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+        """Take a checked scan in."""
+
+    def _checked_time(self, time: object) -> float:
+        good = isinstance(time, (int, float, np.floating, np.integer)) and not isinstance(time, bool)
+        if not good or not math.isfinite(float(time)):  # type: ignore[arg-type]
+            raise InvalidInputError(f"time must be a finite number of seconds, got {time!r}")
+        when = float(time)  # type: ignore[arg-type]
+        if self._time is not None and when < self._time:
+            raise InvalidInputError(f"time must not run backwards: got {when:g} s after {self._time:g} s")
+        return when
+
+    def _checked_measurements(self, measurements: Sequence[Array]) -> list[Array]:
+        if len(measurements) != len(self.sensors):
+            raise InvalidInputError(
+                f"measurements of {len(measurements)} sensors, expected {len(self.sensors)} (one array for each)"
+            )
+        checked = []
+        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+            count = len(z) if np.ndim(z) else -1
+            array = np.zeros((0, sensor.dim)) if np.size(z) == 0 else z
+            checked.append(
+                finite_array(array, f"measurements of sensor {s}", (max(count, 0) if np.size(z) else 0, sensor.dim))
+            )
+        return checked
+
+    def _checked_stamps(self, times: Sequence[Array], measurements: list[Array], when: float) -> list[Array]:
+        if len(times) != len(self.sensors):
+            raise InvalidInputError(f"times of {len(times)} sensors, expected {len(self.sensors)}")
+        checked = []
+        for s, (stamps, z) in enumerate(zip(times, measurements, strict=True)):
+            array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, f"times of sensor {s}", (len(z),))
+            early = -math.inf if self._time is None else self._time
+            if len(array) and not (array.min() >= early and array.max() <= when):
+                wrong = array[(array < early) | (array > when)][0]
+                raise InvalidInputError(
+                    f"times of sensor {s} must lie from the last step's time, {early:g} s, to {when:g} s, got {wrong:g}"
+                )
+            checked.append(array)
+        return checked
+
+    def _instant(self, times: list[Array] | None) -> None:
+        if times is not None:
+            raise InvalidInputError(
+                f"times: the {self.name} tracker takes all sensors at one instant; give measurements the scan's time, "
+                "or use an mht or nearest-neighbour tracker"
+            )
+
+    def _seed(self) -> np.random.SeedSequence:
+        """Source of the randomness of this step alone, so that a restored tracker goes on alike."""
+        return np.random.SeedSequence((self.seed, self._scan))
+
+    def _assign(self, problem: AssignmentProblem) -> Solution:
+        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, **self.solver_parameters)
+
+    def _elapsed(self, time: float) -> float:
+        return 0.0 if self._time is None else time - self._time
+
+    def _predicted(self, bank: Bank, dt: float) -> Bank:
+        if dt == 0.0 or not len(bank):
+            return bank
+        return bank.moved(predict_each(self.filter, bank.states, np.full(len(bank), dt)))
+
+    def _new_ids(self, count: int) -> Array:
+        ids = np.arange(self._next_id, self._next_id + count)
+        self._next_id += count
+        return ids
+
+    def _scan_of(self, time: float, measurements: Sequence[Array]) -> Scan:
+        return Scan(index=self._scan, time=time, measurements=tuple(measurements))
+
+    def _fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
+        """Positions, covariances, and which of them are narrow enough to start a track."""
+        positions, covariances = positions_and_covariances(self._place, scan, tuples)
+        region = self._place.region
+        limit = self.initiation.widest * float(np.linalg.norm(region[:, 1] - region[:, 0]))
+        axes = len(self.filter.motion.position)
+        wide = np.sqrt(np.einsum("kii->ki", covariances)[:, :axes])
+        # heights are the scene's own where radars do not tell them: they do not forbid a track
+        return positions, covariances, (wide[:, :2] <= limit).all(axis=1)
+
+    def _singles(self, s: int, scan: Scan, numbers: Array) -> tuple[Any, Array, Array]:
+        """States of new tracks from single measurements (0-based numbers) of sensor s: also which are fit."""
+        tuples = np.zeros((len(numbers), len(self.sensors)), dtype=np.int32)
+        tuples[:, s] = numbers + 1
+        positions, covariances, fit = self._fused(scan, tuples)
+        return self.initiation.start(self.filter, positions[fit], covariances[fit]), fit, positions[fit]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole state as an npz file of format "assoc.tracker"; whole or not at all."""
+        save_npz(path, FORMAT, VERSION, self._arrays())
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Read the state that a tracker with the same settings has saved; the future is the same, bit for bit.
+
+        Raises
+        ------
+        InvalidInputError
+            The file is not a saved tracker, or that of a tracker with other settings.
+        """
+        own = self._arrays()
+        kinds = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
+        spec = {name: Field(kinds[value.dtype.kind], value.ndim) for name, value in own.items()}
+        found = load_npz(path, FORMAT, VERSION, {"settings": spec["settings"]})
+        if str(found["settings"]) != str(own["settings"]):
+            raise InvalidInputError(
+                f"{path}: was saved by a tracker with other settings: {_difference(found['settings'], own['settings'])}"
+            )
+        self._take(load_npz(path, FORMAT, VERSION, spec))
+
+    def _settings(self) -> dict[str, str]:
+        """What a saved state depends on, as texts."""
+        return {
+            "tracker": self.name,
+            "filter": f"{type(self.filter).__name__}, {type(self.filter.motion).__name__}",
+            "sensors": "; ".join(f"{sensor!r}" for sensor in self.sensors),
+            "region": str(self._place.region.tolist()),
+            "solver": f"{self.solver} {sorted(self.solver_parameters.items())}",
+            "seed": str(self.seed),
+            "life_cycle": repr(self.life_cycle),
+            "initiation": repr(self.initiation),
+            "gate_probability": repr(self.gate_probability),
+        }
+
+    def _arrays(self) -> dict[str, Array]:
+        rng = getattr(self.filter, "rng", None)
+        return {
+            "settings": np.array(json.dumps(self._settings())),
+            "time": np.array(math.nan if self._time is None else self._time),
+            "scan": np.array(self._scan),
+            "next_id": np.array(self._next_id),
+            "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
+            **self._bank.arrays("bank."),
+        }
+
+    def _take(self, arrays: dict[str, Array]) -> None:
+        when = float(arrays["time"])
+        self._time = None if math.isnan(when) else when
+        self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
+        rng = getattr(self.filter, "rng", None)
+        if rng is not None and str(arrays["filter_rng"]):
+            rng.bit_generator.state = json.loads(str(arrays["filter_rng"]))
+        self._bank = self._bank.restored(arrays, "bank.")
+
+    def __repr__(self) -> str:
+        when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
+        return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
+
+
+def _difference(saved: Array, own: Array) -> str:
+    before, now = json.loads(str(saved)), json.loads(str(own))
+    for key in now:
+        if before.get(key) != now[key]:
+            return f"{key} was {str(before.get(key))[:80]!r}, is {now[key][:80]!r}"
+    return "an unknown setting"

@@ -1,0 +1,98 @@
+from functools import cache
+
+import numpy as np
+import pytest
+
+from assoc import InvalidInputError
+from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.tracking import Initiation, LifeCycle, TrackOrientedMHT
+from tests.tracking import plain
+
+ALL = 1 - 1e-12
+SEEDS = (0, 4, 5)
+
+
+@cache
+def best_of(seed):
+    times, scans = plain.small_scans(np.random.default_rng(seed))
+    return times, scans, max(plain.enumerate_hypotheses(times, scans, plain.sensor()), key=lambda one: one[0])
+
+
+def tracker(depth=3, **options):
+    options = {
+        "life_cycle": LifeCycle(missed_probability=1e-9),
+        "initiation": Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
+        "gate_probability": ALL,
+        "max_branches": 10_000,
+        "branch_drop": 1e6,
+        **options,
+    }
+    motion = ConstantVelocity(plain.Q_SIGMA, kind="continuous")
+    return TrackOrientedMHT([plain.sensor()], KalmanFilter(motion), region=plain.REGION, depth=depth, **options)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_best_hypothesis_of_the_window_is_that_of_enumeration(seed):
+    times, scans, (best, tracks) = best_of(seed)
+    own = tracker()
+    for time, z in zip(times, scans, strict=True):
+        own.step(time, [z])
+    assert sum(track.score for track in own.tracks) == pytest.approx(best, abs=1e-6)
+    wanted = sorted((s, *m) for s, _, m, _ in tracks)
+    for track, (score, *mean) in zip(sorted(own.tracks, key=lambda t: t.score), wanted, strict=True):
+        assert track.score == pytest.approx(score, abs=1e-6)
+        np.testing.assert_allclose(track.mean, mean, rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("solver", ["exact", "lagrangian", "aco"])
+def test_late_decisions_are_those_of_enumeration(seed, solver):
+    times, scans, (_, tracks) = best_of(seed)
+    own = tracker(solver=solver)
+    final = []
+    for time, z in zip(times, scans, strict=True):
+        final += own.step(time, [z]).final
+    final += own.flush()
+    assert [decision.scan for decision in final] == [0, 1, 2]
+    parts = set()
+    for k in (1, 2):
+        # the first scan may also name targets in the making, which the best hypothesis calls false alarms
+        for label in set(final[k].assigned[0].tolist()) - {0}:
+            parts.add((k, *np.flatnonzero(final[k].assigned[0] == label) + 1))
+    assert parts == {(k, t[1][k]) for t in tracks for k in (1, 2) if t[1][k]}
+
+
+def test_each_plot_may_have_its_own_time():
+    rng = np.random.default_rng(3)
+    own, R = tracker(depth=1), plain.sensor().covariance
+    place, velocity = np.array([[200.0, 300, 100], [700.0, 600, 300]]), np.array([[20.0, 5, 0], [-15.0, 10, 0]])
+    wanted, last = [None, None], [0.0, 0.0]
+    for k in range(12):
+        stamps = 5.0 * k + np.sort(rng.uniform(0, 4, 2))
+        z = place + stamps[:, None] * velocity + rng.normal(0, 10, (2, 3))
+        step = own.step(5.0 * k + 4.5, [z], [stamps])
+        for i in range(2):
+            if k == 0:
+                wanted[i] = plain.start(z[i], R)
+            else:
+                wanted[i] = plain.correct(*plain.predict(*wanted[i], stamps[i] - last[i]), z[i], R)[:2]
+            last[i] = stamps[i]
+    assert step.assigned[0].tolist() == [1, 2] and step.confirmed[0].all()
+    for track, state, when in zip(own.tracks, wanted, last, strict=True):
+        mean, covariance = plain.predict(*state, own.time - when)
+        np.testing.assert_allclose(track.mean, mean, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(track.covariance, covariance, rtol=1e-7, atol=1e-7)
+        assert track.last_detection == pytest.approx(when)
+
+
+def test_times_outside_the_scan_are_refused():
+    own = tracker()
+    own.step(10.0, [np.zeros((0, 3))])
+    with pytest.raises(InvalidInputError, match="times of sensor 0 must lie from"):
+        own.step(20.0, [np.array([[1.0, 2, 3]])], [np.array([9.0])])
+
+
+@pytest.mark.parametrize("wrong", [{"depth": 0}, {"max_branches": 1.5}, {"branch_drop": -1.0}, {"gate_probability": 1}])
+def test_settings_out_of_range(wrong):
+    with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+        tracker(**wrong)
