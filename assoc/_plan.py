@@ -64,11 +64,14 @@ class Plan:
         source = self.sources[item[0]]
         if isinstance(source, AssignmentProblem):
             return _best([_of_problem(source, one) for one in self._solve(source, self.seed)], self.kbest)
+        return self.associate(source, source.scan(item[1]))
+
+    def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
+        """Associate a scan of the sensors of a scene."""
         # a seed of its own for each scan, whichever process solves it and whatever was solved before
-        seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(item[1],))
-        scan = source.scan(item[1])
-        problem = build_problem(source, scan, **self.gating)
-        return _best([_of_scan(source, scan, problem, one) for one in self._solve(problem, seed)], self.kbest)
+        seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
+        problem = build_problem(scene, scan, **self.gating)
+        return _best([_of_scan(scene, scan, problem, one) for one in self._solve(problem, seed)], self.kbest)
 
     def _solve(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> list[Solution]:
         if self.kbest is not None:

@@ -1,0 +1,31 @@
+"""Adapter to Stone Soup 1.9: its trackers with our solvers, and scenes in both directions.
+
+``pip install 'assoc[stonesoup]'``. What is handed over is sorted by its content first: the order in which
+Python's sets iterate, which changes from run to run, changes no result.
+"""
+
+from __future__ import annotations
+
+try:
+    import stonesoup as _stonesoup  # noqa: F401
+except ImportError as error:
+    raise ImportError("the adapter needs Stone Soup: pip install 'assoc[stonesoup]'") from error
+
+from assoc.integrations.stonesoup.adapted import AdaptedSensor, adapt
+from assoc.integrations.stonesoup.associator import AssignmentAssociator
+from assoc.integrations.stonesoup.fusion import FusionFeeder
+from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing, measurement_model
+from assoc.integrations.stonesoup.readers import SceneDetectionReader, SceneGroundTruthReader
+from assoc.integrations.stonesoup.scenes import scene_from_detections
+
+__all__ = [
+    "AdaptedSensor",
+    "AssignmentAssociator",
+    "CartesianToSlantRangeBearing",
+    "FusionFeeder",
+    "SceneDetectionReader",
+    "SceneGroundTruthReader",
+    "adapt",
+    "measurement_model",
+    "scene_from_detections",
+]

@@ -1,0 +1,109 @@
+"""Stone Soup's data association solved as an assignment problem of two dimensions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from ordered_set import OrderedSet
+from stonesoup.base import Property
+from stonesoup.dataassociator.base import DataAssociator
+from stonesoup.types.hypothesis import Hypothesis, ProbabilityHypothesis
+from stonesoup.types.track import Track
+
+from assoc.errors import InvalidInputError
+from assoc.integrations.stonesoup.ordering import sorted_detections, sorted_paths
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+from assoc.solvers.front import assign
+
+
+class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
+    """Assign detections to tracks with any of our solvers; each track and each detection is used once.
+
+    With hypotheses that have probabilities (``PDAHypothesiser``) the joint probability is maximised: the costs
+    are negative log ratios of "this detection" to "missed". With distances (``DistanceHypothesiser``) their sum
+    is minimised, a missed detection counting its ``missed_distance``; where that is infinite, as many tracks as
+    can be are given a detection.
+
+    Attributes
+    ----------
+    solution : Solution or None
+        The last solution, with its lower bound; None where there was nothing to choose.
+    """
+
+    solver: str = Property(default="exact", doc="One of ``assoc.solvers.names()``.")
+    parameters: Mapping[str, Any] = Property(default_factory=dict, doc="Parameters of the solver.")
+    seed: int = Property(default=0, doc="The same seed gives the same association.")
+    time_limit: float = Property(default=None, doc="Seconds for each scan.")
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.solution: Solution | None = None
+
+    def associate(
+        self, tracks: Iterable[Track], detections: Iterable[Any], timestamp: datetime, **kwargs: Any
+    ) -> dict[Track, Hypothesis]:
+        """Associate tracks and detections.
+
+        Parameters
+        ----------
+        tracks : set of Track
+        detections : set of Detection
+        timestamp : datetime
+            To predict to where a detection is missed.
+
+        Returns
+        -------
+        dict of Track to Hypothesis
+            Tracks for which the hypothesiser offers nothing are left out.
+        """
+        self.solution = None
+        ordered = sorted_paths(tracks)
+        found = OrderedSet(sorted_detections(detections))
+        place = {id(detection): d for d, detection in enumerate(found, start=1)}
+        offered = self.generate_hypotheses(ordered, found, timestamp, **kwargs)
+        missed: dict[int, Hypothesis] = {}
+        pairs: dict[tuple[int, int], Hypothesis] = {}
+        for t, track in enumerate(ordered, start=1):
+            for hypothesis in offered[track]:
+                if hypothesis:
+                    pairs[t, place[id(hypothesis.measurement)]] = hypothesis
+                else:
+                    missed[t] = hypothesis
+        chosen = dict(missed)
+        if pairs:
+            problem = _problem(pairs, missed, (len(ordered), len(found)))
+            self.solution = assign(problem, self.solver, seed=self.seed, time_limit=self.time_limit, **self.parameters)
+            for t, d in self.solution.tuples.tolist():
+                if t and d:
+                    chosen[t] = pairs[t, d]
+        return {track: chosen[t] for t, track in enumerate(ordered, start=1) if t in chosen}
+
+
+def _problem(
+    pairs: Mapping[tuple[int, int], Hypothesis], missed: Mapping[int, Hypothesis], sizes: tuple[int, int]
+) -> AssignmentProblem:
+    """Tracks and detections as the two sensors of a problem; a lone index is a track missed or clutter."""
+    kinds = {isinstance(one, ProbabilityHypothesis) for one in (*pairs.values(), *missed.values())}
+    if len(kinds) > 1:
+        raise InvalidInputError("hypotheses: some have probabilities and some distances, expected one kind")
+    by_probability = kinds.pop()
+
+    def cost(hypothesis: Hypothesis) -> float:
+        return -float(hypothesis.probability.log_value) if by_probability else float(hypothesis.distance)
+
+    costs = {pair: cost(one) for pair, one in pairs.items()}
+    alone = {t: cost(missed[t]) if t in missed else math.inf for t, _ in pairs}
+    finite = [abs(value) for value in (*costs.values(), *alone.values()) if math.isfinite(value)]
+    # dearer than any choice that misses one track fewer
+    forced = 2.0 * (sizes[0] + 1) * max(finite, default=0.0) + 1.0
+    base = {t: value if math.isfinite(value) else forced for t, value in alone.items()}
+    return AssignmentProblem(
+        np.array(list(costs), dtype=np.int64),
+        np.array([value - base[t] for (t, _), value in costs.items()]),
+        sizes,
+    )

@@ -1,0 +1,103 @@
+"""Sensors of Stone Soup that observe one state space together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from stonesoup.models.measurement.nonlinear import CartesianToBearingRange
+
+from assoc.errors import InvalidInputError
+from assoc.integrations.stonesoup.adapted import AdaptedSensor, model_key
+from assoc.sensors import Sensor
+from assoc.sensors.base import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Sensors that measure the same state space, and where it holds a position.
+
+    Attributes
+    ----------
+    adapted : tuple of AdaptedSensor
+    sensors : tuple of Sensor
+        As a scene takes them: in the plane if none of them measures heights.
+    ndim_state : int
+    mapping : tuple of int
+        State dimensions of x, y or x, y, z.
+    """
+
+    adapted: tuple[AdaptedSensor, ...]
+    sensors: tuple[Sensor, ...]
+    ndim_state: int
+    mapping: tuple[int, ...]
+
+    @property
+    def planar(self) -> bool:
+        """Whether heights play no part."""
+        return len(self.mapping) == 2
+
+    def split(self, detections: Sequence[Any]) -> list[list[Any]]:
+        """Sort out detections by sensor, keeping their order.
+
+        Raises
+        ------
+        InvalidInputError
+            A detection is of none of the sensors.
+        """
+        parts: list[list[Any]] = [[] for _ in self.adapted]
+        for detection in detections:
+            home = next((s for s, one in enumerate(self.adapted) if one.measured(detection)), None)
+            if home is None:
+                raise InvalidInputError(
+                    f"a detection at {detection.timestamp} is of none of the {len(parts)} sensors: its "
+                    f"{type(detection.measurement_model).__name__} differs in place, rotation, noise or mapping "
+                    "(sensors that move are not supported)"
+                )
+            parts[home].append(detection)
+        return parts
+
+    def measurements(self, parts: Sequence[Sequence[Any]]) -> tuple[Array, ...]:
+        """Measurements of a scan as a scene has them, one array (n, d) for each sensor."""
+        return tuple(
+            np.array([one.measurement(d.state_vector) for d in part]).reshape(len(part), one.sensor.dim)
+            for one, part in zip(self.adapted, parts, strict=True)
+        )
+
+
+def make_frame(adapted: Sequence[AdaptedSensor]) -> Frame:
+    """Check that sensors go together.
+
+    Raises
+    ------
+    InvalidInputError
+        No sensor, two that cannot be told apart, different state spaces, or ranges on the ground beside heights.
+    """
+    if not adapted:
+        raise InvalidInputError("sensors: expected at least one")
+    for s, one in enumerate(adapted):
+        if not isinstance(one, AdaptedSensor):
+            raise InvalidInputError(f"sensors: number {s} is a {type(one).__name__}, expected adapt(sensor, ...)")
+        for other in adapted[:s]:
+            alike = model_key(one.model) == model_key(other.model)
+            if alike and (not one.sensor.name or one.sensor.name == other.sensor.name):
+                raise InvalidInputError(
+                    f"sensors: number {s} has the same measurement model as another; give each a name of its own "
+                    'and set it as metadata["sensor"] of the detections'
+                )
+    states = {(one.model.ndim_state, one.mapping[:2]) for one in adapted}
+    heights = {one.mapping[2] for one in adapted if one.measures_height}
+    if len(states) > 1 or len(heights) > 1:
+        raise InvalidInputError("sensors: their measurement models differ in ndim_state or in the mapping of x, y, z")
+    sensors = [one.sensor for one in adapted]
+    if heights and any(type(one.model) is CartesianToBearingRange for one in adapted):
+        raise InvalidInputError(
+            "sensors: CartesianToBearingRange measures the range on the ground and cannot be combined with "
+            "sensors that measure heights; use CartesianToSlantRangeBearing"
+        )
+    if not heights:
+        sensors = [replace(one, position=one.position * (1.0, 1.0, 0.0)) for one in sensors]
+    (ndim_state, plane) = states.pop()
+    return Frame(tuple(adapted), tuple(sensors), ndim_state, (*plane, *heights))

@@ -1,0 +1,53 @@
+"""Orders that depend on what things are, not on where they lie in memory.
+
+Stone Soup hands over sets of objects that hash by identity: they iterate in another order in each run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+
+def _numbers(vector: object) -> tuple[float, ...]:
+    return tuple(np.asarray(vector, dtype=np.float64).ravel().tolist())
+
+
+def _time(timestamp: datetime | None) -> tuple[bool, datetime]:
+    return timestamp is not None, timestamp or datetime.min
+
+
+def _detection_key(detection: Any) -> tuple[Any, ...]:
+    model = detection.measurement_model
+    offset = getattr(model, "translation_offset", None)
+    return (
+        type(model).__name__,
+        () if offset is None else _numbers(offset),
+        _numbers(detection.state_vector),
+        _time(detection.timestamp),
+        type(detection).__name__,
+    )
+
+
+def sorted_detections(detections: Iterable[Any]) -> list[Any]:
+    """Detections by measurement model, sensor's place, measurement and time; those equal in all are alike."""
+    return sorted(detections, key=_detection_key)
+
+
+def _path_key(path: Any) -> tuple[Any, ...]:
+    first, last = path[0], path[-1]
+    return (
+        _time(first.timestamp),
+        _numbers(first.state_vector),
+        len(path),
+        _time(last.timestamp),
+        _numbers(last.state_vector),
+    )
+
+
+def sorted_paths(paths: Iterable[Any]) -> list[Any]:
+    """Tracks or ground truth paths by their first and last state."""
+    return sorted(paths, key=_path_key)

@@ -1,0 +1,118 @@
+"""Scenes from Stone Soup's detections and ground truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import datetime
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assoc.errors import InvalidInputError
+from assoc.integrations.stonesoup.adapted import AdaptedSensor
+from assoc.integrations.stonesoup.frame import Frame, make_frame
+from assoc.integrations.stonesoup.ordering import sorted_detections, sorted_paths
+from assoc.scene import Scene, Truth, default_region
+from assoc.sensors import Sensor
+from assoc.sensors.base import Array
+
+
+def scene_from_detections(
+    detections: Iterable[tuple[datetime, Iterable[Any]]],
+    sensors: Sequence[AdaptedSensor],
+    *,
+    truth: Iterable[Any] | None = None,
+    start: datetime | None = None,
+    region: ArrayLike | None = None,
+    name: str = "",
+) -> Scene:
+    """Make a scene of what a Stone Soup reader, feeder or simulator yields.
+
+    Sets that come with the same time are one scan, as a ``PlatformDetectionSimulator`` yields a set for each
+    sensor. If no sensor measures heights, the scene lies in the plane z = 0.
+
+    Parameters
+    ----------
+    detections : iterable of (datetime, set of Detection)
+        Any ``DetectionReader``; times must not decrease.
+    sensors : sequence of AdaptedSensor
+        See `adapt`.
+    truth : iterable of GroundTruthPath, optional
+        What was really there; a ``TrueDetection`` then says which path caused it. It is read after the
+        detections, so that a simulator's own paths may be given. Paths are numbered in the order of their
+        first states.
+    start : datetime, optional
+        The scene's time 0; by default the time of the first scan.
+    region : array_like (3, 2), optional
+        See `Scene`.
+    name : str, optional
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidInputError
+        No detections at all, times that decrease, or a detection of none of the sensors.
+    """
+    frame = make_frame(sensors)
+    moments, scans = [], []
+    for time, found in by_time(detections):
+        moments.append(time)
+        scans.append(frame.split(sorted_detections(found)))
+    if not scans:
+        raise InvalidInputError("detections: the reader yielded none, expected at least one scan")
+    zero = moments[0] if start is None else start
+    return Scene(
+        sensors=frame.sensors,
+        times=np.array([(moment - zero).total_seconds() for moment in moments]),
+        measurements=[frame.measurements(parts) for parts in scans],
+        region=region_of(frame, region),
+        truth=None if truth is None else _truth(sorted_paths(truth), moments, scans, frame),
+        name=name,
+    )
+
+
+def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[Any]]]:
+    """Put sets of the same time together."""
+    previous: datetime | None = None
+    for time, group in groupby(detections, key=lambda pair: pair[0]):
+        if previous is not None and time < previous:
+            raise InvalidInputError(f"detections: time {time} comes after {previous}, expected increasing times")
+        previous = time
+        yield time, [one for _, found in group for one in found]
+
+
+def region_of(frame: Frame, region: ArrayLike | None) -> Array:
+    """Return a region as given, or the default one; without heights it lies in the plane."""
+    sensors: Sequence[Sensor] = frame.sensors
+    box = np.array(default_region(sensors) if region is None else region, dtype=np.float64)
+    if frame.planar and box.shape == (3, 2):
+        # range-azimuth radars on the ground then see slant ranges that are ranges on the ground
+        box[2] = 0.0
+    return box
+
+
+def _truth(
+    paths: Sequence[Any], moments: Sequence[datetime], scans: Sequence[Sequence[Sequence[Any]]], frame: Frame
+) -> Truth:
+    number = {id(path): i for i, path in enumerate(paths)}
+    known: dict[datetime, list[tuple[int, Array]]] = {}
+    for i, path in enumerate(paths):
+        # a path may hold several states of one time, the last of them counts
+        for moment, state in {state.timestamp: state for state in path}.items():
+            place = np.zeros(3)
+            place[: len(frame.mapping)] = np.asarray(state.state_vector, dtype=np.float64).ravel()[list(frame.mapping)]
+            known.setdefault(moment, []).append((i, place))
+    present = [known.get(moment, []) for moment in moments]
+    return Truth(
+        target_ids=[np.array([i for i, _ in one], dtype=np.int64) for one in present],
+        positions=[np.array([place for _, place in one]).reshape(len(one), 3) for one in present],
+        sources=[
+            [np.array([number.get(id(getattr(d, "groundtruth_path", None)), -1) for d in p], dtype=np.int64) for p in s]
+            for s in scans
+        ],
+    )

@@ -1,0 +1,196 @@
+"""Inside Stone Soup's trackers: against its own association, exhaustive search, and another hash order."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.errors import InvalidInputError
+from assoc.simulation import simulate
+
+pytest.importorskip("stonesoup")
+
+from stonesoup.dataassociator.neighbour import GNNWith2DAssignment
+from stonesoup.hypothesiser.distance import DistanceHypothesiser
+from stonesoup.hypothesiser.probability import PDAHypothesiser
+from stonesoup.measures import Mahalanobis
+from stonesoup.models.measurement.linear import LinearGaussian
+from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
+from stonesoup.predictor.kalman import KalmanPredictor
+from stonesoup.types.array import StateVector
+from stonesoup.types.detection import Detection
+from stonesoup.types.state import GaussianState
+from stonesoup.types.track import Track
+from stonesoup.updater.kalman import ExtendedKalmanUpdater
+
+from assoc.integrations.stonesoup import AssignmentAssociator, FusionFeeder, SceneDetectionReader, adapt
+from assoc.integrations.stonesoup.ordering import sorted_detections
+from tests.integrations.test_stonesoup_scenes import adapted, planar_model
+
+ZERO = datetime(2026, 1, 1)
+PREDICTOR = KalmanPredictor(CombinedLinearGaussianTransitionModel([ConstantVelocity(1.0)] * 2))
+UPDATER = ExtendedKalmanUpdater()
+SENSOR = LinearGaussian(4, (0, 2), np.diag([4.0, 4.0]))
+
+
+def crowd(seed, tracks=5, detections=7, spread=6.0):
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0.0, spread, (tracks, 2))
+    known = {
+        Track([GaussianState(StateVector([x, 0, y, 0]), np.diag([2.0, 0.1, 2.0, 0.1]), timestamp=ZERO)])
+        for x, y in places
+    }
+    seen = [
+        *places[: detections - 2] + rng.normal(0, 2.0, (min(tracks, detections - 2), 2)),
+        *rng.uniform(0, 9, (2, 2)),
+    ]
+    time = ZERO + timedelta(seconds=1)
+    return known, {Detection(StateVector(z), timestamp=time, measurement_model=SENSOR) for z in seen}, time
+
+
+def by_distance(missed=3.0):
+    return DistanceHypothesiser(PREDICTOR, UPDATER, Mahalanobis(), missed_distance=missed)
+
+
+@pytest.mark.parametrize("solver", ["exact", "milp", "aco", "lagrangian"])
+def test_as_good_as_the_global_nearest_neighbour_of_stone_soup(solver):
+    for seed in range(5):
+        tracks, detections, time = crowd(seed)
+        ours = AssignmentAssociator(by_distance(), solver=solver).associate(tracks, detections, time)
+        theirs = GNNWith2DAssignment(by_distance()).associate(tracks, detections, time)
+        assert ours.keys() == theirs.keys()
+        total = [sum(h.distance for h in one.values()) for one in (ours, theirs)]
+        assert total[0] == pytest.approx(total[1], abs=1e-9)
+        used = [h.measurement for h in ours.values() if h]
+        assert len(used) == len(set(used)) > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_probabilities_against_all_joint_hypotheses(seed):
+    tracks, detections, time = crowd(seed, tracks=4, detections=5)
+    hypothesiser = PDAHypothesiser(PREDICTOR, UPDATER, clutter_spatial_density=0.02, prob_detect=0.8, prob_gate=0.99)
+    associator = AssignmentAssociator(hypothesiser)
+    ours = associator.associate(tracks, detections, time)
+    offered = [list(hypothesiser.hypothesise(track, sorted_detections(detections), time)) for track in tracks]
+    best = -np.inf
+    for joint in itertools.product(*offered):
+        used = [h.measurement for h in joint if h]
+        if len(used) == len(set(used)):
+            best = max(best, sum(float(h.probability.log_value) for h in joint))
+    assert sum(float(h.probability.log_value) for h in ours.values()) == pytest.approx(best)
+    assert associator.solution.status == "optimal"
+
+
+def test_an_infinite_price_of_a_miss_assigns_as_many_as_can_be():
+    tracks, detections, time = crowd(1, tracks=6, detections=4)
+    chosen = AssignmentAssociator(by_distance(np.inf)).associate(tracks, detections, time)
+    assert len(chosen) == 6
+    assert sum(bool(h) for h in chosen.values()) == 4
+
+
+def test_nothing_to_choose():
+    tracks, detections, time = crowd(0)
+    associator = AssignmentAssociator(by_distance())
+    assert associator.associate(set(), detections, time) == {}
+    missed = associator.associate(tracks, set(), time)
+    assert missed.keys() == tracks and not any(missed.values())
+    assert associator.solution is None
+
+
+def test_hypotheses_of_two_kinds_are_refused():
+    tracks, detections, time = crowd(0)
+
+    class Both(DistanceHypothesiser):
+        def hypothesise(self, track, found, timestamp, **kwargs):
+            if track is min(tracks, key=id):
+                return super().hypothesise(track, found, timestamp)
+            return PDAHypothesiser(PREDICTOR, UPDATER, 0.1, prob_gate=0.99).hypothesise(track, found, timestamp)
+
+    with pytest.raises(InvalidInputError, match="expected one kind"):
+        AssignmentAssociator(Both(PREDICTOR, UPDATER, Mahalanobis(), 9.0)).associate(tracks, detections, time)
+
+
+def test_fusion_is_the_association_of_the_scene():
+    scene = simulate("three-radar", seed=1, scans=6)
+    sensors = adapted(scene)
+    feeder = FusionFeeder(SceneDetectionReader(scene), sensors, region=scene.region, solver="exact")
+    expected = assoc.associate(scene)
+    for k, (_, fused) in enumerate(feeder):
+        want = expected.scans[k]
+        order, theirs = [np.argsort(p[:, 0]) for p in (want.positions, np.array([place(d) for d in fused]))]
+        fused = [list(fused)[i] for i in theirs]
+        np.testing.assert_allclose([place(d) for d in fused], want.positions[order], rtol=1e-6)
+        np.testing.assert_allclose(
+            [d.measurement_model.covar() for d in fused], want.covariances[order], rtol=1e-4, atol=1e-2
+        )
+        for detection, chosen in zip(fused, want.targets[order].tolist(), strict=True):
+            sources = detection.metadata["sources"]
+            assert [one.metadata["measurement"] if one else 0 for one in sources] == chosen
+            assert detection.measurement_model.mapping == (0, 2, 4)
+        assert feeder.association.solution.cost == pytest.approx(want.solution.cost)
+
+
+def place(detection):
+    return np.asarray(detection.state_vector, dtype=float).ravel()
+
+
+def test_two_radars_in_the_plane_against_least_squares():
+    """Position and covariance of a planar fusion, from the textbook, with no height anywhere."""
+    from scipy.optimize import least_squares
+
+    models = [planar_model(0.0, 0.0), planar_model(8e3, 1e3)]
+    target = np.array([3e3, 5e3])
+    rng = np.random.default_rng(0)
+    sigma = np.sqrt(np.diag(models[0].covar()))
+    vectors = [np.array([np.arctan2(*d[::-1]), np.hypot(*d)]) for d in (target, target - [8e3, 1e3])]
+    vectors = [v + rng.normal(0.0, sigma) for v in vectors]
+    stream = [
+        (ZERO, {Detection(StateVector(v), timestamp=ZERO, measurement_model=m)})
+        for v, m in zip(vectors, models, strict=True)
+    ]
+
+    def residuals(at):
+        parts = [(at, vectors[0]), (at - [8e3, 1e3], vectors[1])]
+        return np.concatenate([(np.array([np.arctan2(*d[::-1]), np.hypot(*d)]) - v) / sigma for d, v in parts])
+
+    fit = least_squares(residuals, target, xtol=1e-14, ftol=1e-14)
+    [(_, fused)] = list(FusionFeeder(stream, [adapt(m, max_range=2e4) for m in models]))
+    [one] = fused
+    np.testing.assert_allclose(place(one), fit.x, atol=1e-3)
+    np.testing.assert_allclose(one.measurement_model.covar(), np.linalg.inv(fit.jac.T @ fit.jac), rtol=1e-3)
+    assert (one.measurement_model.ndim_state, one.measurement_model.mapping) == (4, (0, 2))
+
+
+def test_false_alarms_are_dropped_and_empty_scans_pass():
+    models = [planar_model(0.0, 0.0), planar_model(8e3, 1e3)]
+    lone = Detection(StateVector([0.5, 900.0]), timestamp=ZERO, measurement_model=models[0])
+    later = ZERO + timedelta(seconds=1)
+    feeder = FusionFeeder([(ZERO, {lone}), (later, set())], [adapt(m, max_range=2e4) for m in models])
+    assert [(time, len(found)) for time, found in feeder] == [(ZERO, 0), (later, 0)]
+
+
+def test_another_hash_order_changes_no_bit():
+    script = Path(__file__).with_name("hash_order.py")
+    outputs = []
+    for seed in ("1", "2"):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", str(script), seed],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        order, result = done.stdout.split("---\n")
+        outputs.append((order, result))
+    # the sets really came in another order, and tracks were really made
+    assert outputs[0][0] != outputs[1][0]
+    assert outputs[0][1] == outputs[1][1]
+    assert outputs[0][1].count("\n") > 40
