@@ -1,0 +1,143 @@
+"""Which column of a CSV file means what, in which unit, and how its text becomes a number."""
+
+from __future__ import annotations
+
+import datetime
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from assoc.errors import InvalidInputError
+
+NAUTICAL_MILE = 1852.0
+FLIGHT_LEVEL = 30.48
+"""A flight level is 100 feet, in metres."""
+
+DAY = 86_400.0
+
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "time": ("time", "timestamp"),
+    "range": ("range", "rho", "distance"),
+    "bearing": ("bearing", "theta"),
+    "mode3": ("mode3", "mode_3", "mode3a", "squawk", "identity"),
+    "altitude": ("altitude", "alt", "mode_c", "flight_level"),
+    "aircraft": ("aircraft",),
+}
+"""Where no column is named, the first of these that the file has is taken, a unit at its end or not."""
+
+REQUIRED = ("time", "range", "bearing")
+
+UNITS: dict[str, dict[str, float]] = {
+    "range": {"nmi": NAUTICAL_MILE, "km": 1000.0, "m": 1.0},
+    "bearing": {"deg": math.pi / 180.0, "rad": 1.0},
+    "altitude": {"fl": FLIGHT_LEVEL, "ft": 0.3048, "m": 1.0},
+}
+"""Units of each column and what they are in metres and radians; the first one is taken where nothing is said."""
+
+_ENDINGS = {"range": (*UNITS["range"], "nm"), "bearing": tuple(UNITS["bearing"]), "altitude": tuple(UNITS["altitude"])}
+_MODE3_ENDINGS = ("dec", "oct")
+_CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:\.\d{1,9})?)\Z")
+
+
+def choose(
+    header: Sequence[str], columns: Mapping[str, str], units: Mapping[str, str]
+) -> tuple[dict[str, int], dict[str, str]]:
+    """Find the place and the unit of every meaning.
+
+    Parameters
+    ----------
+    header : sequence of str
+        The names in the file; upper and lower case are the same.
+    columns, units : mapping of str to str
+        Meaning to the column's name, and to its unit, where the user gives them.
+
+    Returns
+    -------
+    places : dict of str to int
+        Meaning to column number, for the columns that are there.
+    units : dict of str to str
+        The unit of range, bearing and altitude.
+    """
+    for meaning in columns:
+        if meaning not in COLUMNS:
+            raise InvalidInputError(f"columns: unknown meaning {meaning!r}; known: {', '.join(COLUMNS)}")
+    for meaning, unit in units.items():
+        if meaning not in UNITS:
+            raise InvalidInputError(f"units: unknown meaning {meaning!r}; known: {', '.join(UNITS)}")
+        if unit not in UNITS[meaning]:
+            raise InvalidInputError(f"units: expected {' or '.join(UNITS[meaning])} for the {meaning}, got {unit!r}")
+    names = [name.strip().lower() for name in header]
+    places: dict[str, int] = {}
+    chosen: dict[str, str] = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
+    for meaning, usual in COLUMNS.items():
+        endings = {f"_{unit}": unit for unit in _ENDINGS.get(meaning, ())}
+        endings |= {f"_{base}": "" for base in _MODE3_ENDINGS if meaning == "mode3"}
+        if meaning in columns:
+            wanted = [columns[meaning].strip().lower()]
+        else:
+            wanted = [name + ending for name in usual for ending in ("", *endings)]
+        found = next((name for name in wanted if name in names), None)
+        if found is None:
+            if meaning in REQUIRED or meaning in columns:
+                have = ", ".join(name.strip()[:30] for name in header[:12])
+                what = repr(columns[meaning]) if meaning in columns else " or ".join(usual)
+                raise InvalidInputError(f"no column {what} for the {meaning}; it has: {have!r}")
+            continue
+        if names.count(found) > 1:
+            raise InvalidInputError(f"the column {found!r} is there {names.count(found)} times")
+        places[meaning] = names.index(found)
+        unit = next((unit for ending, unit in endings.items() if found.endswith(ending)), "")
+        if unit:
+            chosen[meaning] = "nmi" if unit == "nm" else unit
+    if len(set(places.values())) < len(places):
+        raise InvalidInputError("columns: two meanings have the same column")
+    return places, {**chosen, **units}
+
+
+def seconds(text: str) -> tuple[float, bool]:
+    """Read a time: seconds, a clock time h:mm:ss, or a date with a time (ISO 8601, UTC unless it says otherwise).
+
+    Returns
+    -------
+    value : float
+        Seconds.
+    clock : bool
+        Whether it is a clock time, which begins anew at midnight.
+
+    Raises
+    ------
+    ValueError
+        It is none of these.
+    """
+    match = _CLOCK.match(text)
+    if match:
+        hours, minutes, rest = int(match[1]), int(match[2]), float(match[3])
+        if hours > 24 or minutes > 59 or rest >= 61:
+            raise ValueError(text)
+        return 3600.0 * hours + 60.0 * minutes + rest, True
+    if text[4:5] == "-" and len(text) <= 40:
+        moment = datetime.datetime.fromisoformat(text)
+        if moment.tzinfo is None:
+            moment = moment.replace(tzinfo=datetime.UTC)
+        return moment.timestamp(), False
+    return number(text), False
+
+
+def number(text: str) -> float:
+    """Read a finite number; what Python would also take (1_000, nan, other scripts' digits) is refused."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def whole(text: str) -> int:
+    """Read a whole number, also one written as 902.0; nothing is 0."""
+    if not text:
+        return 0
+    value = number(text)
+    if value != int(value) or not -1 <= value < 2**53:
+        raise ValueError(text)
+    return int(value)

@@ -1,0 +1,76 @@
+"""Groupings that ignore the antenna, to see what the clustering time window is worth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.recordings.recording import Recording
+from assoc.recordings.windows import Window, windows_of
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def irregular_groups(
+    recording: Recording, rng: np.random.Generator, mean: float = 6.2, shape: float = 2.0
+) -> list[Window]:
+    """Group plots by intervals of irregular length, as the paper's data come without a window.
+
+    The paper has 183 groups in about 1,130 s, some shorter and some longer than a rotation, and does not say how
+    they come about. Here the lengths are gamma-distributed.
+
+    Parameters
+    ----------
+    recording : Recording
+    rng : numpy.random.Generator
+    mean : float, default 6.2
+        Of the lengths, seconds.
+    shape : float, default 2
+        Of the gamma distribution; with 2 about a fifth of the groups are longer than 9.5 s.
+
+    Returns
+    -------
+    list of Window
+        Without empty ones.
+    """
+    if not 0 < mean < math.inf or not 0 < shape < math.inf:
+        raise InvalidInputError(f"mean, shape: expected numbers > 0, got {mean!r}, {shape!r}")
+    if not len(recording):
+        return []
+    start, end = float(recording.times[0]), float(recording.times[-1])
+    edges: list[float] = []
+    reached = start
+    while reached <= end:
+        # drawn in blocks; gaps of hours take as many groups as they last
+        lengths = np.cumsum(rng.gamma(shape, mean / shape, 256))
+        edges.extend((reached + lengths).tolist())
+        reached = edges[-1]
+    return windows_of(recording, np.searchsorted(np.array(edges), recording.times, side="right"))
+
+
+def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
+    """Group plots by intervals of one length that is not the antenna's, from the first plot on."""
+    if not 0 < seconds < math.inf:
+        raise InvalidInputError(f"seconds: expected a number > 0, got {seconds!r}")
+    if not len(recording):
+        return []
+    return windows_of(recording, np.floor((recording.times - recording.times[0]) / seconds).astype(np.int64))
+
+
+def groups_of_sizes(recording: Recording, sizes: Sequence[int]) -> list[Window]:
+    """Group plots by given numbers of plots, in the order of time.
+
+    Parameters
+    ----------
+    recording : Recording
+    sizes : sequence of int
+        At least 1 each; together as many as there are plots.
+    """
+    if any(int(size) != size or size < 1 for size in sizes) or sum(sizes) != len(recording):
+        expected = f"whole numbers >= 1 that add up to {len(recording)}"
+        raise InvalidInputError(f"sizes: expected {expected}, got {list(sizes)}")
+    return windows_of(recording, np.repeat(np.arange(len(sizes)), np.asarray(sizes, dtype=np.int64)))

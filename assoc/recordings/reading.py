@@ -1,0 +1,247 @@
+"""Radar plots from a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from array import array
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
+from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, number, seconds, whole
+from assoc.recordings.recording import UNDECODED, Recording
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MAX_DISORDER = 30.0
+"""Plots that come at most this late (s) are put where they belong; later ones are an error."""
+
+LONGEST_LINE = 10_000
+MOST_PLOTS = 20_000_000
+_FARTHEST = 1e7
+
+
+def read_plots(
+    path: str | os.PathLike[str],
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    max_disorder: float = MAX_DISORDER,
+    garbled_codes: Array | None = None,
+) -> Recording:
+    """Read radar plots from a CSV file with a header line.
+
+    Needed are columns for time, range and bearing; Mode 3, altitude and (from a simulation) aircraft are read
+    where they are there. Separators are commas, semicolons or tabs.
+
+    Parameters
+    ----------
+    path : path-like
+    columns : mapping of str to str, optional
+        Names of the columns for "time", "range", "bearing", "mode3", "altitude", "aircraft", where they are not
+        the usual ones (`assoc.recordings.columns.COLUMNS`).
+    units : mapping of str to str, optional
+        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m). Without it the end of the
+        column's name tells (range_km), and without that nautical miles, degrees and flight levels are meant.
+    max_disorder : float, default 30
+        Plots up to this many seconds late are sorted in; one that is later is an error with its line.
+    garbled_codes : array_like of int, optional
+        Flight levels that are taken for garbled answers (default `GARBLED_CODES`).
+
+    Returns
+    -------
+    Recording
+        In the order of time. Its notes count what was mended: rows that came late, that repeat a row word for
+        word (left out), that hold only zeros (left out: fillers, not plots), and midnights that were passed.
+
+    Raises
+    ------
+    InvalidInputError
+        The file cannot be read as such a table; the message begins with the path and names the line.
+    """
+    file = Path(path)
+    if not 0 <= max_disorder < math.inf:
+        raise InvalidInputError(f"max_disorder: expected seconds >= 0, got {max_disorder!r}")
+    try:
+        with file.open("rb") as stream:
+            return _read(file, stream, columns or {}, units or {}, max_disorder, garbled_codes)
+    except OSError as error:
+        raise InvalidInputError(f"{file}: cannot be read ({error.strerror or error})") from None
+
+
+def _lines(file: Path, stream: IO[bytes]) -> Iterator[str]:
+    """Decoded lines, none of them longer than a plot can be: memory stays small whatever the file is."""
+    count = 0
+    while True:
+        raw = stream.readline(LONGEST_LINE + 1)
+        if not raw:
+            return
+        count += 1
+        if len(raw) > LONGEST_LINE:
+            raise InvalidInputError(f"{file}: line {count} is longer than {LONGEST_LINE} bytes, expected plots (CSV)")
+        if b"\x00" in raw:
+            raise InvalidInputError(f"{file}: line {count} holds a NUL byte, expected text (UTF-8)")
+        try:
+            yield raw.decode("utf-8-sig" if count == 1 else "utf-8")
+        except UnicodeDecodeError:
+            raise InvalidInputError(f"{file}: line {count} is not UTF-8 text") from None
+
+
+def _read(
+    file: Path,
+    stream: IO[bytes],
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    max_disorder: float,
+    garbled_codes: Array | None,
+) -> Recording:
+    lines = _lines(file, stream)
+    head = next((line for line in lines), "")
+    if not head.strip():
+        raise InvalidInputError(f"{file}: has no header line, expected column names such as time,range,bearing")
+    separator = max(",;\t", key=head.count)
+    try:
+        header = next(csv.reader([head], delimiter=separator))
+        places, scales = choose(header, columns, units)
+    except csv.Error as error:
+        raise InvalidInputError(f"{file}: line 1: {error}") from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{file}: {error}") from None
+    table = _Table(file, places, header)
+    rows = csv.reader(lines, delimiter=separator)
+    try:
+        for cells in rows:
+            table.add(cells, rows.line_num + 1)
+    except csv.Error as error:
+        raise InvalidInputError(f"{file}: line {rows.line_num + 1}: {error}") from None
+    return table.recording(scales, max_disorder, garbled_codes)
+
+
+class _Table:
+    """Rows of the file as they come."""
+
+    def __init__(self, file: Path, places: Mapping[str, int], header: list[str]) -> None:
+        self.file = file
+        self.places = places
+        self.names = {meaning: header[place].strip()[:30] for meaning, place in places.items()}
+        self.values = {meaning: array("d") for meaning in COLUMNS}
+        self.lines = array("q")
+        self.fillers = self.midnights = 0
+        self.clock: bool | None = None
+        self.day = 0.0
+        self.before = 0.0
+
+    def add(self, cells: list[str], line: int) -> None:
+        """Take one row, or refuse it by a line that names it."""
+        if not any(cell.strip() for cell in cells):
+            return
+        row = {}
+        for meaning, place in self.places.items():
+            text = cells[place].strip() if place < len(cells) else ""
+            try:
+                row[meaning] = self._value(meaning, text)
+            except (ValueError, OverflowError):
+                raise self._error(line, meaning, self._expected(meaning), text) from None
+        if row["range"] < 0 or row["range"] > _FARTHEST:
+            raise self._error(line, "range", f"0 to {_FARTHEST:g}", f"{row['range']:g}")
+        if abs(row["bearing"]) > 1000 or abs(row.get("altitude", 0.0)) > _FARTHEST or abs(row["time"]) > 1e12:
+            wrong = "bearing" if abs(row["bearing"]) > 1000 else "time" if abs(row["time"]) > 1e12 else "altitude"
+            raise self._error(line, wrong, "a number of usual size", f"{row[wrong]:g}")
+        # a row of zeros is a mark between groups, as in tables 4.5 to 4.8 of the paper, and no plot
+        if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
+            self.fillers += 1
+            return
+        if len(self.lines) >= MOST_PLOTS:
+            raise LimitExceededError(f"{self.file}: more than {MOST_PLOTS} plots; split the file")
+        row["time"] = self._running(row["time"], line)
+        for meaning, values in self.values.items():
+            default = math.nan if meaning == "altitude" else -1.0 if meaning == "aircraft" else float(UNDECODED)
+            values.append(row.get(meaning, default))
+        self.lines.append(line)
+
+    def _value(self, meaning: str, text: str) -> float:
+        if meaning == "time":
+            value, clock = seconds(text)
+            if self.clock not in (None, clock):
+                raise ValueError(text)
+            self.clock = clock
+            return value
+        if meaning == "mode3":
+            code = whole(text)
+            if code < 0:
+                raise ValueError(text)
+            return float(code)
+        if meaning == "aircraft":
+            return float(whole(text)) if text else -1.0
+        if meaning == "altitude" and not text:
+            return math.nan
+        return number(text)
+
+    def _running(self, time: float, line: int) -> float:
+        """Let clock times run on over midnight: a fall by more than half a day is a new day."""
+        if self.clock and self.lines and time + self.day < self.before - DAY / 2:
+            self.day += DAY
+            self.midnights += 1
+        running = time + self.day
+        # a late plot of the day before
+        if self.clock and self.midnights and running > self.before + DAY / 2:
+            running -= DAY
+        self.before = max(self.before, running) if self.lines else running
+        return running
+
+    def _expected(self, meaning: str) -> str:
+        if meaning == "time":
+            kind = {None: "seconds, h:mm:ss or an ISO date", True: "h:mm:ss", False: "seconds or an ISO date"}
+            return kind[self.clock]
+        return "a whole number" if meaning in ("mode3", "aircraft") else "a number"
+
+    def _error(self, line: int, meaning: str, expected: str, text: str) -> InvalidInputError:
+        name = self.names[meaning]
+        return InvalidInputError(f"{self.file}: line {line}, column {name!r}: expected {expected}, got {text[:60]!r}")
+
+    def recording(self, units: Mapping[str, str], max_disorder: float, codes: Array | None) -> Recording:
+        """Sort, leave out what repeats, and convert units."""
+        if not self.lines:
+            raise InvalidInputError(f"{self.file}: holds no plots")
+        columns = {meaning: np.array(values) for meaning, values in self.values.items()}
+        lines = np.array(self.lines)
+        latest = np.maximum.accumulate(columns["time"])
+        late = latest - columns["time"]
+        if (late > max_disorder).any():
+            row = int(np.argmax(late > max_disorder))
+            raise InvalidInputError(
+                f"{self.file}: line {lines[row]}: the time jumps back by {late[row]:.6g} s, expected at most "
+                f"{max_disorder:g} s; split the file there, or allow more with max_disorder"
+            )
+        order = np.argsort(columns["time"], kind="stable")
+        content = np.stack([np.nan_to_num(columns[meaning], nan=-1.0) for meaning in self.places], axis=1)[order]
+        _, first = np.unique(content, axis=0, return_index=True)
+        keep = order[np.sort(first)]
+        scale = {meaning: UNITS[meaning][unit] for meaning, unit in units.items()}
+        levels = columns["altitude"][keep]
+        identities = columns["mode3"][keep].astype(np.int64)
+        in_levels = levels * scale["altitude"] / UNITS["altitude"]["fl"]
+        known = GARBLED_CODES if codes is None else codes
+        return Recording(
+            times=columns["time"][keep],
+            ranges=columns["range"][keep] * scale["range"],
+            azimuths=math.pi / 2 - columns["bearing"][keep] * scale["bearing"],
+            identities=identities,
+            altitudes=levels * scale["altitude"],
+            garbled=garbled_altitudes(in_levels, identities, known if units["altitude"] == "fl" else ()),
+            lines=lines[keep],
+            sources=columns["aircraft"][keep].astype(np.int64) if "aircraft" in self.places else None,
+            notes={
+                "late plots sorted in": int((late > 0).sum()),
+                "repeated rows left out": len(order) - len(keep),
+                "rows of zeros left out": self.fillers,
+                "midnights passed": self.midnights,
+            },
+            name=self.file.name,
+        )

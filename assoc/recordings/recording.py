@@ -1,0 +1,158 @@
+"""A recording: the plots of one radar, each with its own time stamp."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.sensors.base import finite_array, wrap_angle
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+UNDECODED = 0
+"""The identity (Mode 3) of a plot whose transponder answer was not decoded."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording:
+    """Plots of a radar, in the order of time.
+
+    Parameters
+    ----------
+    times : array_like (n,)
+        Seconds, not decreasing.
+    ranges : array_like (n,)
+        Slant range, metres, 0 or more.
+    azimuths : array_like (n,)
+        From +x (east) towards +y (north), radians; kept within (-pi, pi].
+    identities : array_like of int (n,), optional
+        Mode 3 codes; 0 is "not decoded", and the default.
+    altitudes : array_like (n,), optional
+        As reported, metres; NaN where there is none.
+    garbled : array_like of bool (n,), optional
+        Altitudes that cannot be right.
+    lines : array_like of int (n,), optional
+        Where the plot stood in its file.
+    sources : array_like of int (n,), optional
+        The aircraft that really caused the plot, -1 for a false plot; only a simulation knows.
+    notes : mapping of str to int, optional
+        What reading had to mend, and how often.
+    name : str
+
+    Raises
+    ------
+    InvalidInputError
+        One line that names the argument and what was expected.
+    """
+
+    times: Array
+    ranges: Array
+    azimuths: Array
+    identities: Array = None  # type: ignore[assignment]  # always an array once made
+    altitudes: Array = None  # type: ignore[assignment]
+    garbled: Array = None  # type: ignore[assignment]
+    lines: Array = None  # type: ignore[assignment]
+    sources: Array | None = None
+    notes: Mapping[str, int] = field(default_factory=dict)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        times = finite_array(self.times, "times")
+        if times.ndim != 1:
+            raise InvalidInputError(f"times must have shape (n,), got {times.shape}")
+        put(self, "times", times)
+        shape = times.shape
+        if (np.diff(times) < 0).any():
+            raise InvalidInputError(f"times must not decrease, plot {int(np.argmax(np.diff(times) < 0)) + 1} does")
+        put(self, "ranges", finite_array(self.ranges, "ranges", shape))
+        if (self.ranges < 0).any():
+            raise InvalidInputError(f"ranges must be 0 or more, got {self.ranges.min():g}")
+        azimuths = wrap_angle(finite_array(self.azimuths, "azimuths", shape))
+        azimuths.setflags(write=False)
+        put(self, "azimuths", azimuths)
+        altitudes = np.full(shape, np.nan) if self.altitudes is None else np.array(self.altitudes, np.float64)
+        if altitudes.shape != shape or np.isinf(altitudes).any():
+            raise InvalidInputError(f"altitudes must be numbers or NaN of shape {shape}, got {altitudes.shape}")
+        altitudes.setflags(write=False)
+        put(self, "altitudes", altitudes)
+        for name, default in (("identities", UNDECODED), ("lines", 0), ("garbled", False), ("sources", None)):
+            value: Any = getattr(self, name)
+            if value is None and default is None:
+                continue
+            array = np.full(shape, default) if value is None else np.array(value)
+            if array.size == 0:
+                array = array.astype(np.int64)
+            kinds = "biu" if name == "garbled" else "iu"
+            if array.shape != shape or array.dtype.kind not in kinds:
+                got = f"{array.dtype} {array.shape}"
+                raise InvalidInputError(f"{name} must be whole numbers of shape {shape}, got {got}")
+            array = array.astype(np.bool_ if name == "garbled" else np.int64)
+            array.setflags(write=False)
+            put(self, name, array)
+        if (self.identities < 0).any():
+            raise InvalidInputError(f"identities must be 0 or more, got {self.identities.min()}")
+        put(self, "notes", dict(self.notes))
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def measurements(self) -> Array:
+        """Range and azimuth (n, 2), metres and radians, as a `Radar2D` measures them."""
+        return np.stack([self.ranges, self.azimuths], axis=1)
+
+    @property
+    def positions(self) -> Array:
+        """Places x (east), y (north) in the slant plane (n, 2), metres."""
+        return self.ranges[:, None] * np.stack([np.cos(self.azimuths), np.sin(self.azimuths)], axis=1)
+
+    @property
+    def bearings(self) -> Array:
+        """Compass bearings (n,), from north clockwise, radians in [0, 2 pi)."""
+        return np.mod(math.pi / 2 - self.azimuths, 2 * math.pi)
+
+    @property
+    def decoded(self) -> Array:
+        """Whether each plot has an identity, bool (n,)."""
+        known: Array = self.identities != UNDECODED
+        return known
+
+    @property
+    def trusted_altitudes(self) -> Array:
+        """Altitudes (n,), metres, NaN where they are missing or garbled."""
+        return np.where(self.garbled, np.nan, self.altitudes)
+
+    def take(self, rows: Array) -> Recording:
+        """Return the plots of some rows, in the order of time."""
+        chosen = np.sort(np.arange(len(self))[rows])
+        parts = {name: getattr(self, name)[chosen] for name in _COLUMNS}
+        sources = None if self.sources is None else self.sources[chosen]
+        return Recording(**parts, sources=sources, notes=self.notes, name=self.name)
+
+    def summary(self) -> str:
+        """What is in it and what is wrong with it, a few lines of text."""
+        if not len(self):
+            return "no plots"
+        missing = int(np.isnan(self.altitudes).sum())
+        identities = len(np.unique(self.identities[self.decoded]))
+        lines = [
+            f"{len(self)} plots over {self.times[-1] - self.times[0]:g} s",
+            f"{identities} identities; {int((~self.decoded).sum())} plots not decoded",
+            f"altitudes: {int(self.garbled.sum())} garbled, {missing} missing",
+            *(f"{what}: {count}" for what, count in self.notes.items() if count),
+        ]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        name = f"{self.name!r}, " if self.name else ""
+        span = f" over {self.times[-1] - self.times[0]:g} s" if len(self) else ""
+        return f"Recording({name}{len(self)} plots{span})"
+
+
+_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines")

@@ -1,0 +1,112 @@
+"""How long the antenna takes for a turn, from the plots themselves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.recordings.recording import Recording
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SHORTEST, LONGEST = 2.0, 30.0
+"""Rotation times (s) that are looked for. Below 2 s, stamps in whole seconds could not tell two of them apart."""
+
+STRETCH = 300.0
+"""Seconds that are looked at together, so that neither gaps nor a drifting motor matter."""
+
+_MOST = 20_000
+_LEAST_COHERENCE = 0.5
+
+
+def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest: float = LONGEST) -> float:
+    """Estimate the rotation time of the antenna.
+
+    An antenna that turns once in T seconds points to the bearing b when t / T - b / (2 pi) + const is whole. The T
+    is taken at which the plots agree best on that constant: the maximum of |mean exp(i (2 pi t / T - b))|, taken
+    over stretches of five minutes and averaged. Where all traffic is in one direction, T / 2, T / 3 and so on
+    agree nearly as well; the longest that agrees within 5 % is the answer.
+
+    Parameters
+    ----------
+    recording : Recording
+    shortest, longest : float
+        Limits of the search, seconds.
+
+    Returns
+    -------
+    float
+        Seconds.
+
+    Raises
+    ------
+    InvalidInputError
+        There are too few plots, or no rotation time fits them.
+    """
+    if not 0 < shortest < longest < math.inf:
+        raise InvalidInputError(f"shortest, longest: expected 0 < shortest < longest, got {shortest}, {longest}")
+    stretches = _stretches(recording)
+    count = sum(len(time) for time, _ in stretches)
+    span = max((float(time[-1] - time[0]) for time, _ in stretches), default=0.0)
+    if count < 5 or span < 2 * shortest:
+        raise InvalidInputError(f"the rotation time cannot be estimated from {count} plots over {span:g} s: give it")
+    step = 1.0 / (8.0 * span)
+    # less than a turn and a half tells nothing of a turn
+    lowest = max(1.0 / longest, 1.5 / span)
+    frequencies = np.arange(lowest, 1.0 / shortest, step)
+    if not len(frequencies):
+        raise InvalidInputError(f"the rotation time cannot be estimated from {span:g} s of plots: give it")
+    agreement = _agreement(stretches, frequencies)
+    peaks = np.flatnonzero(
+        (agreement >= np.concatenate([[-1.0], agreement[:-1]]))
+        & (agreement >= np.concatenate([agreement[1:], [-1.0]]))
+        & (agreement >= 0.95 * agreement.max())
+    )
+    best = int(peaks[0])
+    # by chance one of so many frequencies agrees like this (Rayleigh)
+    chance = math.sqrt(math.log(1000.0 * len(frequencies)) / count)
+    if agreement[best] < max(_LEAST_COHERENCE, chance):
+        raise InvalidInputError(
+            f"no rotation time from {shortest:g} to {longest:g} s fits the plots "
+            f"(agreement {agreement[best]:.2f} of 1): give it"
+        )
+    center = frequencies[best]
+    for _ in range(3):
+        step /= 8.0
+        fine = center + step * np.arange(-8, 9)
+        center = float(fine[np.argmax(_agreement(stretches, fine))])
+    return 1.0 / float(center)
+
+
+def _stretches(recording: Recording) -> list[tuple[Array, Array]]:
+    """Times (from the start of each stretch) and bearings, of stretches without long gaps."""
+    every = max(1, -(-len(recording) // _MOST))
+    starts = [0]
+    for row in range(1, len(recording)):
+        gap = recording.times[row] - recording.times[row - 1]
+        if gap > 2 * LONGEST or recording.times[row] - recording.times[starts[-1]] > STRETCH:
+            starts.append(row)
+    parts = []
+    for first, last in zip(starts, [*starts[1:], len(recording)], strict=True):
+        if last - first >= 2:
+            times = recording.times[first:last]
+            parts.append((times - times[0], recording.bearings[first:last]))
+    # of a very long recording some stretches are enough
+    return parts[::every]
+
+
+def _agreement(stretches: list[tuple[Array, Array]], frequencies: Array) -> Array:
+    """Mean resultant length at each frequency (Hz), over the stretches, weighted by their plots."""
+    total = np.zeros(len(frequencies))
+    count = 0
+    for times, bearings in stretches:
+        turned = np.exp(-1j * bearings)
+        for chunk in range(0, len(frequencies), 512):
+            part = slice(chunk, chunk + 512)
+            waves = np.exp(2j * math.pi * np.outer(frequencies[part], times))
+            total[part] += np.abs(waves @ turned)
+        count += len(times)
+    return total / max(count, 1)

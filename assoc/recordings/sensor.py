@@ -1,0 +1,94 @@
+"""The radar that made a recording, as a sensor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.recordings.recording import Recording
+from assoc.sensors.radar import Radar2D
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def radar_of(
+    recording: Recording,
+    *,
+    range_noise: float | None = None,
+    azimuth_noise: float | None = None,
+    detection_probability: float = 0.8,
+    false_alarm_rate: float = 2.5,
+    name: str = "radar",
+) -> Radar2D:
+    """Describe the radar of a recording; it stands at the origin.
+
+    Parameters
+    ----------
+    recording : Recording
+    range_noise, azimuth_noise : float, optional
+        Standard deviations, metres and radians. Without them they are taken from the steps in which the plots
+        come: step / sqrt(12), the deviation of rounding.
+    detection_probability : float, default 0.8
+    false_alarm_rate : float, default 2.5
+        False plots in a rotation.
+    name : str
+
+    Returns
+    -------
+    Radar2D
+        Its field of view is the full circle, out to the farthest plot and two steps more.
+
+    Raises
+    ------
+    InvalidInputError
+        The plots do not come in steps, and no noise is given.
+    """
+    steps = [
+        _noise("range_noise", range_noise, recording.ranges),
+        _noise("azimuth_noise", azimuth_noise, recording.bearings),
+    ]
+    reach = float(recording.ranges.max()) + 8.0 * steps[0] if len(recording) else 1.0
+    return Radar2D(
+        position=np.zeros(3),
+        noise=np.array(steps),
+        detection_probability=detection_probability,
+        false_alarm_rate=false_alarm_rate,
+        field_of_view=np.array([[0.0, reach], [-math.pi, math.pi]]),
+        name=name,
+    )
+
+
+def _noise(name: str, given: float | None, values: Array) -> float:
+    if given is not None:
+        if isinstance(given, bool) or not 0 < given < math.inf:
+            raise InvalidInputError(f"{name}: expected a number > 0, got {given!r}")
+        return float(given)
+    step = resolution(values)
+    if step == 0.0:
+        raise InvalidInputError(f"{name}: the plots do not come in steps that would tell it, so it must be given")
+    return step / math.sqrt(12.0)
+
+
+def resolution(values: Array) -> float:
+    """Step in which values come (n,), or 0 if they do not come in steps.
+
+    It is the smallest difference between two of them, if all are its multiples within 5 % of it.
+    """
+    distinct = np.unique(values)
+    if len(distinct) < 3:
+        return 0.0
+    gaps = np.diff(distinct)
+    # printed with a few digits, one value is two that differ in the last of them
+    gaps = gaps[gaps > 1e-4 * gaps.max()]
+    step = float(gaps.min())
+    # the step itself is rounded: let the farthest multiples correct it
+    for _ in range(4):
+        counts = np.round(distinct / step)
+        if not counts.any():
+            return 0.0
+        step = float(distinct @ counts / (counts @ counts))
+    off = np.abs(distinct - np.round(distinct / step) * step)
+    return step if (off <= 0.05 * step).all() and len(distinct) < 20 * len(values) ** 0.5 + 20 else 0.0

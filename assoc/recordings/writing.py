@@ -1,0 +1,47 @@
+"""Radar plots to a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+
+import numpy as np
+
+from assoc._files import write_atomically
+from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.recordings.recording import Recording
+
+
+def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
+    """Write plots so that `read_plots` reads them back.
+
+    Columns are time (s), range_nmi, bearing_deg, mode3, altitude_fl, and aircraft where the sources are known.
+    The file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    recording : Recording
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    known = recording.sources is not None
+    writer.writerow(["time", "range_nmi", "bearing_deg", "mode3", "altitude_fl", *(["aircraft"] if known else [])])
+    columns = [
+        [_short(value, 6) for value in recording.times],
+        [_short(value, 6) for value in recording.ranges / NAUTICAL_MILE],
+        [_short(value, 8) for value in np.degrees(recording.bearings)],
+        recording.identities.tolist(),
+        ["" if math.isnan(value) else _short(value, 3) for value in recording.altitudes / FLIGHT_LEVEL],
+    ]
+    if recording.sources is not None:
+        columns.append(recording.sources.tolist())
+    writer.writerows(zip(*columns, strict=True))
+    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+
+
+def _short(value: float, digits: int) -> str:
+    """Text of a number without zeros at its end."""
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".")

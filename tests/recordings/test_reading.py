@@ -1,0 +1,228 @@
+"""Plots from CSV: the paper's table as it is, units, what is mended, and one clear line for what is not."""
+
+from __future__ import annotations
+
+import math
+import os
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from assoc.errors import InvalidInputError
+from assoc.recordings import Recording, garbled_altitudes, radar_of, read_plots, write_plots
+from tests.recordings.common import TABLE_2_1, circling
+
+
+def written(folder, text):
+    path = folder / "plots.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_the_papers_table(tmp_path):
+    recording = read_plots(written(tmp_path, TABLE_2_1))
+    assert len(recording) == 20
+    assert recording.times[0] == 13 * 60 + 6
+    assert recording.times[-1] - recording.times[0] == 23.0
+    assert recording.ranges[:2] == pytest.approx([117 * 1852, 21 * 1852])
+    # 220.8 deg from north: south-west
+    assert recording.positions[0] == pytest.approx(
+        117 * 1852 * np.array([math.sin(math.radians(220.8352)), math.cos(math.radians(220.8352))])
+    )
+    assert (recording.positions[0] < 0).all()
+    assert np.degrees(recording.bearings[:3]) == pytest.approx([220.8352, 235.2527, 248.6154])
+    assert recording.lines.tolist() == list(range(2, 22))
+    assert recording.identities[recording.decoded].min() == 902
+    assert np.flatnonzero(~recording.decoded).tolist() == [3]
+    assert recording.altitudes[0] == pytest.approx(22_000 * 0.3048)
+    # 2 for an aircraft that is at 400 in the next turn, and twice where 79 follows
+    assert np.flatnonzero(recording.garbled).tolist() == [3, 4, 11]
+    assert np.isnan(recording.trusted_altitudes).sum() == 3
+    assert "1 plots not decoded" in recording.summary()
+    assert "3 garbled" in recording.summary()
+    assert sum(recording.notes.values()) == 0
+
+
+def test_the_radar_behind_the_papers_table(tmp_path):
+    radar = radar_of(read_plots(written(tmp_path, TABLE_2_1)))
+    # whole nautical miles, and bearings in steps of 1440 / 4095 deg
+    assert radar.noise == pytest.approx([1852 / 12**0.5, math.radians(1440 / 4095) / 12**0.5], rel=1e-4)
+    assert radar.in_view(read_plots(written(tmp_path, TABLE_2_1)).measurements).all()
+    with pytest.raises(InvalidInputError, match="range_noise: the plots do not come in steps"):
+        radar_of(Recording(np.arange(50.0), np.random.default_rng(0).uniform(1e3, 1e5, 50), np.zeros(50)))
+    given = radar_of(circling(), range_noise=10.0, azimuth_noise=1e-3)
+    assert given.noise.tolist() == [10.0, 1e-3]
+    with pytest.raises(InvalidInputError, match="azimuth_noise: expected a number > 0"):
+        radar_of(circling(), range_noise=10.0, azimuth_noise=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("time,range_km,bearing_rad\n5,1.852,0.5\n", {}),
+        ("t;r;b\n5;1;28.64788976\n", {"columns": {"time": "t", "range": "r", "bearing": "b"}}),
+        ("TIME\tRange\tBEARING\tother\n5\t1852\t28.64788976\tx\n", {"units": {"range": "m"}}),
+        ('"time","range_nm","bearing_deg"\r\n"5"," 1 ",28.64788976\r\n\r\n', {}),
+        ("\ufefftime,range,bearing\n0:00:05,1,28.64788976", {}),
+        ("time,range,bearing\n1970-01-01T00:00:05Z,1,28.64788976", {}),
+        ("time,range,bearing\n1970-01-01T01:00:05+01:00,1,388.64788976", {}),
+    ],
+)
+def test_columns_units_and_times(tmp_path, text, options):
+    recording = read_plots(written(tmp_path, text), **options)
+    assert recording.times.tolist() == [5.0]
+    assert recording.ranges == pytest.approx([1852.0])
+    assert recording.bearings == pytest.approx([0.5])
+    assert not recording.decoded.any()
+    assert np.isnan(recording.altitudes).all()
+
+
+HEAD = "time,range,bearing,mode3,altitude\n"
+
+
+def test_disorder_repeats_fillers_and_midnight(tmp_path):
+    text = HEAD + (
+        "23:59:50,10,5,1,100\n23:59:56,10,5,1,100\n23:59:53,11,5,2,100\n0:00:02,12,5,1,100\n"
+        "0:00:02,12,5,1,100\n0,0,0,0,0\n23:59:59,13,5,3,100\n0:00:04,14,5,1,100\n"
+    ).replace("0,0,0,0,0", "0:00:03,0,0,0,0")
+    recording = read_plots(written(tmp_path, text))
+    assert np.diff(recording.times).tolist() == [3, 3, 3, 3, 2]
+    assert recording.lines.tolist() == [2, 4, 3, 8, 5, 9]
+    assert recording.notes == {
+        "late plots sorted in": 2,
+        "repeated rows left out": 1,
+        "rows of zeros left out": 1,
+        "midnights passed": 1,
+    }
+    assert "midnights passed: 1" in recording.summary()
+
+
+def test_a_jump_back_is_an_error_with_its_line(tmp_path):
+    path = written(tmp_path, HEAD + "100,10,5,1,100\n7200,10,5,1,100\n7201,10,5,1,100\n3600,10,5,1,100\n")
+    with pytest.raises(InvalidInputError, match="line 5: the time jumps back by 3601 s, expected at most 30"):
+        read_plots(path)
+    recording = read_plots(path, max_disorder=4000.0)
+    # gaps of hours are no error
+    assert recording.times.tolist() == [100, 3600, 7200, 7201]
+    assert recording.lines.tolist() == [2, 5, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "has no header line"),
+        ("\n\n", "has no header line"),
+        (HEAD, "holds no plots"),
+        ("time,range\n1,2\n", "no column bearing or theta for the bearing; it has: 'time, range'"),
+        ("time,time,range,bearing\n", "the column 'time' is there 2 times"),
+        (HEAD + "1,2,3,4,5\nx,2,3,4,5\n", "line 3, column 'time': expected seconds or an ISO date, got 'x'"),
+        (HEAD + "0:00:01,2,3,4,5\n2,2,3,4,5\n", "line 3, column 'time': expected h:mm:ss, got '2'"),
+        (HEAD + "0:99:01,2,3,4,5\n", "line 2, column 'time': expected seconds, h:mm:ss or an ISO date"),
+        (HEAD + "2020-13-45T00:00:00,2,3,4,5\n", "line 2, column 'time'"),
+        (HEAD + "1,two,3,4,5\n", "line 2, column 'range': expected a number, got 'two'"),
+        (HEAD + "1,nan,3,4,5\n", "line 2, column 'range': expected a number, got 'nan'"),
+        (HEAD + "1,1e999,3,4,5\n", "line 2, column 'range'"),
+        (HEAD + "1,-2,3,4,5\n", "line 2, column 'range': expected 0 to 1e\\+07, got '-2'"),
+        (HEAD + "1,2,3e9,4,5\n", "line 2, column 'bearing'"),
+        (HEAD + "1,2\n", "line 2, column 'bearing': expected a number, got ''"),
+        (HEAD + "1,2,3,4.5,5\n", "line 2, column 'mode3': expected a whole number, got '4.5'"),
+        (HEAD + "1,2,3,-4,5\n", "line 2, column 'mode3': expected a whole number"),
+        (HEAD + "1,2,3,4,1e300\n", "line 2, column 'altitude'"),
+        (HEAD + "1,٢,3,4,5\n", "line 2, column 'range': expected a number"),
+        (HEAD + "1,2_0,3,4,5\n", "line 2, column 'range': expected a number"),
+        (HEAD + "1,2,3,4," + "5" * 20_000, "line 2 is longer than 10000 bytes"),
+        (b"x" * 1_000_000, "line 1 is longer than 10000 bytes"),
+        (HEAD.encode() + b"1,2,3,4,5\n1,\x00,3,4,5\n", "line 3 holds a NUL byte"),
+        (HEAD.encode("utf-16"), "line 1"),
+        (HEAD.encode() + b"1,2,\xff\xfe,4,5\n", "line 2 is not UTF-8 text"),
+        (HEAD + '1,2,"3,4,5\n', "line 2"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "line 1"),
+    ],
+)
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path, text, message):
+    path = written(tmp_path, text)
+    with pytest.raises(InvalidInputError, match=message) as error:
+        read_plots(path)
+    assert str(error.value).startswith(str(path))
+    assert len(str(error.value).splitlines()) == 1
+    assert len(str(error.value)) < 400
+
+
+def test_other_refusals(tmp_path):
+    with pytest.raises(InvalidInputError, match="No such file"):
+        read_plots(tmp_path / "none.csv")
+    with pytest.raises(InvalidInputError, match="cannot be read"):
+        read_plots(tmp_path)
+    path = written(tmp_path, TABLE_2_1)
+    for options, message in (
+        ({"columns": {"time": "when"}}, "no column 'when' for the time"),
+        ({"columns": {"height": "x"}}, "unknown meaning 'height'"),
+        ({"columns": {"time": "range"}}, "two meanings have the same column"),
+        ({"units": {"range": "mile"}}, "expected nmi or km or m for the range, got 'mile'"),
+        ({"units": {"time": "s"}}, "units: unknown meaning 'time'"),
+        ({"max_disorder": -1.0}, "max_disorder"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            read_plots(path, **options)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.one_of(st.binary(max_size=200), st.text(alphabet='0123456789:.,;"\n\r\t-eE naif', max_size=120)))
+def test_any_bytes_give_a_recording_or_one_line(tmp_path, content):
+    raw = content if isinstance(content, bytes) else HEAD.encode() + content.encode()
+    path = written(tmp_path, raw)
+    try:
+        read_plots(path)
+    except InvalidInputError as error:
+        assert str(error).startswith(str(path))
+        assert len(str(error).splitlines()) == 1
+
+
+def test_what_is_written_is_read_back(tmp_path):
+    recording = circling()
+    write_plots(tmp_path / "out.csv", recording)
+    back = read_plots(tmp_path / "out.csv")
+    assert back.times == pytest.approx(recording.times, abs=1e-6)
+    assert back.measurements == pytest.approx(recording.measurements, abs=1e-2)
+    assert back.identities.tolist() == recording.identities.tolist()
+    assert back.sources.tolist() == recording.sources.tolist()
+    assert os.listdir(tmp_path) == ["out.csv"]
+
+
+def test_garbled_altitudes():
+    levels = [300, 302, 2, 304, 512, 305, 120, 306, np.nan, 307, 100, 2, 90]
+    identities = [5] * 10 + [0, 0, 6]
+    found = np.flatnonzero(garbled_altitudes(levels, identities)).tolist()
+    # 120 is no known code, but nobody falls that far and comes back
+    assert found == [2, 4, 6, 11]
+    assert np.flatnonzero(garbled_altitudes(levels, identities, codes=[])).tolist() == [2, 4, 6]
+    # a steady climb is none
+    assert not garbled_altitudes(np.arange(50.0, 350.0, 10.0), np.ones(30, dtype=int)).any()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"times": [1.0, 0.0]}, "times must not decrease, plot 1 does"),
+        ({"ranges": [1.0, -1.0]}, "ranges must be 0 or more"),
+        ({"ranges": [1.0]}, "ranges must have shape"),
+        ({"identities": [1.5, 2.0]}, "identities must be whole numbers"),
+        ({"identities": [-1, 2]}, "identities must be 0 or more"),
+        ({"altitudes": [np.inf, 1.0]}, "altitudes must be numbers or NaN"),
+        ({"sources": [1]}, "sources must be whole numbers of shape"),
+    ],
+)
+def test_a_recording_is_checked(change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Recording(**{"times": [0.0, 1.0], "ranges": [1.0, 1.0], "azimuths": [0.0, 0.0], **change})
+
+
+def test_rows_of_a_recording():
+    recording = circling()
+    part = recording.take(recording.sources == 3)
+    assert (part.identities == 4).all()
+    assert len(part) == (recording.sources == 3).sum()
+    assert len(recording.take([])) == 0
+    assert recording.take([]).summary() == "no plots"

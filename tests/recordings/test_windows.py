@@ -1,0 +1,151 @@
+"""Windows hold each aircraft once, as the antenna does; rotation times are found; other groupings are as described."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assoc.errors import InvalidInputError
+from assoc.recordings import (
+    Recording,
+    clustering_time_window,
+    estimate_rotation,
+    fixed_groups,
+    groups_of_sizes,
+    irregular_groups,
+    read_plots,
+)
+from tests.recordings.common import GROUPS_WITH_WINDOW, TABLE_2_1, circling
+
+
+def table(folder):
+    path = folder / "table.csv"
+    path.write_text(TABLE_2_1)
+    return read_plots(path)
+
+
+def test_the_papers_windows(tmp_path):
+    recording = table(tmp_path)
+    windows = clustering_time_window(recording, 9.5, by="time")
+    found = [
+        {(round(z[0] / 1852), int(one)) for z, one in zip(w.measurements, w.identities, strict=True)} for w in windows
+    ]
+    assert found[:2] == GROUPS_WITH_WINDOW
+    assert [len(w) for w in windows] == [8, 6, 6]
+    # by the antenna, 906 (bearing 212 deg, before 902's 221) opens the second turn and not ends the first
+    assert [len(w) for w in clustering_time_window(recording, 9.5)] == [7, 7, 6]
+    assert estimate_rotation(recording) == pytest.approx(9.5, abs=0.15)
+
+
+def holds_each_once(recording, windows):
+    rows = np.concatenate([w.rows for w in windows])
+    assert np.sort(rows).tolist() == list(range(len(recording)))
+    assert all(len(np.unique(recording.sources[w.rows])) == len(w) for w in windows)
+    assert all((np.diff(w.times) >= 0).all() for w in windows)
+    assert [w.number for w in windows] == sorted({w.number for w in windows})
+    for w in windows:
+        assert (w.times == recording.times[w.rows]).all()
+        assert (w.measurements == recording.measurements[w.rows]).all()
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10_000), st.sampled_from([4.0, 9.5, 12.0]), st.sampled_from([0.0, 0.1]))
+def test_each_aircraft_once_in_a_window(seed, turn, jitter):
+    # the sector from 100 to 160 deg stays empty, and is found
+    bearings = np.radians(160 + 300 * np.random.default_rng(seed).random(8))
+    recording = circling(turn=turn, turns=20, seed=seed, jitter=jitter * turn, bearings=bearings)
+    windows = clustering_time_window(recording, turn)
+    holds_each_once(recording, windows)
+    assert len(windows) <= 21
+
+
+def test_stamps_in_whole_seconds_and_an_estimated_rotation():
+    recording = circling(turns=60, step=1.0, bearings=np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60]))
+    estimated = estimate_rotation(recording)
+    assert estimated == pytest.approx(9.5, abs=0.01)
+    windows = clustering_time_window(recording)
+    holds_each_once(recording, windows)
+    # cut by time alone, rounded stamps put an aircraft into a window twice
+    by_time = clustering_time_window(recording, 9.5, by="time")
+    assert any(len(np.unique(recording.sources[w.rows])) < len(w) for w in by_time)
+
+
+@pytest.mark.parametrize("turn", [2.5, 4.8, 9.5, 12.0, 28.0])
+def test_the_rotation_is_found(turn):
+    assert estimate_rotation(circling(turn=turn, turns=60)) == pytest.approx(turn, rel=1e-3)
+
+
+def test_the_rotation_of_a_single_aircraft():
+    assert estimate_rotation(circling(turns=60, aircraft=1, jitter=0.05)) == pytest.approx(9.5, rel=0.01)
+
+
+def test_no_rotation_in_noise_or_too_little():
+    rng = np.random.default_rng(1)
+    noise = Recording(np.sort(rng.uniform(0, 900, 800)), np.ones(800), rng.uniform(-3, 3, 800))
+    with pytest.raises(InvalidInputError, match="no rotation time from 2 to 30 s fits"):
+        estimate_rotation(noise)
+    with pytest.raises(InvalidInputError, match="cannot be estimated from 2 plots"):
+        clustering_time_window(Recording([0.0, 1.0], [1.0, 1.0], [0.0, 0.1]))
+    assert clustering_time_window(Recording([], [], [])) == []
+    for rotation in (0.0, -1.0, math.nan, math.inf, "9.5"):
+        with pytest.raises(InvalidInputError, match="rotation: expected seconds > 0"):
+            clustering_time_window(circling(), rotation)
+    with pytest.raises(InvalidInputError, match="by: expected"):
+        clustering_time_window(circling(), 9.5, by="bearing")
+
+
+def joined(*parts):
+    return Recording(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("times", "ranges", "azimuths", "identities")),
+        sources=np.concatenate([p.sources for p in parts]),
+    )
+
+
+def test_gaps_of_hours():
+    bearings = np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60])
+    # after three hours and a bit the antenna is somewhere else
+    parts = [circling(turns=30, bearings=bearings, seed=k, start=k * 11_003.7) for k in range(3)]
+    recording = joined(*parts)
+    assert estimate_rotation(recording) == pytest.approx(9.5, rel=1e-3)
+    windows = clustering_time_window(recording)
+    holds_each_once(recording, windows)
+    assert all(w.times[-1] - w.times[0] < 2 * 9.5 for w in windows)
+    assert len(windows) <= 3 * 31
+
+
+def test_a_drifting_motor():
+    # the rotation slows down by 2 %: at the end the antenna is four turns behind the first rotation time
+    bearings = np.radians([170, 200, 240, 280, 300, 350, 10, 40, 60])
+    recording = circling(turns=400, bearings=bearings, drift=5e-4)
+    stretched = recording.times + 2.5e-6 * (recording.times - 1000.0) ** 2
+    slowing = Recording(
+        stretched, recording.ranges, recording.azimuths, recording.identities, sources=recording.sources
+    )
+    holds_each_once(slowing, clustering_time_window(slowing, 9.5))
+
+
+def test_groupings_without_a_window(tmp_path):
+    recording = circling(turns=400)
+    groups = irregular_groups(recording, np.random.default_rng(3))
+    assert np.concatenate([g.rows for g in groups]).tolist() == list(range(len(recording)))
+    span = recording.times[-1] - recording.times[0]
+    assert span / (groups[-1].number + 1) == pytest.approx(6.2, rel=0.15)
+    # some are longer than a rotation: an aircraft is in them twice
+    assert any(len(np.unique(recording.sources[g.rows])) < len(g) for g in groups)
+    again = irregular_groups(recording, np.random.default_rng(3))
+    assert [g.rows.tolist() for g in again] == [g.rows.tolist() for g in groups]
+    lengths = np.diff([g.times[0] for g in fixed_groups(recording, 6.2)])
+    assert lengths.mean() == pytest.approx(6.2, rel=0.01)
+    sizes = groups_of_sizes(table(tmp_path), [10, 6, 4])
+    assert [len(g) for g in sizes] == [10, 6, 4]
+    for call, message in (
+        (lambda: groups_of_sizes(recording, [1, 2]), "sizes: expected whole numbers"),
+        (lambda: fixed_groups(recording, 0.0), "seconds: expected"),
+        (lambda: irregular_groups(recording, np.random.default_rng(0), mean=-1.0), "mean, shape"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            call()
