@@ -34,7 +34,7 @@ _TURN = 2.0 * math.pi
 _WEAK = 1.0
 _MAX_STEPS = 100
 # nearer to a sensor than this (metres) the derivatives of angles are those at this distance
-_NEAREST = 0.01
+_NEAREST = 1e-9
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
 _POOR_FIT = 10.0
 
@@ -414,6 +414,10 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
             # numerically singular: the region's width is all that can be said
             c0, c3, c5 = sensors.half[0] ** 2, sensors.half[1] ** 2, sensors.half[2] ** 2
             c1 = c2 = c4 = 0.0
+        elif not _solve((c0, c1, c2, c3, c4, c5), 0.0, 0.0, 0.0)[0]:
+            # longer than thin by more digits than there are: rounding must not leave it indefinite
+            least = 4e-15 * (c0 + c3 + c5)
+            c0, c3, c5 = c0 + least, c3 + least, c5 + least
         C = covariances[t]
         C[0, 0], C[1, 1], C[2, 2] = c0, c3, c5
         C[0, 1] = C[1, 0] = c1

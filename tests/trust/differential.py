@@ -1,0 +1,205 @@
+"""Every way to an answer on the same random problems, against exact arithmetic and against each other.
+
+    python -m tests.trust.differential --count 5000 --seed 1 [--ways exact,aco] [--verbose]
+
+prints the faults found (none, one hopes), each with the seed and number that make it again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+from assoc.solution import OPTIMALITY_TOLERANCE, Solution
+from assoc.solvers.front import assign
+from assoc.solvers.kbest import kbest
+from tests.trust.problems import Case, draw, exact_cost, exact_optimum
+
+Way = Callable[[AssignmentProblem], list[Solution]]
+
+
+def _by(solver: str, **parameters: object) -> Way:
+    return lambda problem: [assign(problem, solver, **parameters)]
+
+
+def _through_a_file(problem: AssignmentProblem) -> list[Solution]:
+    """Solve what comes back from an npz file; the choice must be as good as that of the original."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "problem.npz"
+        problem.save(path)
+        again = AssignmentProblem.load(path)
+    if not (
+        np.array_equal(again.tuples, problem.tuples)
+        and again.costs.tobytes() == problem.costs.tobytes()
+        and np.array_equal(again.sizes, problem.sizes)
+        and again.dummy == problem.dummy
+    ):
+        raise AssertionError("the problem changed on its way through a file")
+    return [assign(again, "exact")]
+
+
+def _through_a_tensor(problem: AssignmentProblem) -> list[Solution]:
+    """Solve the problem written out densely."""
+    again = AssignmentProblem.from_dense(problem.to_dense(), dummy=problem.dummy)
+    answer = assign(again, "exact")
+    # rows of the other problem: find the same tuples, at their smaller cost, in this one
+    least: dict[tuple[int, ...], int] = {}
+    for i in np.argsort(-problem.costs, kind="stable").tolist():
+        least[tuple(problem.tuples[i].tolist())] = i
+    indices = np.array([least[tuple(row)] for row in answer.tuples.tolist()], dtype=np.intp)
+    return [
+        Solution(
+            answer.tuples,
+            indices,
+            answer.cost,
+            answer.lower_bound,
+            "exact",
+            answer.iterations,
+            answer.runtime,
+        )
+    ]
+
+
+WAYS: dict[str, Way] = {
+    "exact": _by("exact"),
+    "greedy": _by("greedy"),
+    "aco": _by("aco"),
+    "aco paper": _by("aco", mode="paper"),
+    "genetic": _by("genetic"),
+    "tabu": _by("tabu"),
+    "lagrangian": _by("lagrangian"),
+    "lagrangian cold": _by("lagrangian", warm_start=False, polish=False),
+    "milp scip": _by("milp"),
+    "milp cp_sat": _by("milp", backend="cp_sat"),
+    "milp highs": _by("milp", backend="highs"),
+    "kbest": lambda problem: kbest(problem, 4),
+    "file": _through_a_file,
+    "tensor": _through_a_tensor,
+}
+PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor")
+"""Ways that promise the optimum on problems of this size."""
+
+
+def rounding(problem: AssignmentProblem) -> Fraction:
+    """What float64 can lose on sums of these costs: the oracle knows the optimum better than a solver can."""
+    largest = sum(map(Fraction, np.abs(problem.costs).tolist()), Fraction(0))
+    return largest * Fraction(1, 10**15)
+
+
+def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way: Way) -> Iterator[str]:
+    """What is wrong with the answer that comes this way; ``optimum`` None: there is no solution."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            answers = way(problem)
+    except InfeasibleError:
+        if optimum is not None:
+            yield "says infeasible"
+        return
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
+        return
+    if optimum is None:
+        yield "answers a problem that has no solution"
+        return
+    for place, answer in enumerate(answers):
+        yield from (f"{text} (place {place})" for text in _faults_of(problem, optimum, answer))
+    first = answers[0]
+    room = rounding(problem)
+    if name in PROVING:
+        excess = exact_cost(problem, first.indices) - optimum
+        if excess > Fraction(OPTIMALITY_TOLERANCE) * max(1, abs(optimum)) + room:
+            yield f"is {float(excess):.3g} above the optimum {float(optimum):.6g}"
+        if first.status != "optimal" and first.gap > float(room):
+            yield f"is not certified: gap {first.gap:.3g} of {first.cost:.6g}"
+    costs = [answer.cost for answer in answers]
+    if costs != sorted(costs):
+        yield "ranks its answers wrongly"
+    if len({answer.tuples.tobytes() for answer in answers}) != len(answers):
+        yield "lists a solution twice"
+
+
+def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) -> Iterator[str]:
+    if not np.array_equal(problem.tuples[answer.indices], answer.tuples):
+        yield "names other tuples than it indexes"
+    smallest = int(problem.sizes.min())
+    for s, size in enumerate(problem.sizes.tolist()):
+        column = answer.tuples[:, s]
+        used = np.bincount(column[column > 0], minlength=size + 1)[1:]
+        if (used > 1).any() or ((problem.dummy or size == smallest) and (used == 0).any()):
+            yield f"is not feasible in sensor {s + 1}"
+    cost = exact_cost(problem, answer.indices)
+    if not math.isfinite(answer.cost) or float(cost) != answer.cost:
+        yield f"says cost {answer.cost!r}, its tuples cost {float(cost)!r}"
+    # nan fails every comparison; a bound may be -inf where nothing is known
+    if not answer.lower_bound <= answer.cost:
+        yield f"has the bound {answer.lower_bound!r} above its cost {answer.cost!r}"
+    if answer.solver != "kbest" and answer.lower_bound > -math.inf:
+        over = Fraction(answer.lower_bound) - optimum
+        if over > rounding(problem) * Fraction(1, 100):
+            yield f"has a bound {float(over):.3g} above the optimum {float(optimum)!r}"
+    if answer.solver != "kbest" and answer.status == "optimal":
+        excess = cost - optimum
+        if excess > Fraction(1.01 * OPTIMALITY_TOLERANCE) * max(1, abs(cost)):
+            yield f"says optimal, {float(excess):.3g} above the optimum {float(optimum):.6g}"
+
+
+def judge(case: Case, names: list[str]) -> list[str]:
+    """All faults on one case, as lines."""
+    try:
+        optimum: Fraction | None = exact_optimum(case.problem)
+    except InfeasibleError:
+        optimum = None
+    found = [f"{name} {text}" for name in names for text in faults(case.problem, optimum, name, WAYS[name])]
+    if optimum is not None:
+        costs = [name for name in names]
+        del costs
+    return found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the program; exit code 1 if there were faults."""
+    parser = argparse.ArgumentParser(description="All solvers on random problems, against exact arithmetic.")
+    parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=int, default=0)
+    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
+    chosen = parser.parse_args(arguments)
+    names = chosen.ways.split(",")
+    kinds: Counter[str] = Counter()
+    shapes: Counter[str] = Counter()
+    started = time.perf_counter()
+    for number in range(chosen.start, chosen.start + chosen.count):
+        case = draw(chosen.seed, number)
+        shapes[case.structure] += 1
+        for line in judge(case, names):
+            kind = f"[{case.temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
+            kinds[kind] += 1
+            if kinds[kind] <= chosen.show:
+                print(f"seed {chosen.seed} number {number} ({case.structure}, {case.temper}): {line}", flush=True)
+    print(
+        f"{chosen.count} problems, {chosen.count * len(names)} answers, {time.perf_counter() - started:.0f} s:"
+        f" {sum(kinds.values())} faults"
+    )
+    for kind, count in kinds.most_common():
+        print(f"{count:6d} {kind}")
+    return 1 if kinds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,330 @@
+"""Random problems in every shape and temper, small enough for an exact oracle; the same seed, the same problem.
+
+A case is drawn as a *structure* (which tuples there are) and a *temper* (what they cost); both are drawn at
+random by `draw`, or one after the other by whoever wants them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+# the oracle below visits sets of covered measurements: 14 must-cover measurements are quick, 20 are not
+_MOST_ROWS = 14
+
+
+@dataclass(frozen=True)
+class Case:
+    """A problem and how it came about."""
+
+    problem: AssignmentProblem
+    structure: str
+    temper: str
+    number: int
+
+
+def draw(seed: int, number: int) -> Case:
+    """Draw case ``number`` of a seed."""
+    rng = np.random.default_rng([seed, number])
+    structure = str(rng.choice(list(STRUCTURES)))
+    temper = str(rng.choice(list(TEMPERS)))
+    return Case(make(rng, structure, temper), structure, temper, number)
+
+
+def make(rng: np.random.Generator, structure: str, temper: str) -> AssignmentProblem:
+    """Draw a problem of one structure and temper."""
+    tuples, sizes, dummy = STRUCTURES[structure](rng)
+    costs = TEMPERS[temper](rng, tuples, sizes)
+    order = rng.permutation(len(tuples))
+    return AssignmentProblem(tuples[order], costs[order], sizes, dummy=dummy)
+
+
+def exact_optimum(problem: AssignmentProblem) -> Fraction:
+    """Optimal cost in exact arithmetic, by recursion over the sets of covered measurements.
+
+    Raises
+    ------
+    InfeasibleError
+        The problem has no solution.
+    """
+    sizes = problem.sizes.tolist()
+    smallest = min(sizes)
+    order = sorted(range(len(sizes)), key=lambda s: not (problem.dummy or sizes[s] == smallest))
+    offset, bits, to_cover = [0] * len(sizes), 0, 0
+    for s in order:
+        offset[s] = bits
+        bits += sizes[s]
+        if problem.dummy or sizes[s] == smallest:
+            to_cover = bits
+    # all costs as whole numbers of the smallest unit among them: sums are exact and quick
+    ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
+    unit = max((denominator for _, denominator in ratios), default=1)
+    covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
+    best: dict[int, int] = {}
+    for row, (numerator, denominator) in zip(problem.tuples.tolist(), ratios, strict=True):
+        mask = sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i)
+        price = numerator * (unit // denominator)
+        if mask not in best or price < best[mask]:
+            best[mask] = price
+    for mask, price in best.items():
+        low = (mask & -mask).bit_length() - 1
+        if low < to_cover:
+            covering[low].append((mask, price))
+    memo: dict[int, int | None] = {}
+
+    def rest(covered: int) -> int | None:
+        low = (~covered & -~covered).bit_length() - 1
+        if low >= to_cover:
+            return 0
+        if covered not in memo:
+            least = None
+            for mask, price in covering[low]:
+                if not mask & covered:
+                    more = rest(covered | mask)
+                    if more is not None and (least is None or price + more < least):
+                        least = price + more
+            memo[covered] = least
+        return memo[covered]
+
+    answer = rest(0)
+    if answer is None:
+        raise InfeasibleError("no solution")
+    return Fraction(answer, unit)
+
+
+def exact_cost(problem: AssignmentProblem, indices: NDArray[np.intp]) -> Fraction:
+    """Cost of a choice of tuples in exact arithmetic."""
+    return sum((Fraction(cost) for cost in problem.costs[indices].tolist()), Fraction(0))
+
+
+# --- structures: which tuples there are -------------------------------------------------------------------
+
+
+def _grid(sizes: Ints, first: int) -> Ints:
+    axes = [np.arange(first, n + 1) for n in sizes]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(sizes)).astype(np.int64)
+
+
+def _sizes(rng: np.random.Generator, sensors: int, least: int = 0, rows: int = _MOST_ROWS) -> Ints:
+    most = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3, 6: 2}[sensors]
+    while True:
+        sizes = rng.integers(least, most + 1, sensors)
+        if sizes.sum() <= rows:
+            return sizes.astype(np.int64)
+
+
+def _real(tuples: Ints) -> Ints:
+    return tuples[np.count_nonzero(tuples, axis=1) >= 2]
+
+
+Structure = tuple[Ints, Ints, bool]
+
+
+def _gated(rng: np.random.Generator) -> Structure:
+    sizes = _sizes(rng, int(rng.integers(2, 7)))
+    tuples = _real(_grid(sizes, 0))
+    return tuples[rng.random(len(tuples)) < rng.choice([0.05, 0.2, 0.5, 1.0])], sizes, True
+
+
+def _with_listed_singletons(rng: np.random.Generator) -> Structure:
+    tuples, sizes, dummy = _gated(rng)
+    every = _grid(sizes, 0)
+    single = every[np.count_nonzero(every, axis=1) == 1]
+    return np.concatenate([tuples, single[rng.random(len(single)) < 0.7]]), sizes, dummy
+
+
+def _with_duplicates(rng: np.random.Generator) -> Structure:
+    tuples, sizes, dummy = _with_listed_singletons(rng)
+    return np.concatenate([tuples, tuples[rng.random(len(tuples)) < 0.5]]), sizes, dummy
+
+
+def _all_gated(rng: np.random.Generator) -> Structure:
+    sizes = _sizes(rng, int(rng.integers(1, 7)))
+    return np.zeros((0, len(sizes)), np.int64), sizes, True
+
+
+def _one_sensor(rng: np.random.Generator) -> Structure:
+    sizes = _sizes(rng, 1)
+    return _grid(sizes, 1)[rng.random(int(sizes[0])) < 0.6], sizes, bool(rng.random() < 0.8)
+
+
+def _one_measurement_each(rng: np.random.Generator) -> Structure:
+    sizes = np.ones(int(rng.integers(2, 7)), np.int64)
+    tuples = _real(_grid(sizes, 0))
+    return tuples[rng.random(len(tuples)) < 0.6], sizes, True
+
+
+def _empty_sensors(rng: np.random.Generator) -> Structure:
+    sizes = _sizes(rng, int(rng.integers(2, 7)))
+    sizes[rng.random(len(sizes)) < 0.5] = 0
+    return _real(_grid(sizes, 0)), sizes, True
+
+
+def _disconnected(rng: np.random.Generator) -> Structure:
+    sensors = int(rng.integers(2, 5))
+    start = np.zeros(sensors, np.int64)
+    blocks = []
+    for _ in range(3):
+        sizes = rng.integers(0, 2 if sensors > 3 else 3, sensors)
+        if (start + sizes).sum() > _MOST_ROWS:
+            break
+        block = _real(_grid(sizes, 0))
+        blocks.append(np.where(block > 0, block + start, 0))
+        start += sizes
+    tuples = np.concatenate(blocks)
+    number = [np.concatenate([[0], rng.permutation(n) + 1]) for n in start]
+    return np.stack([number[s][tuples[:, s]] for s in range(sensors)], axis=1), start, True
+
+
+def _chain(rng: np.random.Generator) -> Structure:
+    """Draw one long component: each tuple shares a measurement with the next, as ghosts of bearings do."""
+    length = int(rng.integers(3, 5))
+    sizes = np.full(3, length, np.int64)
+    steps = rng.integers(0, 2, (2 * length, 3))
+    tuples = np.minimum(1 + np.cumsum(steps, axis=0), length)
+    extra = _grid(sizes, 0)[rng.integers(0, (length + 1) ** 3, 10)]
+    return _real(np.unique(np.concatenate([tuples, extra]), axis=0)), sizes, True
+
+
+def _axial_square(rng: np.random.Generator) -> Structure:
+    sensors = int(rng.integers(2, 6))
+    sizes = np.full(sensors, int(rng.integers(1, {2: 7, 3: 5, 4: 4, 5: 3}[sensors])), np.int64)
+    return _grid(sizes, 1), sizes, False
+
+
+def _axial_rectangular(rng: np.random.Generator) -> Structure:
+    sizes = _sizes(rng, int(rng.integers(2, 6)), least=1, rows=12)
+    return _grid(sizes, 1), sizes, False
+
+
+def _axial_sparse(rng: np.random.Generator) -> Structure:
+    tuples, sizes, dummy = (_axial_square, _axial_rectangular)[rng.integers(2)](rng)
+    return tuples[rng.random(len(tuples)) < rng.choice([0.3, 0.6])], sizes, dummy
+
+
+def _axial_without_anything(rng: np.random.Generator) -> Structure:
+    sizes = rng.integers(0, 2, int(rng.integers(2, 5))).astype(np.int64)
+    return np.zeros((0, len(sizes)), np.int64), sizes, False
+
+
+STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
+    "gated": _gated,
+    "listed singletons": _with_listed_singletons,
+    "duplicates": _with_duplicates,
+    "all gated": _all_gated,
+    "one sensor": _one_sensor,
+    "one measurement each": _one_measurement_each,
+    "empty sensors": _empty_sensors,
+    "disconnected": _disconnected,
+    "chain": _chain,
+    "axial square": _axial_square,
+    "axial rectangular": _axial_rectangular,
+    "axial sparse": _axial_sparse,
+    "axial, nothing": _axial_without_anything,
+}
+
+
+# --- tempers: what the tuples cost ------------------------------------------------------------------------
+
+Temper = Callable[[np.random.Generator, Ints, Ints], Floats]
+
+
+def _normal(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.normal(-2.0, 4.0, len(tuples))
+
+
+def _positive(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.uniform(0.0, 10.0, len(tuples))
+
+
+def _negative(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.uniform(-10.0, 0.0, len(tuples))
+
+
+def _ties(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.integers(-3, 3, len(tuples)).astype(float)
+
+
+def _all_equal(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return np.full(len(tuples), float(rng.choice([-1.0, 0.0, 1.0, -0.1])))
+
+
+def _near_ties(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Costs that differ by about as much as the tolerances."""
+    return -1.0 + rng.integers(0, 5, len(tuples)) * float(rng.choice([1e-6, 1e-8, 1e-9, 1e-10, 1e-15]))
+
+
+def _scaled(factor: float) -> Temper:
+    return lambda rng, tuples, sizes: factor * rng.normal(-0.5, 1.0, len(tuples))
+
+
+def _wide(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.choice([-1.0, 1.0], len(tuples)) * 10.0 ** rng.uniform(-12.0, 12.0, len(tuples))
+
+
+def _prices(scale: float) -> Temper:
+    """Prices of the measurements that nearly cancel, so that sums lose most of their digits."""
+
+    def costs(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+        total = rng.normal(0.0, 1.0, len(tuples))
+        for s, size in enumerate(sizes):
+            price = np.concatenate([[0.0], rng.normal(0.0, scale, int(size))])
+            price[1:] -= price[1:].mean() if size else 0.0
+            total += price[tuples[:, s]]
+        return total
+
+    return costs
+
+
+def _whole_at_the_border(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Whole numbers about where solvers stop treating them as such, and halves."""
+    scale = float(rng.choice([1.0, 3e8, 1e9, 4e15, 9e15]))
+    return rng.integers(-3, 3, len(tuples)) * scale + rng.integers(-2, 3, len(tuples)) * float(rng.choice([0.5, 1.0]))
+
+
+def _dear_singletons(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Singletons so dear, or so cheap, that the tuples' own costs drown in them."""
+    costs = rng.normal(0.0, 5.0, len(tuples))
+    single = np.count_nonzero(tuples, axis=1) == 1
+    return np.where(single, costs * float(rng.choice([-1e9, 1e6, 1e12])), costs)
+
+
+def _forbidden(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return np.where(rng.random(len(tuples)) < 0.4, np.inf, rng.normal(-2.0, 4.0, len(tuples)))
+
+
+def _zeros_of_both_signs(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.choice([0.0, -0.0, 5e-324, -5e-324], len(tuples))
+
+
+TEMPERS: dict[str, Temper] = {
+    "normal": _normal,
+    "positive": _positive,
+    "negative": _negative,
+    "ties": _ties,
+    "all equal": _all_equal,
+    "near ties": _near_ties,
+    "1e-12": _scaled(1e-12),
+    "1e-300": _scaled(1e-300),
+    "1e4": _scaled(1e4),
+    "1e12": _scaled(1e12),
+    "1e290": _scaled(1e290),
+    "wide": _wide,
+    "prices 1e3": _prices(1e3),
+    "prices 1e6": _prices(1e6),
+    "prices 1e12": _prices(1e12),
+    "whole": _whole_at_the_border,
+    "dear singletons": _dear_singletons,
+    "forbidden": _forbidden,
+    "zeros": _zeros_of_both_signs,
+}
