@@ -110,7 +110,9 @@ class Part:
             return
         left = steps * max(1, self.packing.num_rows // 30)
         while left > 0 and not self.closed and not run.should_stop():
-            self.weight += self.improve(self.best, run.rng, min(left, 10))
+            self.improve(self.best, run.rng, min(left, 10))
+            # summed anew: changes of the order of rounding would add up to an improvement that is none
+            self.weight = weight_of(self, self.best)
             left -= 10
 
     def offer(self, owner: Owner, weight: float) -> bool:
@@ -215,7 +217,7 @@ def _take_turn(part: Part, searcher: Searcher, run: Run, iterations: int, patien
         searcher.iterate(part, run.rng)
         part.refine(run, refinement)
         part.iterations += 1
-        part.stalled = 0 if part.weight < before else part.stalled + 1
+        part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
         if part.closed or part.stalled >= patience or part.iterations >= iterations or run.should_stop():
             return True
     return False

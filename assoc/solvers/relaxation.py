@@ -69,6 +69,11 @@ class Relaxation:
     def recover(self, duals: Floats) -> NDArray[np.int64] | None:
         """Return a feasible choice of columns built up sensor by sensor, None where that met a dead end."""
         owner = np.full(duals.size, -1, dtype=np.int64)
+        if self.cols.shape[1] == 1:
+            # with one sensor there is nothing to assign upward: each row takes its cheapest column
+            order = np.argsort(-self.packing.weights, kind="stable")
+            owner[self.cols[order, 0]] = order
+            return np.unique(owner[owner >= 0])
         if not _recover(self.cols, self.packing.weights, self.packing.slack, self.sensor, duals, owner):
             return None
         return np.unique(owner[owner >= 0])
