@@ -56,7 +56,7 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     starts = run.rng.permutation(costs.size)[np.arange(parameters.ants) % costs.size]
     best: NDArray[np.int32] | None = None
     best_weight = np.inf
-    cycle = 0
+    cycle, cut_off = 0, False
     while cycle < parameters.iterations:
         if cycle > 0:
             starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
@@ -71,10 +71,10 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
                 best, best_weight = tour[tour < packing.num_columns].copy(), weight
                 run.record(cycle, weight, -np.inf)
         _lay(pheromone, positive, tours, lengths, parameters.rho)
-        if (owners == owners[0]).all():
+        if (owners == owners[0]).all() or run.should_stop():
             break
-        if run.should_stop():
-            break
+    else:
+        cut_off = True
     if best is None:
         cover = Cover.empty(packing)
         if not cover.complete(run):
@@ -82,6 +82,9 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
         best = cover.columns()
     bound, duals = bound_of_choice(packing, best, run)
     run.record(cycle, float(packing.weights[best].sum()), bound)
+    if cut_off:
+        # said only now: a run that is stopped does not raise its bound
+        run.stopped_by = run.stopped_by or "iterations"
     return Outcome(best, cycle, bound, duals)
 
 

@@ -123,6 +123,8 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     # the proof of a bound over the columns that are left needs the columns that were dropped, too
     proof = search.proof
     bound = min(search.bound, float(packing.weights[columns].sum()))
+    if search.cut_off:
+        run.stopped_by = run.stopped_by or "iterations"
     return Outcome(columns, search.iterations, bound, proof)
 
 
@@ -140,6 +142,7 @@ class _Search:
         self.columns: NDArray[np.int64] | None = None
         self.weight = math.inf
         self.iterations = 0
+        self.cut_off = False
         self._focus(packing, duals, np.arange(packing.num_columns))
 
     def _focus(self, packing: Packing, duals: Floats, place: NDArray[np.int64]) -> None:
@@ -183,6 +186,8 @@ class _Search:
                 self._refine()
             elif not dropped and not self._step(subgradient, factor):
                 break
+        else:
+            self.cut_off = True
 
     def polish(self) -> None:
         """Improve the best solution by cluster search, within the columns that are left."""

@@ -180,6 +180,7 @@ def solve_by(
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
     done = len(parts)
+    cut_off = False
     root_bound = sum(part.bound for part in parts)
     queue: list[tuple[Part, Searcher | None]] = [(part, None) for part in parts]
     while queue:
@@ -191,6 +192,7 @@ def solve_by(
             before, iterations_before = part.weight, part.iterations
             over = _take_turn(part, searcher, run, iterations, patience, refinement)
             done += part.iterations - iterations_before
+            cut_off |= part.iterations >= iterations and part.stalled < patience and not part.closed
             if part.best is None and over:
                 complete(part, run)
             pieces = None if over else split_part(part)
@@ -207,6 +209,9 @@ def solve_by(
             queue.append((part, searcher))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     run.record(done, weight, bound)
+    if cut_off:
+        # said only now: a run that is stopped neither searches other parts nor raises their bounds
+        run.stopped_by = run.stopped_by or "iterations"
     return Outcome(chosen, done, bound, duals)
 
 

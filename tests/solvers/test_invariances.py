@@ -147,6 +147,19 @@ def test_callback_stops(name, hard):
     check_answer(hard, solution.tuples)
 
 
+@pytest.mark.parametrize(
+    ("name", "chosen"),
+    [(name, {}) for name in ("aco", "genetic", "tabu", "lagrangian")] + [("aco", {"mode": "paper"})],
+)
+def test_the_limit_of_iterations_is_named(name, chosen, hard):
+    solution = assign(hard, name, iterations=1, time_limit=20.0, **chosen)
+    assert solution.stopped_by == "iterations" and solution.iterations >= 1
+    check_answer(hard, solution.tuples)
+    # a search that ends by itself is not said to be cut off
+    easy = gated_problem(np.random.default_rng(3), (3, 3, 3), 0.5)
+    assert assign(easy, name, **chosen).stopped_by in ("converged", "gap")
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_trace_never_gets_worse(name):
     problem = gated_problem(np.random.default_rng(12), (9, 9, 9), 0.5, "mixed")
