@@ -9,6 +9,7 @@ and home), numba would fail at import; the cache then goes to a temporary folder
 from __future__ import annotations
 
 import hashlib
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import caching
+from numba.core import caching, event
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -38,6 +39,7 @@ def _source_stamp(solvers: bool) -> str:
 
 _CACHES: Any = caching.CacheImpl
 _CONFIG: Any = numba.config
+_EVENT: Any = event
 _STANDARD_LOCATORS = tuple(_CACHES._locator_classes)
 
 
@@ -67,3 +69,25 @@ _CACHES._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
 def njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``."""
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+
+
+class _Loads(event.Listener):
+    """Counts how often the compiler was asked: for code to compile, or to load from the cache."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def on_start(self, event: Any) -> None:
+        self.count += 1
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+_loads = _Loads()
+_EVENT.register("numba:compiler_lock", _loads)
+
+
+def loaded() -> tuple[int, int]:
+    """Return numbers that change when code is compiled, loaded from the cache, or imported in this process."""
+    return _loads.count, len(sys.modules)

@@ -7,19 +7,17 @@ This is a program: the package must not import it, or ``python -m assoc.solve`` 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from assoc._inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
 from assoc._program import (
     Option,
     Parser,
     given,
     leave_on_interrupt,
-    one_line,
     options,
     run,
     seconds,
@@ -56,9 +54,12 @@ def _solve(words: list[str]) -> None:
     if "kbest" in settings and (explicit or parameters):
         raise InvalidInputError("--kbest: ranks by itself and takes no --solver and no parameters of solvers")
     files = parsed["files"]
-    _check_outputs([path for path in (parsed["json"], parsed["csv"]) if path], files)
+    outputs = [path for path in (parsed["json"], parsed["csv"]) if path]
+    check_distinct(outputs, files)
+    for path in outputs:
+        check_output(path)
 
-    sources = [_load(file) for file in files]
+    sources = [load_source(file) for file in files]
     started = time.perf_counter()
     plan, items = _plan(sources, files, solver, settings, parameters)
     association = plan.gather(_with_progress(plan.run(items, settings.get("jobs", 1)), len(items)))
@@ -142,12 +143,7 @@ def _common(parsed: dict[str, Any]) -> dict[str, Any]:
     if parsed["scans"] is not None:
         found["scans"] = parsed["scans"]
     if parsed["gate_probability"] is not None:
-        try:
-            found["gate_probability"] = float(parsed["gate_probability"])
-        except ValueError:
-            raise InvalidInputError(
-                f"--gate-probability: expected a number, got {parsed['gate_probability']!r}"
-            ) from None
+        found["gate_probability"] = number(parsed["gate_probability"], "--gate-probability")
     if parsed["kbest"] is not None:
         found["kbest"] = whole_number(parsed["kbest"], "--kbest", 1)
     if parsed["max_tuples"] is not None:
@@ -156,33 +152,18 @@ def _common(parsed: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_config(path: str) -> dict[str, Any]:
-    import tomllib
-
     from assoc.solvers import registry
 
-    try:
-        with open(path, "rb") as file:
-            content = tomllib.load(file)
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except ValueError as error:  # TOMLDecodeError and UnicodeDecodeError
-        raise InvalidInputError(f"{path}: is not a TOML file ({one_line(error)})") from None
-    config = {key.replace("-", "_"): value for key, value in content.items()}
-    texts = ("solver", "scans")
-    numbers = ("time_limit", "gate_probability")
+    config = read_toml(path)
     for key, value in config.items():
         if isinstance(value, dict):
             if key not in registry.names():
                 raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(registry.names())}")
             continue
         if key not in _SETTINGS:
-            raise InvalidInputError(
-                f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]"
-            )
-        kind: Any = str if key in texts else (int, float) if key in numbers else int
-        if not isinstance(value, kind) or isinstance(value, bool):
-            expected = "text" if key in texts else "a number" if key in numbers else "a whole number"
-            raise InvalidInputError(f"{path}: {key}: expected {expected}, got {value!r}")
+            raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
+        kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
+        check_kind(value, kind, f"{path}: {key}")
     return config
 
 
@@ -195,52 +176,6 @@ def _section(config: dict[str, Any], solver: str, choices: list[Option]) -> dict
         # unknown names go through: the registry knows what to say about them
         found[name] = by_name[name].check(value, f"[{solver}] {key}") if name in by_name else value
     return found
-
-
-def _check_outputs(outputs: list[str], inputs: list[str]) -> None:
-    """Refuse before the work what could not be written after it."""
-    taken = {os.path.realpath(path): path for path in inputs}
-    for path in outputs:
-        if os.path.realpath(path) in taken:
-            raise InvalidInputError(f"{path}: is given twice, or would overwrite what is read")
-        taken[os.path.realpath(path)] = path
-        if Path(path).is_dir():
-            raise InvalidInputError(f"{path}: is a folder, expected a file name to write")
-        if not Path(path).parent.is_dir():
-            raise InvalidInputError(f"{path}: the folder {Path(path).parent} does not exist")
-
-
-def _load(path: str) -> Scene | AssignmentProblem:
-    found = _format_of(path)
-    if found == "assoc.problem":
-        from assoc.problem import AssignmentProblem
-
-        return AssignmentProblem.load(path)
-    if found is not None and found != "assoc.scene":
-        raise InvalidInputError(
-            f"{path}: has the format {found[:60]!r}, expected 'assoc.scene' or 'assoc.problem'"
-        )
-    from assoc.scene import Scene
-
-    return Scene.load(path)
-
-
-def _format_of(path: str) -> str | None:
-    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
-    import io
-    import zipfile
-
-    import numpy as np
-
-    try:
-        with zipfile.ZipFile(path) as archive:
-            member = archive.getinfo("format.npy")
-            if member.file_size > 10_000:
-                return None
-            text = np.lib.format.read_array(io.BytesIO(archive.read(member)), allow_pickle=False)
-    except Exception:  # whatever a damaged file raises here, the loader says it better
-        return None
-    return str(text) if text.dtype.kind == "U" and text.ndim == 0 else None
 
 
 def _plan(
@@ -267,24 +202,9 @@ def _plan(
     items = plan.items()
     if "scans" in settings:
         counts = [sum(number == n for number, _ in items) for n in range(len(files))]
-        chosen = [
-            _scan_range(settings["scans"], count, file) for count, file in zip(counts, files, strict=True)
-        ]
+        chosen = [scan_range(settings["scans"], count, file) for count, file in zip(counts, files, strict=True)]
         items = [(number, k) for number, k in items if k in chosen[number]]
     return plan, items
-
-
-def _scan_range(text: str, count: int, file: str) -> range:
-    """Parse A:B or A, within the scans of a file."""
-    first, colon, last = text.partition(":")
-    try:
-        start = int(first) if first or not colon else 0
-        stop = (int(last) if last else count) if colon else start + 1
-    except ValueError:
-        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
-    if not 0 <= start < stop <= count:
-        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {file}")
-    return range(start, stop)
 
 
 def _with_progress(scans: Iterator[ScanAssociation], count: int) -> Iterator[ScanAssociation]:

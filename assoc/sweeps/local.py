@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import os
 import pickle
-import shutil
 import signal
-import tempfile
 import threading
 import time
+import uuid
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from assoc.errors import InvalidInputError
 from assoc.sweeps.work import Batch, Job, Result, run_batch
 
 SECONDS_OF_A_BATCH = 0.2
+_JOB = ".job-"
 
 
 def run_here(job: Job, batches: Iterable[Batch]) -> Generator[Result]:
@@ -25,10 +25,11 @@ def run_here(job: Job, batches: Iterable[Batch]) -> Generator[Result]:
         yield run_batch(job, batch)
 
 
-def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[Result]:
+def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path) -> Generator[Result]:
     """Do batches in processes, and yield results as they come.
 
-    What all runs share goes through a file that each process reads once; a task carries its batch alone.
+    What all runs share goes through a file in the study's folder that each process reads once; a task carries
+    its batch alone.
 
     Raises
     ------
@@ -38,9 +39,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
-    with tempfile.TemporaryDirectory(prefix="assoc-sweep-") as folder:
-        path = Path(folder) / "job"
-        path.write_bytes(pickle.dumps(job))
+    with _shared(job, folder) as path:
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
             with _interrupts_ignored():
@@ -54,6 +53,23 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int) -> Generator[
             ) from None
         finally:
             stop_workers()
+
+
+@contextmanager
+def _shared(job: Job, folder: Path) -> Iterator[Path]:
+    """A file of the job in the study's folder, which only one sweep at a time has open."""
+    # what a sweep that was killed together with its workers could not take away
+    for stale in folder.glob(_JOB + "*"):
+        stale.unlink(missing_ok=True)
+    path = folder / f"{_JOB}{uuid.uuid4().hex}"
+    try:
+        try:
+            path.write_bytes(pickle.dumps(job))
+        except OSError as error:
+            raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -83,12 +99,12 @@ _job: tuple[str, Job] | None = None
 def _run(path: str, parent: int, batch: Batch) -> Result:
     global _job
     if _job is None or _job[0] != path:
-        _watch(parent, Path(path).parent)
+        _watch(parent, Path(path))
         _job = path, pickle.loads(Path(path).read_bytes())
     return run_batch(_job[1], batch)
 
 
-def _watch(parent: int, folder: Path) -> None:
+def _watch(parent: int, path: Path) -> None:
     """End with the parent, also when it was killed and could not say so or clean up."""
     if os.getppid() != parent:
         return
@@ -96,7 +112,8 @@ def _watch(parent: int, folder: Path) -> None:
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(1.0)
-        shutil.rmtree(folder, ignore_errors=True)
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
         os._exit(1)
 
     threading.Thread(target=watch, name="parent", daemon=True).start()

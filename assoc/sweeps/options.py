@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assoc._program import one_line, seconds, whole_number
+from assoc._inputs import check_kind, check_output, number, read_toml, scan_range
+from assoc._program import seconds, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from
@@ -146,7 +146,7 @@ def read(given: Mapping[str, Any]) -> Options:
         Anything that is not as ``--help`` says.
     """
     config = given.get("config", "")
-    content = _read_toml(config) if config else {}
+    content = read_toml(config) if config else {}
     tables = {key: content.pop(key) for key in [*content] if key in registry.names() and key not in _KNOWN}
     values = {key: _of_file(config, key, value) for key, value in content.items()}
     for name, value in given.items():
@@ -178,10 +178,7 @@ def _of_text(name: str, value: Any) -> Any:
     if name == "time_limit":
         return seconds(value, flag)
     if name == "gate_probability":
-        try:
-            return float(value)
-        except ValueError:
-            raise InvalidInputError(f"{flag}: expected a number, got {value!r}") from None
+        return number(value, flag)
     if name == "jobs":
         return os.cpu_count() or 1 if value == "all" else whole_number(value, flag, 1)
     return value
@@ -200,10 +197,7 @@ def _of_file(file: str, key: str, value: Any) -> Any:
         return words
     if key == "jobs" and value == "all":
         return _of_text(key, value)
-    kind: Any = str if key in _TEXTS else (int, float) if key in _NUMBERS else int
-    if not isinstance(value, kind) or isinstance(value, bool):
-        expected = "text" if key in _TEXTS else "a number" if key in _NUMBERS else "a whole number"
-        raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
+    check_kind(value, str if key in _TEXTS else float if key in _NUMBERS else int, label)
     if key in _WHOLE or key == "jobs":
         least = _WHOLE.get(key, 1)
         if value < least:
@@ -213,44 +207,9 @@ def _of_file(file: str, key: str, value: Any) -> Any:
     return float(value) if key in _NUMBERS else value
 
 
-def _read_toml(path: str) -> dict[str, Any]:
-    import tomllib
-
-    try:
-        with open(path, "rb") as file:
-            content = tomllib.load(file)
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError and UnicodeDecodeError
-        raise InvalidInputError(f"{path}: is not a TOML file ({one_line(error)})") from None
-    return {key.replace("-", "_"): value for key, value in content.items()}
-
-
-def scan_range(text: str, count: int, name: str) -> range:
-    """Parse A:B or A, within the scans of a source.
-
-    Raises
-    ------
-    InvalidInputError
-        It is not of that form, or reaches beyond.
-    """
-    first, colon, last = text.partition(":")
-    try:
-        start = int(first) if first or not colon else 0
-        stop = (int(last) if last else count) if colon else start + 1
-    except ValueError:
-        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
-    if not 0 <= start < stop <= count:
-        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {name}")
-    return range(start, stop)
-
-
 def check_outputs(folder: str | None, csv: str | None) -> None:
     """Refuse before the work what could not be written after it."""
     if folder is not None and os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
     if csv is not None:
-        if Path(csv).is_dir():
-            raise InvalidInputError(f"{csv}: is a folder, expected a file name to write")
-        if not Path(csv).parent.is_dir() and Path(csv).parent != Path(folder or "."):
-            raise InvalidInputError(f"{csv}: the folder {Path(csv).parent} does not exist")
+        check_output(csv, folder)

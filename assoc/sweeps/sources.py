@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import tempfile
 import zipfile
@@ -11,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
+from assoc._inputs import load_source
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
@@ -68,27 +66,7 @@ def load_sources(files: Sequence[str]) -> tuple[Source, ...]:
     InvalidInputError
         A file is neither, or the same content is given twice.
     """
-    return named([_load(file) for file in files], files)
-
-
-def _load(file: str) -> Scene | AssignmentProblem:
-    found = _format_of(file)
-    if found not in (None, "assoc.scene", "assoc.problem"):
-        raise InvalidInputError(f"{file}: has the format {found!r}, expected 'assoc.scene' or 'assoc.problem'")
-    return AssignmentProblem.load(file) if found == "assoc.problem" else Scene.load(file)
-
-
-def _format_of(file: str) -> str | None:
-    """Return the format that a file claims; None if that cannot be read, which loading will explain."""
-    try:
-        with zipfile.ZipFile(file) as archive:
-            member = archive.getinfo("format.npy")
-            if member.file_size > 10_000:
-                return None
-            text = np.lib.format.read_array(io.BytesIO(archive.read(member)), allow_pickle=False)
-    except Exception:  # whatever a damaged file raises here, the loader says it better
-        return None
-    return str(text)[:60] if text.dtype.kind == "U" and text.ndim == 0 else None
+    return named([load_source(file) for file in files], files)
 
 
 def named(contents: Sequence[Scene | AssignmentProblem], files: Sequence[str]) -> tuple[Source, ...]:

@@ -59,6 +59,8 @@ class Manifest:
     time_limit : float or None
     gating : mapping
         Options of ``assoc.build_problem``.
+    code : str
+        Digest of the solvers' and costs' source files; empty where it is not known.
     """
 
     package: str
@@ -66,6 +68,7 @@ class Manifest:
     sources: Mapping[str, str]
     time_limit: float | None
     gating: Mapping[str, Any]
+    code: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the file holds."""
@@ -73,6 +76,7 @@ class Manifest:
             "format": FORMAT,
             "version": VERSION,
             "assoc": self.package,
+            "code": self.code,
             "seed": self.seed,
             "sources": [{"fingerprint": key, "name": name} for key, name in self.sources.items()],
             "time_limit": self.time_limit,
@@ -85,6 +89,10 @@ class Manifest:
         if self.package != new.package:
             raise InvalidInputError(
                 f"{folder}: this study was made by version {self.package} of assoc, this is {new.package}; {elsewhere}"
+            )
+        if self.code and new.code and self.code != new.code:
+            raise InvalidInputError(
+                f"{folder}: solvers or costs of assoc were changed since this study was begun; {elsewhere}"
             )
         if {*self.sources} != {*new.sources}:
             strange = [name for key, name in new.sources.items() if key not in self.sources]
@@ -242,7 +250,8 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     try:
         sources = {str(one["fingerprint"]): str(one["name"]) for one in content["sources"]}
         limit = None if content["time_limit"] is None else float(content["time_limit"])
-        return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, dict(content["gating"]))
+        gating, code = dict(content["gating"]), str(content.get("code", ""))
+        return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, gating, code)
     except (KeyError, TypeError, ValueError) as error:
         raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
 

@@ -11,6 +11,7 @@ from typing import Any
 import assoc
 from assoc.errors import InvalidInputError
 from assoc.sweeps.batching import Batches, RunNumbers
+from assoc.sweeps.code import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import Source
 from assoc.sweeps.store import Manifest, RunKey, Store
@@ -97,7 +98,7 @@ class Study:
     def manifest(self) -> Manifest:
         """What a folder must say to hold this study."""
         names = {source.fingerprint: source.name for source in self.sources}
-        return Manifest(assoc.__version__, self.seed, names, self.time_limit, dict(self.gating))
+        return Manifest(assoc.__version__, self.seed, names, self.time_limit, dict(self.gating), code_digest())
 
     @property
     def size(self) -> int:
@@ -179,14 +180,14 @@ class Study:
             progress(counts)
         if missing == 0:
             return counts
-        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, assoc.__version__)
+        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, assoc.__version__, code_digest())
         seconds = local.SECONDS_OF_A_BATCH if scheduler is None else cluster.SECONDS_OF_A_BATCH
         batches = Batches(self.settings, self.missing(store), seconds)
         results: Generator[Result]
         if scheduler is not None:
             results = cluster.run_with_dask(job, batches, scheduler)
         elif jobs > 1:
-            results = local.run_with_joblib(job, batches, jobs)
+            results = local.run_with_joblib(job, batches, jobs, store.folder)
         else:
             results = local.run_here(job, batches)
         try:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._compiled import loaded
 from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.sweeps.code import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import Source
 from assoc.sweeps.store import COLUMNS
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 TRACE_POINTS = 16
 _CACHED_TUPLES = 10_000_000
 _WARM_UP_SECONDS = 1.0
-_WARM_UP_PROBLEMS = 8
+_ATTEMPTS = 4
 
 Tuples = set[tuple[int, ...]]
 
@@ -67,6 +69,8 @@ class Job:
         Options of ``assoc.build_problem``.
     package : str
         Version of assoc, which the worker's must be.
+    code : str
+        Digest of its solvers, which the worker's must have, too.
     """
 
     sources: tuple[Source, ...]
@@ -74,16 +78,17 @@ class Job:
     time_limit: float | None
     gating: Mapping[str, Any]
     package: str
+    code: str
     _problems: OrderedDict[tuple[int, int], tuple[AssignmentProblem, Tuples | None]] = field(
         default_factory=OrderedDict, compare=False
     )
     _held: list[int] = field(default_factory=lambda: [0], compare=False)
-    _warm: dict[Any, set[int]] = field(default_factory=dict, compare=False)
+    _warm: set[Any] = field(default_factory=set, compare=False)
     _busy: Any = field(default_factory=threading.Lock, compare=False)
 
     def __reduce__(self) -> Any:
         # what a worker keeps beside stays with that worker
-        return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package)
+        return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package, self.code)
 
     def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
         """Return a problem and its true tuples (None where they are not known); recent ones are kept."""
@@ -124,21 +129,33 @@ class Job:
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
-        """Let a family of settings load its compiled code before the clock of a run starts.
-
-        Several problems, because not every one needs all of the code.
-        """
+        """Let a family of settings load most of its code on its first problem, at the most for a second."""
         from assoc.solvers.front import assign
 
-        met = self._warm.setdefault(setting.family, set())
-        if len(met) >= _WARM_UP_PROBLEMS or id(problem) in met:
+        if setting.family in self._warm:
             return
         limit = min(_WARM_UP_SECONDS, self.time_limit or _WARM_UP_SECONDS)
         try:
             assign(problem, setting.solver, time_limit=limit, **setting.parameters)
         except InfeasibleError:
             pass
-        met.add(id(problem))
+        self._warm.add(setting.family)
+
+    def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
+        """Solve a problem in a time that is the solver's own.
+
+        A run during which code was compiled or loaded, or a module imported, is done again: no choice of problems
+        to warm up on is sure to need all of the code that a later one needs.
+        """
+        from assoc.solvers.front import assign
+
+        self.warm_up(setting, problem)
+        for _ in range(_ATTEMPTS):
+            before = loaded()
+            solution = assign(problem, setting.solver, seed=seed, time_limit=self.time_limit, **setting.parameters)
+            if loaded() == before:
+                break
+        return solution
 
 
 def run_batch(job: Job, batch: Batch) -> Result:
@@ -156,6 +173,8 @@ def run_batch(job: Job, batch: Batch) -> Result:
     started = time.perf_counter()
     if assoc.__version__ != job.package:
         raise InvalidInputError(f"a worker has version {assoc.__version__} of assoc, this is {job.package}")
+    if code_digest() != job.code:
+        raise InvalidInputError("a worker has other code of assoc than this process, though of the same version")
     columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     for run in batch.runs:
         for name, value in zip(COLUMNS, _row(job, batch.settings[run[0]], *run[1:]), strict=True):
@@ -164,15 +183,12 @@ def run_batch(job: Job, batch: Batch) -> Result:
 
 
 def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Sequence[Any]:
-    from assoc.solvers.front import assign
-
     problem, truth = job.problem(source, scan)
     seed = job.seed_of(setting, source, repeat, scan)
     head = (setting.key, job.sources[source].fingerprint, repeat, scan, seed)
     number = None if truth is None else len(truth)
     try:
-        job.warm_up(setting, problem)
-        solution = assign(problem, setting.solver, seed=seed, time_limit=job.time_limit, **setting.parameters)
+        solution = job.solve(setting, problem, seed)
     except InfeasibleError:
         return (*head, None, None, None, None, "infeasible", number, None, [])
     except InvalidInputError as error:

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import pytest
 
@@ -39,7 +38,7 @@ def same(one, other):
 @pytest.fixture(scope="module")
 def slow(scene_of_module):
     """Runs of some 10 ms, so that there is a middle to kill in."""
-    settings = grid("aco", {"mode": ["paper"], "ants": [60], "alpha": [1, 2], "beta": [1, 2]})
+    settings = grid("aco", {"mode": ["paper"], "ants": [30], "alpha": [1, 2], "beta": [1, 2]})
     return Study([scene_of_module], settings, 8)
 
 
@@ -100,11 +99,17 @@ def scheduler(tmp_path):
 
 
 @pytest.fixture
-def workers(scheduler, tmp_path):
+def start_worker(scheduler, tmp_path):
+    """A function that starts one more worker process."""
     words = ["worker", scheduler, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--host", "127.0.0.1"]
-    processes = [start(words, tmp_path, f"worker-{i}.log") for i in range(2)]
+    processes = []
+
+    def start_one():
+        processes.append(start(words, tmp_path, f"worker-{len(processes)}.log"))
+        return processes[-1]
+
     try:
-        yield processes
+        yield start_one
     finally:
         for process in processes:
             stop(process)
@@ -129,12 +134,7 @@ def test_the_job_is_small_and_shared_once(study):
     assert len(pickle.dumps(batch)) < 3000
 
 
-def test_processes_give_the_same(slow, expected, tmp_path):
-    slow.run(tmp_path / "s", jobs=2)
-    assert same(tmp_path / "s", expected)
-
-
-def test_an_interrupted_study_goes_on_on_another_backend(slow, expected, tmp_path):
+def test_an_interrupted_study_goes_on_in_processes_and_is_the_same(slow, expected, tmp_path):
     class EnoughError(Exception):
         pass
 
@@ -164,58 +164,49 @@ def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp
         slow.run(tmp_path / "s", jobs=2, progress=kill_one)
     assert "\n" not in str(raised.value)
     assert 20 <= len(load(tmp_path / "s")) < slow.size
-    slow.run(tmp_path / "s", jobs=2)
+    slow.run(tmp_path / "s")
     assert same(tmp_path / "s", expected)
 
 
-def test_a_cluster_gives_the_same_and_survives_the_loss_of_a_worker(slow, expected, scheduler, workers, tmp_path):
-    def kill_one(counts):
-        if counts.new >= 20 and workers[0].poll() is None:
+def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
+    slow, expected, scheduler, start_worker, tmp_path, monkeypatch
+):
+    from assoc.sweeps.work import Job
+
+    workers = [start_worker(), start_worker()]
+    packed, seen = [], {}
+    plain = Job.__reduce__
+    monkeypatch.setattr(Job, "__reduce__", lambda self: packed.append(1) or plain(self))
+
+    def lose(counts):
+        if counts.new >= 40 and "one lost" not in seen:
+            # once for the scatter, whatever the number of batches (one more where it is measured first)
+            seen["packed"] = len(packed)
             workers[0].kill()
             workers[0].wait(10)
+            seen["one lost"] = counts.new
+        elif counts.new >= 80 and "all lost" not in seen:
+            seen["left"] = workers[1].poll()
+            workers[1].kill()
+            start_worker()
+            seen["all lost"] = counts.new
 
-    more = replace(slow, repeats=8)
-    with Store(tmp_path / "s", more.manifest) as store:
-        counts = more.run_in(store, scheduler=scheduler, progress=kill_one)
-    assert workers[0].poll() == -signal.SIGKILL and workers[1].poll() is None
+    with Store(tmp_path / "s", slow.manifest) as store:
+        counts = slow.run_in(store, scheduler=scheduler, progress=lose)
+    assert 1 <= seen["packed"] <= 2
+    # it went on with the one worker that was left, and then with a new one alone
+    assert seen["left"] is None and 40 <= seen["one lost"] < seen["all lost"] < slow.size
+    assert [worker.poll() for worker in workers] == [-signal.SIGKILL] * 2
     # complete, without doubles, and the same
     assert counts.new == slow.size == len(load(tmp_path / "s")) and same(tmp_path / "s", expected)
 
 
-def test_a_cluster_whose_every_worker_is_replaced(slow, expected, scheduler, workers, tmp_path):
-    words = ["worker", scheduler, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--host", "127.0.0.1"]
-    fresh = []
-
-    def replace_all(counts):
-        if counts.new >= 20 and not fresh:
-            for worker in workers:
-                worker.kill()
-            fresh.append(start(words, tmp_path, "worker-2.log"))
-
-    try:
-        slow.run(tmp_path / "s", scheduler=scheduler, progress=replace_all)
-    finally:
-        for worker in fresh:
-            stop(worker)
-    assert fresh and same(tmp_path / "s", expected)
-
-
-def test_the_job_travels_once_to_each_worker(slow, scheduler, workers, tmp_path, monkeypatch):
-    from assoc.sweeps.work import Job
-
-    packed = []
-    plain = Job.__reduce__
-    monkeypatch.setattr(Job, "__reduce__", lambda self: packed.append(1) or plain(self))
-    slow.run(tmp_path / "s", scheduler=scheduler)
-    # once for the scatter, whatever the number of batches (one more where it is measured first)
-    assert 1 <= len(packed) <= 2
-
-
-def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, workers):
+def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, start_worker):
     def lose(counts):
         if counts.new >= 20 and not lost:
             lost.append(scheduler.process.kill())
 
+    start_worker()
     lost = []
     with pytest.raises(InvalidInputError, match="same command goes on"):
         slow.run(tmp_path / "s", scheduler=scheduler, progress=lose)

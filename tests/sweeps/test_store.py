@@ -126,6 +126,12 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
     (whole / MANIFEST).write_text(json.dumps({**content, "assoc": "0.0.1"}))
     with pytest.raises(InvalidInputError, match="made by version 0.0.1 of assoc, this is"):
         study.run(whole)
+    (whole / MANIFEST).write_text(json.dumps({**content, "code": "0" * 16}))
+    with pytest.raises(InvalidInputError, match="solvers or costs of assoc were changed"):
+        study.run(whole)
+    # a study from before there was a digest goes on
+    (whole / MANIFEST).write_text(json.dumps({key: content[key] for key in content if key != "code"}))
+    assert study.run(whole).new == 0
     (whole / MANIFEST).write_text(json.dumps({**content, "version": 2}))
     with pytest.raises(InvalidInputError, match="has version 2"):
         study.run(whole)

@@ -1,0 +1,81 @@
+"""The time of a run is the solver's own: never that of compiling, loading or importing."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numba
+import numpy as np
+import pytest
+
+import assoc
+from assoc.problem import AssignmentProblem
+from assoc.solvers import registry
+from assoc.solvers.greedy import GreedyParameters
+from assoc.solvers.run import Outcome
+from assoc.sweeps import Setting, Study, load
+from assoc.sweeps.sources import Source
+
+
+def chain(number):
+    """A problem of so many tuples."""
+    tuples = [[i, i] for i in range(1, number + 1)]
+    return AssignmentProblem(tuples, np.full(number, -1.0), [number, number])
+
+
+@pytest.fixture
+def lazy(monkeypatch, tmp_path):
+    """A solver that needs code for large problems that small ones do not need."""
+    met = []
+    (tmp_path / "a_slow_module.py").write_text("import time\ntime.sleep(0.3)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def solve(packing, parameters, run):
+        met.append(packing.num_columns)
+        if packing.num_columns == 2:
+            kernel(1.0)
+        if packing.num_columns == 3:
+            import a_slow_module  # noqa: F401
+        return Outcome(np.arange(packing.num_columns), 1)
+
+    @numba.njit
+    def kernel(x):
+        return np.linalg.norm(np.full((3, 3), x))
+
+    monkeypatch.setattr(registry, "_REGISTERED", {})
+    registry.register("lazy", GreedyParameters, solve)
+    yield met
+    sys.modules.pop("a_slow_module", None)
+
+
+def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
+    sources = [Source(chain(number), str(number)) for number in (1, 2, 3)]
+    started = time.perf_counter()
+    Study(sources, [Setting("lazy", {})], 2).run(tmp_path / "s")
+    elapsed = time.perf_counter() - started
+    frame = load(tmp_path / "s")
+    assert elapsed > 0.3 and len(frame) == 6
+    assert frame["time"].max() < 0.1
+    # the warm-up, and one more run where something was loaded
+    assert lazy.count(1) == 3 and lazy.count(2) == 3 and lazy.count(3) == 3
+
+
+def test_a_run_done_again_is_the_same(study, tmp_path, monkeypatch):
+    from assoc.sweeps import work
+
+    study.run(tmp_path / "once")
+    calls = []
+    monkeypatch.setattr(work, "loaded", lambda: calls.append(1) or len(calls))
+    study.run(tmp_path / "again")
+    assert len(calls) == 8 * study.size
+    frames = [load(tmp_path / name).drop(columns="time") for name in ("once", "again")]
+    assert frames[0].equals(frames[1])
+
+
+def test_a_worker_with_other_code_is_refused(study):
+    from assoc.sweeps.work import Batch, Job, run_batch
+
+    job = Job(tuple(study.sources), 0, None, {}, assoc.__version__, "0" * 16)
+    with pytest.raises(assoc.InvalidInputError, match="other code"):
+        run_batch(job, Batch(study.settings, [(0, 0, 0, 0)]))
