@@ -1,12 +1,15 @@
-"""``python -m assoc.simulate``: simulate a scene and write it to a file."""
+"""``python -m assoc.simulate``: simulate a scene or a recording of plots and write it to a file."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from assoc._program import Option, Parser, given, leave_on_interrupt, options, run, whole_number, writing
+from assoc.errors import InvalidInputError
 
 _PURPOSE = {
     "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
@@ -14,7 +17,11 @@ _PURPOSE = {
     "bearing-only": "bearing sensors whose lines of sight cross where nobody is",
     "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
     "from-tracks": "recorded trajectories (CSV) seen by simulated radars",
+    "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or a pair that is hard to keep apart",
 }
+
+_PLOTS = ("rotating-radar",)
+"""Scenarios that write plots, not a scene."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,10 +41,31 @@ def _simulate(words: list[str]) -> None:
     choices = options(simulation.parameters(scenario))
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
     seed = whole_number(parsed["seed"], "--seed", 0)
+    if scenario in _PLOTS:
+        _write_plots(scenario, seed, parsed, given(choices, parsed))
+        return
     scene = simulation.simulate(scenario, seed, **given(choices, parsed))
     with writing:
         scene.save(parsed["output"])
     print(f"{parsed['output']}: {scene!r}")
+
+
+def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[str, Any]) -> None:
+    from assoc import simulation
+    from assoc.recordings import write_plots, write_tracks
+
+    output, truth = parsed["output"], parsed["truth"]
+    if Path(output).suffix.lower() != ".csv":
+        raise InvalidInputError(f"--output: {scenario} writes plots as CSV, expected a name that ends in .csv")
+    simulated = simulation.simulate_recording(scenario, seed, **values)
+    with writing:
+        write_plots(output, simulated.recording)
+        if truth is not None:
+            rows = simulated.truth
+            write_tracks(truth, rows.ids, rows.times, rows.positions, simulated.velocities)
+    print(f"{output}: {simulated.recording!r}")
+    if truth is not None:
+        print(f"{truth}: {simulated.truth!r}")
 
 
 def _list_parser() -> Parser:
@@ -45,7 +73,7 @@ def _list_parser() -> Parser:
     parser = Parser(
         prog="assoc.simulate",
         usage="python -m assoc.simulate SCENARIO -o scene.npz [options]",
-        description="Simulate a scene and write it to a file.",
+        description="Simulate a scene (or plots) and write it to a file.",
         epilog="scenarios (each has its own --help):\n" + "\n".join(lines),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -58,9 +86,11 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
     parser = Parser(
         prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".", allow_abbrev=False
     )
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="FILE", help="the scene file to write (.npz)"
-    )
+    content = "plots (.csv)" if scenario in _PLOTS else "the scene file to write (.npz)"
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)
+    if scenario in _PLOTS:
+        text = "also write where the aircraft were whenever the antenna pointed at them (CSV)"
+        parser.add_argument("--truth", metavar="FILE", help=text)
     parser.add_argument("--seed", default="0", metavar="N", help="seed of the random generator (default 0)")
     group = parser.add_argument_group("scenario")
     for option in choices:

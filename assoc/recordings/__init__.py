@@ -9,7 +9,7 @@ from assoc.recordings.recording import UNDECODED, Recording
 from assoc.recordings.rotation import estimate_rotation
 from assoc.recordings.sensor import radar_of
 from assoc.recordings.windows import Window, clustering_time_window
-from assoc.recordings.writing import write_plots
+from assoc.recordings.writing import write_plots, write_tracks
 
 __all__ = [
     "GARBLED_CODES",
@@ -25,4 +25,5 @@ __all__ = [
     "radar_of",
     "read_plots",
     "write_plots",
+    "write_tracks",
 ]

@@ -103,10 +103,9 @@ def _agreement(stretches: list[tuple[Array, Array]], frequencies: Array) -> Arra
     total = np.zeros(len(frequencies))
     count = 0
     for times, bearings in stretches:
-        turned = np.exp(-1j * bearings)
         for chunk in range(0, len(frequencies), 512):
             part = slice(chunk, chunk + 512)
-            waves = np.exp(2j * math.pi * np.outer(frequencies[part], times))
-            total[part] += np.abs(waves @ turned)
+            angles = np.outer(2 * math.pi * frequencies[part], times) - bearings
+            total[part] += np.hypot(np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1))
         count += len(times)
     return total / max(count, 1)

@@ -6,12 +6,15 @@ import csv
 import io
 import math
 import os
+from typing import Any
 
 import numpy as np
 
 from assoc._files import write_atomically
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
+
+Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
@@ -39,6 +42,26 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     if recording.sources is not None:
         columns.append(recording.sources.tolist())
     writer.writerows(zip(*columns, strict=True))
+    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+
+
+def write_tracks(
+    path: str | os.PathLike[str], ids: Array, times: Array, positions: Array, velocities: Array
+) -> None:
+    """Write tracks, or the truth, as CSV with the columns track_id, time, x, y, z, vx, vy, vz.
+
+    Parameters
+    ----------
+    path : path-like
+    ids, times : arrays (n,)
+    positions, velocities : arrays (n, 3)
+        Metres, m/s.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["track_id", "time", "x", "y", "z", "vx", "vy", "vz"])
+    for one, time, place, velocity in zip(ids.tolist(), times, positions, velocities, strict=True):
+        writer.writerow([one, _short(time, 6), *(_short(value, 3) for value in (*place, *velocity))])
     write_atomically(path, lambda file: file.write(text.getvalue().encode()))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import assoc
+from assoc.recordings import read_plots
 
 
 @pytest.mark.parametrize("scenario", ["three-radar", "crowd", "bearing-only"])
@@ -39,6 +40,22 @@ def test_from_tracks(run, tmp_path):
     done = run("assoc.simulate", "from-tracks", tmp_path / "none.csv", "-o", tmp_path / "t.npz")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "none.csv: cannot be read" in done.stderr
+
+
+def test_rotating_radar(run, tmp_path):
+    paths = [tmp_path / "plots.csv", tmp_path / "truth.csv"]
+    words = ["--traffic", "crossing", "--duration", 200]
+    done = run("assoc.simulate", "rotating-radar", "-o", paths[0], "--truth", paths[1], *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "traffic crossing" in done.stdout
+    recording = read_plots(paths[0])
+    assert set(recording.sources.tolist()) <= {-1, 0, 1}
+    truth = paths[1].read_text().splitlines()
+    assert truth[0] == "track_id,time,x,y,z,vx,vy,vz"
+    assert len(truth) >= (recording.sources >= 0).sum()
+    done = run("assoc.simulate", "rotating-radar", "-o", tmp_path / "plots.npz", *words)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "expected a name that ends in .csv" in done.stderr
 
 
 @pytest.mark.parametrize("words", [["--help"], ["crowd", "--help"], ["from-tracks", "--help"]])

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import MISSING, fields
 from importlib import import_module
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation.scenarios.base import ScenarioParameters
+
+if TYPE_CHECKING:
+    from assoc.simulation.scenarios.rotating_radar import SimulatedPlots
 
 # name -> module with a class `parameters` and a function `simulate`
 _MODULES = {
@@ -20,11 +23,18 @@ _MODULES = {
     "dubins-uav": "assoc.simulation.scenarios.dubins_uav",
     "from-tracks": "assoc.simulation.scenarios.from_tracks",
 }
+# the same for those that make a recording of plots, each with its own time, and not a scene
+_RECORDINGS = {"rotating-radar": "assoc.simulation.scenarios.rotating_radar"}
 
 
 def names() -> list[str]:
-    """Names of all scenarios."""
+    """Names of all scenarios that make a scene."""
     return list(_MODULES)
+
+
+def recording_names() -> list[str]:
+    """Names of all scenarios that make a recording of plots."""
+    return list(_RECORDINGS)
 
 
 def parameters(name: str) -> type[ScenarioParameters]:
@@ -35,9 +45,10 @@ def parameters(name: str) -> type[ScenarioParameters]:
     InvalidInputError
         There is no scenario of that name.
     """
-    if name not in _MODULES:
-        raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(_MODULES)}")
-    return cast("type[ScenarioParameters]", import_module(_MODULES[name]).parameters)
+    every = {**_MODULES, **_RECORDINGS}
+    if name not in every:
+        raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(every)}")
+    return cast("type[ScenarioParameters]", import_module(every[name]).parameters)
 
 
 def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
@@ -62,6 +73,32 @@ def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
     InvalidInputError
         Unknown scenario or parameter, or a value out of range.
     """
+    if name in _RECORDINGS:
+        raise InvalidInputError(f"scenario: {name!r} makes a recording, not a scene: use simulate_recording")
+    return cast(Scene, _simulate(name, seed, values))
+
+
+def simulate_recording(name: str, seed: int = 0, **values: Any) -> SimulatedPlots:
+    """Simulate a recording of radar plots.
+
+    Parameters
+    ----------
+    name : str
+        One of ``recording_names()``.
+    seed, **values
+        As for `simulate`.
+
+    Returns
+    -------
+    SimulatedPlots
+        The recording, and the truth.
+    """
+    if name in _MODULES:
+        raise InvalidInputError(f"scenario: {name!r} makes a scene, not a recording: use simulate")
+    return cast("SimulatedPlots", _simulate(name, seed, values))
+
+
+def _simulate(name: str, seed: int, values: dict[str, Any]) -> Any:
     kind = parameters(name)
     known = [field.name for field in fields(cast(Any, kind))]
     for key in values:
@@ -73,10 +110,8 @@ def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
         raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
     chosen = kind(**values)
-    scene = import_module(_MODULES[name]).simulate(
-        chosen, np.random.default_rng(int(seed)), _title(name, seed, chosen)
-    )
-    return cast(Scene, scene)
+    module = import_module({**_MODULES, **_RECORDINGS}[name])
+    return module.simulate(chosen, np.random.default_rng(int(seed)), _title(name, seed, chosen))
 
 
 def _title(name: str, seed: int, chosen: ScenarioParameters) -> str:

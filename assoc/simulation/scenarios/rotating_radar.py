@@ -1,0 +1,194 @@
+"""Plots of one rotating air-surveillance radar: random traffic, or two aircraft that are hard to keep apart.
+
+Made after the recording that G. P. Cahyono's thesis (Multitarget tracking using multiple hypothesis tracking with
+clustering time window radar data, ITS Surabaya, 2014) describes and prints in part: ranges in whole nautical miles
+up to 255, bearings in steps of 1440 / 4095 degrees, lost identities, garbled altitudes. The recording itself is
+not public.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
+from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.recordings.recording import UNDECODED, Recording
+from assoc.sensors.base import Array
+from assoc.simulation.antenna import bearings_in_steps, in_steps, looks, slant_range_and_bearing
+from assoc.simulation.flights import Flight, random_flight
+from assoc.simulation.scenarios.base import ScenarioParameters
+
+if TYPE_CHECKING:
+    from assoc.metrics.trajectories import Trajectories
+
+Traffic = Literal["random", "crossing", "parallel", "head-on"]
+
+BEARING_STEP = 1440 / 4095
+PARALLEL_SEPARATION = 5.0
+"""Nautical miles: what air traffic control keeps between aircraft en route."""
+
+
+@dataclass(frozen=True)
+class RotatingRadarParameters(ScenarioParameters):
+    """Parameters of the rotating radar."""
+
+    traffic: Traffic = field(
+        default="random", metadata={"help": "many aircraft at random, or a pair: crossing, parallel, head-on"}
+    )
+    aircraft: int = field(default=14, metadata={"help": "number of aircraft of random traffic"})
+    duration: float = field(default=1130.0, metadata={"help": "seconds"})
+    rotation: float = field(default=9.5, metadata={"help": "seconds for a turn of the antenna"})
+    detection_probability: float = field(default=0.78, metadata={"help": "P_d of a look"})
+    false_plots: float = field(default=2.5, metadata={"help": "mean false plots in a rotation"})
+    identity_loss: float = field(default=0.05, metadata={"help": "share of plots whose Mode 3 is lost (0)"})
+    garbled: float = field(default=0.1, metadata={"help": "share of altitudes that are garbled"})
+    reach: float = field(default=255.0, metadata={"help": "farthest range, nautical miles"})
+    range_step: float = field(default=1.0, metadata={"help": "step of ranges, nautical miles (0: exact)"})
+    bearing_step: float = field(default=BEARING_STEP, metadata={"help": "step of bearings, degrees (0: exact)"})
+    time_step: float = field(
+        default=0.0, metadata={"help": "stamps are cut to multiples of this, seconds (0: exact; the paper's are 1)"}
+    )
+    separation: float | None = field(
+        default=None,
+        metadata={
+            "help": "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"
+        },
+    )
+
+    def __post_init__(self) -> None:
+        if self.traffic not in get_args(Traffic):
+            raise InvalidInputError(f"traffic: expected one of {', '.join(get_args(Traffic))}, got {self.traffic!r}")
+        self._whole("aircraft", most=4095)
+        self._number("duration", "rotation", "reach", above=0.0)
+        self._number("false_plots", "identity_loss", "garbled", "range_step", "bearing_step", "time_step", least=0.0)
+        self._probability("detection_probability")
+        for name in ("identity_loss", "garbled"):
+            if not getattr(self, name) < 1:
+                raise InvalidInputError(f"{name}: expected a share from 0 to below 1, got {getattr(self, name)!r}")
+        if self.separation is not None:
+            self._number("separation", least=0.0)
+        if self.duration > 1e7 * self.rotation:
+            raise InvalidInputError(f"duration: expected at most 1e7 rotations, got {self.duration:g} s")
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPlots:
+    """A recording and what really was there.
+
+    Attributes
+    ----------
+    recording : Recording
+        With sources.
+    truth : Trajectories
+        Where each aircraft in reach was whenever the antenna pointed at it, detected or not.
+    velocities : array (n, 3)
+        Of the rows of the truth, m/s.
+    """
+
+    recording: Recording
+    truth: Trajectories
+    velocities: Array
+
+
+def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name: str) -> SimulatedPlots:
+    """Simulate the plots; see `assoc.simulation.simulate_recording`."""
+    # with the metrics comes scipy, too slow for --help
+    from assoc.metrics.trajectories import Trajectories
+
+    p = parameters
+    flights = _random_traffic(p, rng) if p.traffic == "random" else _pair(p, rng)
+    codes = rng.choice(np.arange(1, 4096), len(flights), replace=False)
+    seen = [_seen(p, flight) for flight in flights]
+    source = np.repeat(np.arange(len(flights)), [len(times) for times, _, _ in seen])
+    time, place, velocity = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    order = np.lexsort((source, time))
+    source, time, place, velocity = source[order], time[order], place[order], velocity[order]
+    hit = rng.random(len(time)) < p.detection_probability
+    distance, bearing = slant_range_and_bearing(place[hit])
+    level = np.round(place[hit, 2] / FLIGHT_LEVEL)
+    identity = np.where(rng.random(hit.sum()) < p.identity_loss, UNDECODED, codes[source[hit]])
+    wrong = rng.random(hit.sum()) < p.garbled
+    level[wrong] = rng.choice(GARBLED_CODES, int(wrong.sum()))
+
+    turns = p.duration / p.rotation
+    count = int(rng.poisson(p.false_plots * turns))
+    false_turn = rng.uniform(0.0, turns, count)
+    columns = [
+        np.concatenate([time[hit], false_turn * p.rotation]),
+        np.concatenate([distance, rng.uniform(0.0, p.reach * NAUTICAL_MILE, count)]),
+        np.concatenate([bearing, 2 * math.pi * (false_turn % 1.0)]),
+        np.concatenate([identity, np.full(count, UNDECODED)]),
+        np.concatenate([level, rng.choice(GARBLED_CODES, count)]),
+        np.concatenate([source[hit], np.full(count, -1)]),
+    ]
+    order = np.argsort(columns[0], kind="stable")
+    times, ranges, bearings, identities, levels, sources = (column[order] for column in columns)
+    recording = Recording(
+        times=np.floor(times / p.time_step) * p.time_step if p.time_step else times,
+        ranges=in_steps(ranges, p.range_step * NAUTICAL_MILE),
+        azimuths=math.pi / 2 - bearings_in_steps(bearings, math.radians(p.bearing_step)),
+        identities=identities,
+        altitudes=levels * FLIGHT_LEVEL,
+        garbled=garbled_altitudes(levels, identities),
+        lines=np.arange(2, len(times) + 2),
+        sources=sources,
+        name=name,
+    )
+    return SimulatedPlots(recording, Trajectories(time, source, place), velocity)
+
+
+def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Array]:
+    """Times of the looks at an aircraft within reach, its positions and velocities then."""
+    times, places, velocities = flight.path(p.duration)
+    when = looks(times, places, p.rotation)
+    when = when[when <= p.duration]
+    place, velocity = (np.column_stack([np.interp(when, times, axis) for axis in x.T]) for x in (places, velocities))
+    step = p.range_step * NAUTICAL_MILE
+    inside = in_steps(np.linalg.norm(place, axis=1), step) <= p.reach * NAUTICAL_MILE
+    return when[inside], place[inside], velocity[inside]
+
+
+def _random_traffic(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
+    far = p.reach * NAUTICAL_MILE
+    return [random_flight(rng, 0.08 * far, 0.85 * far, p.duration) for _ in range(p.aircraft)]
+
+
+def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
+    """Two aircraft that are closest to each other half-way through the recording."""
+    middle = NAUTICAL_MILE * rng.uniform(0.25, 0.55) * p.reach
+    place = rng.uniform(-math.pi, math.pi)
+    meeting = middle * np.array([math.cos(place), math.sin(place)])
+    # more across the line of sight than along it, so that nobody flies over the radar
+    heading = place + math.pi / 2 * rng.choice([-1.0, 1.0]) + math.radians(rng.uniform(-60.0, 60.0))
+    speeds = rng.uniform(200.0, 260.0, 2)
+    apart = PARALLEL_SEPARATION if p.traffic == "parallel" else 0.0
+    apart = NAUTICAL_MILE * (apart if p.separation is None else p.separation)
+    other = heading
+    along = 0.0
+    if p.traffic == "crossing":
+        other += math.radians(rng.uniform(40.0, 90.0)) * rng.choice([-1.0, 1.0])
+    elif p.traffic == "head-on":
+        other += math.pi
+    else:
+        # side by side, nearly: neither overtakes the other
+        speeds[1] = speeds[0]
+        along = NAUTICAL_MILE * rng.uniform(-2.0, 2.0)
+    level = 304.8 * rng.integers(30, 39)
+    flights = []
+    for number, (direction, speed) in enumerate(zip((heading, other), speeds, strict=True)):
+        forward = np.array([math.cos(direction), math.sin(direction)])
+        # the second one is off to the side of the first
+        side = np.array([-math.sin(heading), math.cos(heading)])
+        there = meeting + number * (apart * side + along * forward)
+        flights.append(
+            Flight(there - speed * p.duration / 2 * forward, float(direction), float(speed), level + 304.8 * number)
+        )
+    return flights
+
+
+parameters = RotatingRadarParameters

@@ -1,0 +1,174 @@
+"""The rotating radar reports what an antenna can see, in the steps and with the losses that it promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.recordings import GARBLED_CODES, clustering_time_window, estimate_rotation, radar_of
+from assoc.simulation import names, recording_names, simulate, simulate_recording
+from assoc.simulation.antenna import looks
+from assoc.simulation.flights import Flight, Turn
+
+NMI = 1852.0
+
+
+@pytest.fixture(scope="module")
+def several():
+    return [simulate_recording("rotating-radar", seed) for seed in range(8)]
+
+
+def test_one_seed_one_recording(several):
+    again = simulate_recording("rotating-radar", 3)
+    assert np.array_equal(again.recording.measurements, several[3].recording.measurements)
+    assert not np.array_equal(again.recording.times[:50], several[4].recording.times[:50])
+    assert again.recording.name == "rotating-radar (seed 3)"
+    assert "traffic head-on" in simulate_recording("rotating-radar", traffic="head-on").recording.name
+
+
+def test_it_is_scenario_s1(several):
+    turns = 1130 / 9.5
+    looks_, hits, lost, false, wrong = (0.0, 0.0, 0.0, 0.0, 0.0)
+    for one in several:
+        recording, real = one.recording, one.recording.sources >= 0
+        assert len(np.unique(one.truth.ids)) == 14
+        assert recording.times.max() <= 1130
+        ranges, bearings = recording.ranges / NMI, np.degrees(recording.bearings) / (1440 / 4095)
+        assert np.abs(ranges - ranges.round()).max() < 1e-9
+        assert ranges.max() <= 255
+        assert np.abs(bearings - bearings.round()).max() < 1e-6
+        looks_, hits = looks_ + len(one.truth), hits + real.sum()
+        lost += (~recording.decoded & real).sum()
+        false += (~real).sum()
+        wrong += np.isin(np.round(recording.altitudes[real] / 30.48), GARBLED_CODES).sum()
+        codes = [np.unique(recording.identities[(recording.sources == k) & recording.decoded]) for k in range(14)]
+        assert all(len(code) <= 1 for code in codes)
+        assert len({int(code[0]) for code in codes if len(code)}) == sum(len(code) for code in codes)
+    # four standard deviations
+    assert hits / looks_ == pytest.approx(0.78, abs=4 * math.sqrt(0.78 * 0.22 / looks_))
+    assert lost / hits == pytest.approx(0.05, abs=4 * math.sqrt(0.05 * 0.95 / hits))
+    assert wrong / hits == pytest.approx(0.10, abs=4 * math.sqrt(0.1 * 0.9 / hits))
+    assert false / (8 * turns) == pytest.approx(2.5, abs=4 * math.sqrt(2.5 / (8 * turns)))
+
+
+def test_the_antenna_is_where_the_plot_is(several):
+    """Time and bearing agree with an antenna that turns clockwise, up to half a step of the bearing."""
+    for one in several:
+        recording = one.recording
+        off = recording.times / 9.5 - recording.bearings / (2 * math.pi)
+        off -= np.round(off)
+        assert np.abs(off).max() <= 0.5 / 1023 + 1e-9
+        truth = one.truth
+        bearing = np.arctan2(truth.positions[:, 0], truth.positions[:, 1]) / (2 * math.pi)
+        off = truth.times / 9.5 - bearing
+        assert np.abs(off - np.round(off)).max() < 1e-5
+
+
+def test_plots_lie_where_the_aircraft_are(several):
+    for one in several:
+        recording, truth = one.recording, one.truth
+        row = {(int(i), round(float(t), 6)): x for i, t, x in zip(truth.ids, truth.times, truth.positions, strict=True)}
+        for k in np.flatnonzero(recording.sources >= 0)[::7]:
+            place = row[int(recording.sources[k]), round(float(recording.times[k]), 6)]
+            assert abs(np.linalg.norm(place) - recording.ranges[k]) <= 0.5 * NMI + 1e-6
+            turn = math.atan2(place[1], place[0]) - recording.azimuths[k]
+            assert abs(math.remainder(turn, 2 * math.pi)) <= math.radians(0.5 * 1440 / 4095) + 1e-9
+
+
+def test_windows_and_the_radar_are_recovered(several):
+    for one in several:
+        recording = one.recording
+        assert estimate_rotation(recording) == pytest.approx(9.5, rel=1e-4)
+        windows = clustering_time_window(recording)
+        assert 118 <= len(windows) <= 120
+        repeated = 0
+        for w in windows:
+            real = recording.sources[w.rows][recording.sources[w.rows] >= 0]
+            repeated += len(real) - len(np.unique(real))
+        # once in a while an aircraft crosses the cut against the antenna
+        assert repeated <= 3
+        assert radar_of(recording).noise == pytest.approx([NMI / 12**0.5, math.radians(1440 / 4095) / 12**0.5])
+
+
+PAIRS = {"crossing": (0, 0.1), "head-on": (0, 0.1), "parallel": (5, 5.4)}
+
+
+@pytest.mark.parametrize("traffic", PAIRS)
+def test_pairs(traffic):
+    least, most = PAIRS[traffic]
+    for seed in range(10):
+        one = simulate_recording("rotating-radar", seed, traffic=traffic, detection_probability=0.99)
+        truth = one.truth
+        assert np.unique(truth.ids).tolist() == [0, 1]
+        grid = np.arange(0.0, 1130.0, 0.5)
+        paths = []
+        for k in (0, 1):
+            rows = truth.ids == k
+            axes = [np.interp(grid, truth.times[rows], axis) for axis in truth.positions[rows].T]
+            paths.append(np.column_stack(axes))
+        apart = np.hypot(*(paths[0] - paths[1])[:, :2].T) / NMI
+        assert least - 0.01 <= apart.min() <= most
+        # apart in height by 1,000 feet
+        assert np.abs((paths[0] - paths[1])[:, 2]) == pytest.approx(304.8)
+        if traffic != "parallel":
+            assert abs(grid[np.argmin(apart)] - 565) < 2
+            assert apart[0] > 40
+
+
+def test_a_turn_and_a_climb():
+    flight = Flight(np.zeros(2), 0.0, 200.0, 5000.0, 5.0, 5500.0, [Turn(50.0, math.radians(1.0), 90.0)])
+    times, places, velocities = flight.path(300.0)
+    assert np.linalg.norm(velocities[:, :2], axis=1) == pytest.approx(200.0)
+    assert places[200] == pytest.approx([10_000.0, 0.0, 5250.0])
+    # a quarter circle of radius v / rate, then straight on
+    radius = 200.0 / math.radians(1.0)
+    assert places[times == 140.0][0] == pytest.approx([10_000 + radius, radius, 5500.0], rel=1e-4)
+    assert velocities[-1] == pytest.approx([0.0, 200.0, 0.0], abs=1e-9)
+
+
+def test_looks_at_an_aircraft_that_passes_overhead():
+    times = np.arange(0.0, 200.0, 0.25)
+    places = np.column_stack([np.zeros(800), 200.0 * (times - 100.1), np.full(800, 9000.0)])
+    when = looks(times, places, 10.0)
+    assert 19 <= len(when) <= 21
+    # south of the radar it is seen half a turn later than north of it
+    assert when[0] == pytest.approx(5.0, abs=1e-6)
+    assert when[-1] % 10.0 == pytest.approx(0.0, abs=1e-6)
+
+
+def test_stamps_in_whole_seconds_and_exact_measurements():
+    one = simulate_recording("rotating-radar", 1, time_step=1.0, range_step=0.0, bearing_step=0.0).recording
+    assert (one.times == np.floor(one.times)).all()
+    assert (np.abs(one.ranges / NMI - np.round(one.ranges / NMI)) > 1e-6).mean() > 0.9
+    assert estimate_rotation(one) == pytest.approx(9.5, rel=1e-3)
+
+
+def test_scenes_and_recordings_have_their_own_doors():
+    assert recording_names() == ["rotating-radar"]
+    assert "rotating-radar" not in names()
+    with pytest.raises(InvalidInputError, match="use simulate_recording"):
+        simulate("rotating-radar")
+    with pytest.raises(InvalidInputError, match="use simulate$"):
+        simulate_recording("crowd")
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"traffic": "jam"}, "traffic: expected one of random, crossing, parallel, head-on, got 'jam'"),
+        ({"aircraft": 0}, "aircraft: expected a whole number"),
+        ({"rotation": 0.0}, "rotation: expected a number above 0"),
+        ({"identity_loss": 1.0}, "identity_loss: expected a share"),
+        ({"range_step": -1.0}, "range_step: expected a number, at least 0"),
+        ({"separation": math.nan}, "separation"),
+        ({"detection_probability": 1.0}, "detection_probability"),
+        ({"duration": 1e300}, "duration: expected at most 1e7 rotations"),
+        ({"speed": 3.0}, "speed: no parameter of scenario 'rotating-radar'"),
+    ],
+)
+def test_bad_parameters(values, message):
+    with pytest.raises(InvalidInputError, match=message):
+        simulate_recording("rotating-radar", **values)
