@@ -2,10 +2,42 @@
 
 from __future__ import annotations
 
+from assoc.tracking.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.multi_sensor import MultiSensorTracker
+from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
+from assoc.tracking.output import TrackTable, track_scene
+from assoc.tracking.static import StaticFusionTracker
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_oriented import TrackOrientedMHT
 from assoc.tracking.tracker import Tracker
 
-__all__ = ["Decision", "Initiation", "LifeCycle", "Step", "Track", "TrackOrientedMHT", "Tracker"]
+TRACKERS: dict[str, type[Tracker]] = {
+    kind.name: kind
+    for kind in (
+        MultiSensorTracker,
+        StaticFusionTracker,
+        TrackOrientedMHT,
+        HypothesisOrientedMHT,
+        NearestNeighbourTracker,
+    )
+}
+"""Trackers by the names that programs know them by."""
+
+__all__ = [
+    "TRACKERS",
+    "Decision",
+    "HypothesisOrientedMHT",
+    "Initiation",
+    "LifeCycle",
+    "MultiSensorTracker",
+    "NearestNeighbourTracker",
+    "StaticFusionTracker",
+    "Step",
+    "Track",
+    "TrackOrientedMHT",
+    "TrackTable",
+    "Tracker",
+    "track_scene",
+]

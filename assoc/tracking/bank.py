@@ -111,9 +111,10 @@ class Bank:
         """Confirm the tracks whose time has come."""
         return replace(self, confirmed=self.confirmed | life_cycle.confirms(self.score, self.detections))
 
-    def doomed(self, life_cycle: LifeCycle, time: float) -> Array:
-        """Which tracks are to be deleted."""
-        return life_cycle.deletes(self.confirmed, self.score, self.best, time - self.last_detection, self.missed)
+    def doomed(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
+        """Which tracks are to be deleted; see `LifeCycle.deletes`."""
+        silent = time - self.last_detection
+        return life_cycle.deletes(self.confirmed, self.score, self.best, silent, self.missed, patience)
 
     def arrays(self, prefix: str = "") -> dict[str, Array]:
         """Everything as plain arrays."""

@@ -19,6 +19,10 @@ Deletion = Literal["time", "count", "score"]
 HISTORY = 62
 """Scans whose detections are remembered, one a bit."""
 
+# a track is given up once a true one would be silent for so long with this probability, and not before these scans
+_OVERLOOKED = 1e-4
+_LEAST_SCANS = 3.0
+
 
 @dataclass(frozen=True)
 class LifeCycle:
@@ -34,10 +38,11 @@ class LifeCycle:
         track is given up when its score has fallen by -ln(missed_probability) since its best.
     m, n : int
     deletion : "time", "count" or "score"
-        What ends a confirmed track: `deletion_time` seconds without a detection (whatever the
-        scans do), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
-    deletion_time : float
-        Seconds; it ends tentative tracks under "time" as well.
+        What ends a confirmed track: `deletion_time` seconds without a detection (however the measurements
+        are grouped), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
+    deletion_time : float, optional
+        Seconds. Left out, it is the time in which a target that is there is missed all along with
+        probability 1e-4, and at least three scans, at the usual pace of the scans.
     deletion_count : int
     deletion_drop : float
     """
@@ -48,7 +53,7 @@ class LifeCycle:
     m: int = 3
     n: int = 4
     deletion: Deletion = "time"
-    deletion_time: float = 30.0
+    deletion_time: float | None = None
     deletion_count: int = 5
     deletion_drop: float = 25.0
 
@@ -59,7 +64,9 @@ class LifeCycle:
             raise InvalidInputError(f"deletion must be 'time', 'count' or 'score', got {self.deletion!r}")
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(field.default, float):
+            if field.name == "deletion_time" and value is None:
+                continue
+            if isinstance(field.default, float) or field.name == "deletion_time":
                 good = isinstance(value, (int, float, np.floating)) and not isinstance(value, bool)
                 if not good or not 0 < value < math.inf:
                     raise InvalidInputError(f"{field.name} must be a number above 0, got {value!r}")
@@ -80,7 +87,25 @@ class LifeCycle:
         window = (detections & np.int64((1 << self.n) - 1)).astype(np.uint64)
         return np.asarray(count_bits(window) >= self.m)
 
-    def deletes(self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array) -> Array:
+    def patience(self, miss: Array, pace: float) -> float:
+        """Seconds without a detection after which a track is deleted.
+
+        Parameters
+        ----------
+        miss : array (S,)
+            ln(1 - P_D) of the sensors.
+        pace : float
+            Usual seconds from scan to scan; 0 while it is not known.
+        """
+        if self.deletion_time is not None:
+            return self.deletion_time
+        if pace == 0:
+            return math.inf
+        return max(_LEAST_SCANS, math.log(_OVERLOOKED) / float(miss.sum())) * pace
+
+    def deletes(
+        self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array, patience: float
+    ) -> Array:
         """Which tracks are to be deleted.
 
         Parameters
@@ -92,9 +117,11 @@ class LifeCycle:
             Seconds since the last detection.
         missed : int array (T,)
             Scans in a row without a detection.
+        patience : float
+            Seconds; see `patience`.
         """
         if self.deletion == "time":
-            gone = silent > self.deletion_time * (1 + 1e-9)
+            gone = silent > patience * (1 + 1e-9)
         elif self.deletion == "count":
             gone = missed >= self.deletion_count
         else:

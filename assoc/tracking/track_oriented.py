@@ -126,7 +126,7 @@ class TrackOrientedMHT(Tracker):
         # numbered by place, so that the order of the measurements does not matter
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[np.lexsort((*positions.T, when))] = self._new_ids(len(numbers))
-        score = np.full(len(numbers), self.terms.birth[s] + self.terms.miss[:s].sum())
+        score = np.full(len(numbers), self._birth[s])
         bank = Bank.new(predict_each(self.filter, states, time - when), ids, score, when)
         history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
         history[:, s] = numbers + 1
@@ -195,7 +195,7 @@ class TrackOrientedMHT(Tracker):
 
     def _end(self, time: float) -> Array:
         before = np.unique(self._bank.track_id[self._bank.confirmed])
-        self._select(~self._bank.doomed(self.life_cycle, time))
+        self._select(~self._doomed(self._bank, time))
         return np.setdiff1d(before, self._bank.track_id)
 
     def _select(self, mask: Array) -> None:

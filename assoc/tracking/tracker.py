@@ -29,15 +29,18 @@ from assoc.solvers.registry import make_parameters
 from assoc.tracking.bank import Bank, empty_bank
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.track import Step, Track
+from assoc.tracking.track import Decision, Step, Track
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 FORMAT = "assoc.tracker"
 VERSION = 1
 
-PROCESS_NOISE = 10.0
+PROCESS_NOISE = 20.0
 """Default process noise: root of the acceleration's spectral density, m/s^1.5."""
+
+
+_FORGETTING = 0.05
 
 
 class Tracker(ABC):
@@ -110,7 +113,10 @@ class Tracker(ABC):
         self.gate_probability = float(gate_probability)
         self.max_tuples = max_tuples
         self.terms = score_terms(self.sensors, self.initiation.birth_rate)
+        # a target that appears with a sensor's measurement was missed by the sensors before it
+        self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
         self._time: float | None = None
+        self._pace = 0.0
         self._scan = 0
         self._next_id = 1
         self._bank = empty_bank(self.filter)
@@ -165,6 +171,10 @@ class Tracker(ABC):
         when = self._checked_time(time)
         checked = self._checked_measurements(measurements)
         stamps = None if times is None else self._checked_stamps(times, checked, when)
+        dt = self._elapsed(when)
+        if dt > 0:
+            # a running mean that forgets: scans may change their pace
+            self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
         step = self._step(when, checked, stamps)
         self._time = when
         self._scan += 1
@@ -173,6 +183,10 @@ class Tracker(ABC):
     @abstractmethod
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         """Take a checked scan in."""
+
+    def flush(self) -> tuple[Decision, ...]:
+        """What the tracker says of the scans that are not final yet, oldest first; for the end of a recording."""
+        return ()
 
     def _checked_time(self, time: object) -> float:
         good = isinstance(time, (int, float, np.floating, np.integer)) and not isinstance(time, bool)
@@ -239,6 +253,9 @@ class Tracker(ABC):
         self._next_id += count
         return ids
 
+    def _doomed(self, bank: Bank, time: float) -> Array:
+        return bank.doomed(self.life_cycle, time, self.life_cycle.patience(self.terms.miss, self._pace))
+
     def _scan_of(self, time: float, measurements: Sequence[Array]) -> Scan:
         return Scan(index=self._scan, time=time, measurements=tuple(measurements))
 
@@ -301,6 +318,7 @@ class Tracker(ABC):
             "settings": np.array(json.dumps(self._settings())),
             "time": np.array(math.nan if self._time is None else self._time),
             "scan": np.array(self._scan),
+            "pace": np.array(self._pace),
             "next_id": np.array(self._next_id),
             "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
             **self._bank.arrays("bank."),
@@ -310,6 +328,7 @@ class Tracker(ABC):
         when = float(arrays["time"])
         self._time = None if math.isnan(when) else when
         self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
+        self._pace = float(arrays["pace"])
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
             rng.bit_generator.state = json.loads(str(arrays["filter_rng"]))

@@ -95,3 +95,80 @@ def small_scans(rng, scans=3, targets=2, extra=1, sigma=10.0):
         z = np.concatenate([seen + rng.normal(0, sigma, seen.shape), rng.uniform(380, 480, (extra, 3))])
         found.append(rng.permutation(z))
     return times, found
+
+
+def stacked_log_density(mean, cov, zs, Rs):
+    """Log of the density of several positions of one target, all at once."""
+    count = len(zs)
+    H = np.tile(np.hstack([np.eye(3), np.zeros((3, 3))]), (count, 1))
+    R = np.zeros((3 * count, 3 * count))
+    for i, one in enumerate(Rs):
+        R[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = one
+    S = H @ cov @ H.T + R
+    v = np.concatenate(zs) - H @ mean
+    return -0.5 * (v @ np.linalg.solve(S, v) + np.linalg.slogdet(2 * math.pi * S)[1])
+
+
+def set_score(zs, present, mean, cov, log_prior=0.0):
+    """Score of measurements (sensor -> z) of one target with this prior of its state, misses of the others included."""
+    total = log_prior
+    for s, one in enumerate(present):
+        if s in zs:
+            total += math.log(one.detection_probability * one.volume / one.false_alarm_rate)
+        else:
+            total += math.log(1 - one.detection_probability)
+    if zs:
+        total += stacked_log_density(mean, cov, list(zs.values()), [present[s].covariance for s in zs])
+    return total
+
+
+def new_target_score(zs, present, volume, birth):
+    """Score of measurements as a new target, born anywhere: the position integrated out against birth / volume."""
+    order = list(zs)
+    first, rest = order[0], order[1:]
+    R = present[first].covariance
+    cov = np.zeros((6, 6))
+    cov[:3, :3] = R
+    density = stacked_log_density(np.append(zs[first], np.zeros(3)), cov, [zs[s] for s in rest],
+                                  [present[s].covariance for s in rest]) if rest else 0.0  # fmt: skip
+    total = math.log(birth / volume) + density
+    for s, one in enumerate(present):
+        if s in zs:
+            total += math.log(one.detection_probability * one.volume / one.false_alarm_rate)
+        else:
+            total += math.log(1 - one.detection_probability)
+    return total
+
+
+def best_partition(tracks, scan, present, volume, birth):
+    """The largest sum of scores of one scan, by trying all: each measurement to a track, a group or nobody."""
+    everything = [(s, j) for s, z in enumerate(scan) for j in range(len(z))]
+
+    def score(groups):
+        total = 0.0
+        for t, (mean, cov) in enumerate(tracks):
+            total += set_score({s: scan[s][j] for s, j in groups.get(t, [])}, present, mean, cov)
+        for key, members in groups.items():
+            if key >= len(tracks):
+                total += new_target_score({s: scan[s][j] for s, j in members}, present, volume, birth)
+        return total
+
+    best = (-math.inf, {})
+
+    def place(i, groups, top):
+        nonlocal best
+        if i == len(everything):
+            value = score(groups)
+            if value > best[0]:
+                best = (value, {key: tuple(sorted(m)) for key, m in groups.items()})
+            return
+        s, _ = one = everything[i]
+        place(i + 1, groups, top)
+        for key in [*range(len(tracks)), *range(len(tracks), top + 1)]:
+            members = groups.get(key, [])
+            if any(other == s for other, _ in members):
+                continue
+            place(i + 1, {**groups, key: [*members, one]}, max(top, key + 1))
+
+    place(0, {}, len(tracks))
+    return best

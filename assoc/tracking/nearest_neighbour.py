@@ -1,0 +1,112 @@
+"""The nearest-neighbour tracker: sensor after sensor, each measurement to the track that is nearest."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.batches import concatenate, predict_each
+from assoc.problem import AssignmentProblem
+from assoc.tracking.bank import Bank
+from assoc.tracking.frames import Frame, look
+from assoc.tracking.track import Step, decision
+from assoc.tracking.tracker import Tracker
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+Rule = Literal["greedy", "assignment"]
+
+
+class NearestNeighbourTracker(Tracker):
+    """The plain tracker that others are measured against.
+
+    The sensors of a scan are taken in one after the other. Pairs of tracks and measurements within the gate
+    are taken by falling likelihood; what is left over starts a track at once, which the next sensor may confirm.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`; with a single sensor each measurement may have its own time.
+    rule : "greedy" or "assignment"
+        "assignment" takes the best 2-D assignment instead (global nearest neighbour), by the tracker's solver.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "nearest-neighbour"
+
+    def __init__(self, *arguments: Any, rule: Rule = "greedy", **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        if rule not in get_args(Rule):
+            raise InvalidInputError(f"rule must be 'greedy' or 'assignment', got {rule!r}")
+        self.rule = rule
+
+    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+        if times is not None and len(self.sensors) > 1:
+            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
+        bank, before = self._bank, time if self._time is None else self._time
+        scan = self._scan_of(time, measurements)
+        seen = np.zeros(len(bank), dtype=np.bool_)
+        assigned = []
+        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+            stamps = None if times is None else times[s]
+            frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
+            before = time
+            chosen = self._choose(frame, s, len(bank), len(z))
+            bank, hit, ids = self._take_in(bank, frame, chosen, s, len(z))
+            free = np.flatnonzero(ids == 0)
+            states, fit, positions = self._singles(s, scan, free)
+            free = free[fit]
+            when = np.full(len(free), time) if stamps is None else stamps[free]
+            order = np.lexsort((*positions.T, when))
+            new = self._new_ids(len(free))
+            ids[free[order]] = new
+            score = np.full(len(free), self._birth[s])
+            aged = predict_each(self.filter, states[order], (time - when)[order])
+            bank = Bank.concatenate([bank, Bank.new(aged, new, score, when[order])])
+            seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
+            assigned.append(ids)
+        bank = bank.counted(seen).confirm(self.life_cycle)
+        now = decision(self._scan, time, assigned, bank.track_id[bank.confirmed])
+        gone = self._doomed(bank, time)
+        self._bank = bank[~gone]
+        ended = np.sort(bank.track_id[gone & bank.confirmed])
+        return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
+
+    def _choose(self, frame: Frame, s: int, tracks: int, count: int) -> Array:
+        """Rows of the pairs that are taken."""
+        pairs = frame.pairs
+        if self.rule == "assignment":
+            costs = self.terms.miss[s] - self.terms.detection[s] - pairs.log_likelihood
+            both = np.stack([pairs.track, pairs.measurement], axis=1) + 1
+            solution = self._assign(AssignmentProblem(both, costs, [tracks, count]))
+            return np.asarray(solution.indices[solution.indices < len(both)])
+        free_track, free = np.ones(tracks, dtype=np.bool_), np.ones(count, dtype=np.bool_)
+        taken = []
+        for row in np.argsort(-pairs.log_likelihood, kind="stable").tolist():
+            t, m = pairs.track[row], pairs.measurement[row]
+            if free_track[t] and free[m]:
+                free_track[t] = free[m] = False
+                taken.append(row)
+        return np.array(taken, dtype=np.int64)
+
+    def _take_in(self, bank: Bank, frame: Frame, chosen: Array, s: int, count: int) -> tuple[Bank, Array, Array]:
+        """Tracks after a sensor's scan, which were detected, and each measurement's track."""
+        pairs = frame.pairs
+        track = pairs.track[chosen]
+        hit = np.zeros(len(bank), dtype=np.bool_)
+        hit[track] = True
+        gain, when = np.full(len(bank), self.terms.miss[s]), np.full(len(bank), np.nan)
+        gain[track] = self.terms.detection[s] + pairs.log_likelihood[chosen]
+        when[track] = frame.when[chosen]
+        rest = np.flatnonzero(~hit)
+        back = np.argsort(np.concatenate([track, rest]), kind="stable")
+        states = concatenate([pairs.states[chosen], frame.predicted[rest]])[back] if len(bank) else frame.predicted
+        ids = np.zeros(count, dtype=np.int64)
+        ids[pairs.measurement[chosen]] = bank.track_id[track]
+        return bank.scored(states, gain, when), hit, ids
+
+    def _settings(self) -> dict[str, str]:
+        return super()._settings() | {"rule": self.rule}

@@ -1,0 +1,95 @@
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
+from tests.tracking import plain
+
+SEEDS = (0, 4)
+
+
+@cache
+def enumerated(seed):
+    times, z = plain.small_scans(np.random.default_rng(seed))
+    everything = plain.enumerate_hypotheses(times, z, plain.sensor())
+    return times, z, sorted(everything, key=lambda one: -one[0])[:60]
+
+
+def tracker(**options):
+    options = {"max_hypotheses": 5000, "depth": 8, "hypothesis_drop": 1e6, **options}
+    return HypothesisOrientedMHT(
+        [plain.sensor()],
+        KalmanFilter(ConstantVelocity(plain.Q_SIGMA, kind="continuous")),
+        region=plain.REGION,
+        life_cycle=LifeCycle(missed_probability=1e-12),
+        initiation=Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
+        gate_probability=1 - 1e-12,
+        **options,
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_all_hypotheses_of_two_scans_and_their_probabilities(seed):
+    times, scans = plain.small_scans(np.random.default_rng(seed))
+    own = tracker()
+    for time, z in zip(times[:2], scans[:2], strict=True):
+        own.step(time, [z])
+    everything = plain.enumerate_hypotheses(times[:2], scans[:2], plain.sensor())
+    weights = np.sort([score for score, _ in everything])[::-1]
+    assert len(own.probabilities) == len(weights)
+    p = np.exp(weights - weights[0])
+    np.testing.assert_allclose(own.probabilities, p / p.sum(), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_best_of_three_scans(seed):
+    times, scans, best = enumerated(seed)
+    own = tracker(max_hypotheses=60)
+    for time, z in zip(times, scans, strict=True):
+        own.step(time, [z])
+    assert sum(track.score for track in own.tracks) == pytest.approx(best[0][0], abs=1e-6)
+    assert len(own.tracks) == len(best[0][1])
+
+
+def test_equation_2_1():
+    one = plain.sensor()
+    own = tracker()
+    own.step(0.0, [np.array([[500.0, 500, 100]])])
+    own.step(1.0, [np.array([[505.0, 500, 100], [520.0, 480, 110]])])
+    P_D, P_FA, P_NT = one.detection_probability, one.false_alarm_rate / one.volume, plain.BIRTH / one.volume
+    mean, cov = plain.predict(*plain.start(np.array([500.0, 500, 100]), one.covariance), 1.0)
+    z = np.array([[505.0, 500, 100], [520.0, 480, 110]])
+    p = [math.exp(plain.correct(mean, cov, one_z, one.covariance)[2]) for one_z in z]
+    # the first scan: false alarm (N_fa = 1), or new; a new target is detected (the paper's P_NT stands for both)
+    new, false = P_D * P_NT, P_FA
+    without = [(new + false) ** 2 * false]
+    with_track = [(1 - P_D) * (new + false) ** 2 * new, *(P_D * q * (new + false) * new for q in p)]
+    wanted = []
+    for parent, targets in ((false, 0), (new, 1)):
+        for a in (new, false):
+            for b in (new, false):
+                wanted.append(parent * (1 - P_D) ** targets * a * b)
+    for i in range(2):
+        wanted += [new * P_D * p[i] * other for other in (new, false)]
+    assert sum(wanted) == pytest.approx(sum(without) + sum(with_track))
+    wanted = np.sort(wanted)[::-1]
+    np.testing.assert_allclose(own.probabilities, wanted / wanted.sum(), rtol=1e-9)
+
+
+def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
+    times, scans = plain.small_scans(np.random.default_rng(1))
+    own = tracker(depth=2, max_hypotheses=50)
+    final = []
+    for time, z in zip(times, scans, strict=True):
+        final += own.step(time, [z]).final
+        for rows in own._members:
+            # every hypothesis agrees with the best on the scan before
+            column = {(int(own._bank.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
+            best = {
+                (int(own._bank.track_id[r]), int(own._history[r, 1])) for r in own._members[0] if own._history[r, 1]
+            }
+            assert column == best
+    assert [decision.scan for decision in final + list(own.flush())] == [0, 1, 2]

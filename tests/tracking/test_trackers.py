@@ -1,0 +1,265 @@
+"""What must be true of every tracker."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from assoc import InvalidInputError, filters, simulation
+from assoc.sensors import PositionSensor
+from assoc.tracking import (
+    TRACKERS,
+    LifeCycle,
+    MultiSensorTracker,
+    NearestNeighbourTracker,
+    StaticFusionTracker,
+    TrackOrientedMHT,
+)
+from assoc.tracking.life_cycle import count_bits
+
+KINDS = list(TRACKERS.values())
+
+
+@cache
+def scene(scans=8, seed=1):
+    return simulation.simulate("three-radar", seed, scans=scans)
+
+
+def run(tracker, one, start=0, stop=None):
+    steps = []
+    for k in range(start, stop or one.num_scans):
+        scan = one.scan(k)
+        steps.append(tracker.step(scan.time, scan.measurements))
+    return steps
+
+
+def same(one, other):
+    assert [t.track_id for t in one.tracks] == [t.track_id for t in other.tracks]
+    for a, b in zip(one.tracks, other.tracks, strict=True):
+        assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
+        assert (a.score, a.confirmed, a.hits, a.started) == (b.score, b.confirmed, b.hits, b.started)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_targets_are_found_and_decisions_are_complete(kind):
+    one = scene()
+    tracker = kind.for_scene(one)
+    steps = run(tracker, one)
+    last = one.scan(one.num_scans - 1)
+    confirmed = np.array([t.position for t in tracker.tracks if t.confirmed])
+    away = np.linalg.norm(confirmed[:, None] - last.truth_positions[None], axis=2)
+    assert (away.min(axis=0) < 250).all() and (away.min(axis=1) < 250).all()
+    final = [d for step in steps for d in step.final]
+    final += tracker.flush()
+    assert [d.scan for d in final] == list(range(one.num_scans))
+    right = total = 0
+    majority = {}
+    for decision in final:
+        scan = one.scan(decision.scan)
+        for z, ids, flags, sources in zip(
+            scan.measurements, decision.assigned, decision.confirmed, scan.sources, strict=True
+        ):
+            assert ids.shape == flags.shape == (len(z),)
+            assert not flags[ids == 0].any()
+            for i, source in zip(ids[flags].tolist(), sources[flags].tolist(), strict=True):
+                majority.setdefault(i, []).append(source)
+    for sources in majority.values():
+        right += max(sources.count(s) for s in set(sources))
+        total += len(sources)
+    assert right >= 0.97 * total
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_saved_and_restored_the_future_is_the_same(kind, tmp_path):
+    one = scene()
+    straight = kind.for_scene(one, seed=3)
+    run(straight, one, 0, 4)
+    straight.save(tmp_path / "state.npz")
+    later = kind.for_scene(one, seed=3)
+    later.restore(tmp_path / "state.npz")
+    same(straight, later)
+    steps, again = run(straight, one, 4), run(later, one, 4)
+    same(straight, later)
+    for a, b in zip(steps, again, strict=True):
+        assert all(np.array_equal(x, y) for x, y in zip(a.assigned, b.assigned, strict=True))
+        assert len(a.final) == len(b.final)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_order_of_the_measurements_does_not_matter(kind):
+    one, rng = scene(), np.random.default_rng(5)
+    plain, shuffled = kind.for_scene(one), kind.for_scene(one)
+    for k in range(one.num_scans):
+        scan = one.scan(k)
+        orders = [rng.permutation(len(z)) for z in scan.measurements]
+        step = plain.step(scan.time, scan.measurements)
+        other = shuffled.step(scan.time, [z[order] for z, order in zip(scan.measurements, orders, strict=True)])
+        for s, order in enumerate(orders):
+            assert np.array_equal(step.assigned[s][order], other.assigned[s])
+    assert [t.track_id for t in plain.tracks] == [t.track_id for t in shuffled.tracks]
+    for a, b in zip(plain.tracks, shuffled.tracks, strict=True):
+        np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_memory_does_not_grow(kind):
+    one = scene(30)
+    tracker = kind.for_scene(one)
+
+    def size():
+        return sum(value.nbytes for value in tracker._arrays().values())
+
+    run(tracker, one, 0, 10)
+    sizes = [size()]
+    for k in range(10, 30):
+        run(tracker, one, k, k + 1)
+        sizes.append(size())
+    assert np.median(sizes[-10:]) < 1.5 * np.median(sizes[:10])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scans_without_measurements_and_time_standing_still(kind):
+    one = scene()
+    empty = [np.zeros((0, 3))] * 3
+    tracker = kind.for_scene(one)
+    assert tracker.tracks == [] and tracker.time is None
+    tracker.step(0.0, empty)
+    run(tracker, one)
+    before = len([t for t in tracker.tracks if t.confirmed])
+    tracker.step(one.times[-1], empty)
+    assert len([t for t in tracker.tracks if t.confirmed]) == before > 0
+    ended = [i for k in range(12) for i in tracker.step(one.times[-1] + 1.0 + k, empty).ended.tolist()]
+    assert not tracker.tracks and len(ended) == before
+
+
+def some_filters():
+    cv = filters.ConstantVelocity(20.0, kind="continuous")
+    turn = filters.CoordinatedTurn(20.0, 0.05)
+    padded = filters.ExtendedKalmanFilter(filters.Padded(cv, 0.1))
+    yield "modified", filters.ModifiedEKF(cv)
+    yield "unscented", filters.UnscentedKalmanFilter(turn)
+    yield "ensemble", filters.EnsembleKalmanFilter(cv, 200, 1)
+    yield "acceleration", filters.ExtendedKalmanFilter(filters.ConstantAcceleration(5.0))
+    yield (
+        "imm",
+        filters.InteractingMultipleModel([padded, filters.ExtendedKalmanFilter(turn)], [[0.95, 0.05], [0.1, 0.9]]),
+    )
+    yield "fuzzy", filters.FuzzyAdaptiveEKF.from_data(filters.CoordinatedTurn(20.0, 0.05), filters.tuned_data())
+
+
+@pytest.mark.parametrize(("name", "filter_"), list(some_filters()))
+@pytest.mark.parametrize("kind", [MultiSensorTracker, TrackOrientedMHT])
+def test_any_filter(kind, name, filter_, tmp_path):
+    one = scene(6)
+    tracker = kind.for_scene(one, filter_)
+    run(tracker, one, 0, 5)
+    tracker.save(tmp_path / "state.npz")
+    run(tracker, one, 5)
+    confirmed = np.array([t.position for t in tracker.tracks if t.confirmed])
+    away = np.linalg.norm(confirmed[:, None] - one.scan(5).truth_positions[None], axis=2)
+    assert away.min(axis=0).max() < 400
+    ends = [t.mean for t in tracker.tracks]
+    again = kind.for_scene(one, filter_)
+    again.restore(tmp_path / "state.npz")
+    run(again, one, 5)
+    assert all(np.array_equal(a, t.mean) for a, t in zip(ends, again.tracks, strict=True))
+
+
+@pytest.mark.parametrize("solver", ["greedy", "aco", "genetic", "tabu", "lagrangian", "milp"])
+def test_any_solver(solver):
+    one = scene(4)
+    tracker = MultiSensorTracker.for_scene(one, solver=solver)
+    run(tracker, one)
+    assert sum(t.confirmed for t in tracker.tracks) == 3
+
+
+def test_planar_states():
+    view = [[-2e4, 2e4], [-2e4, 2e4]]
+    sensor = PositionSensor(
+        position=np.zeros(3), noise=[30.0, 30.0], detection_probability=0.9, false_alarm_rate=0.5, field_of_view=view
+    )
+    motion = filters.ConstantVelocity(2.0, dimensions=2, kind="continuous")
+    for kind in KINDS:
+        tracker = kind([sensor], filters.KalmanFilter(motion))
+        for k in range(6):
+            tracker.step(10.0 * k, [np.array([[1000.0 * k, 500.0]])])
+        (track,) = [t for t in tracker.tracks if t.confirmed]
+        assert track.mean.shape == (4,) and track.position[2] == 0
+        np.testing.assert_allclose(track.velocity, [100, 0, 0], atol=2)
+
+
+class TestBadInput:
+    @pytest.fixture
+    def tracker(self):
+        return MultiSensorTracker.for_scene(scene())
+
+    def test_time_backwards(self, tracker):
+        tracker.step(5.0, [np.zeros((0, 3))] * 3)
+        with pytest.raises(InvalidInputError, match="time must not run backwards: got 4 s after 5 s"):
+            tracker.step(4.0, [np.zeros((0, 3))] * 3)
+
+    @pytest.mark.parametrize("time", [np.nan, "1", None, True])
+    def test_time_is_no_number(self, tracker, time):
+        with pytest.raises(InvalidInputError, match="time must be a finite number"):
+            tracker.step(time, [np.zeros((0, 3))] * 3)
+
+    def test_number_of_sensors(self, tracker):
+        with pytest.raises(InvalidInputError, match="measurements of 2 sensors, expected 3"):
+            tracker.step(0.0, [np.zeros((0, 3))] * 2)
+
+    def test_shape_and_nan(self, tracker):
+        with pytest.raises(InvalidInputError, match=r"measurements of sensor 1 must have shape \(2, 3\)"):
+            tracker.step(0.0, [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros((0, 3))])
+        with pytest.raises(InvalidInputError, match="measurements of sensor 0 must be finite"):
+            tracker.step(0.0, [np.full((1, 3), np.nan), np.zeros((0, 3)), np.zeros((0, 3))])
+        assert tracker.num_steps == 0
+
+    def test_unknown_solver_and_filter(self):
+        with pytest.raises(InvalidInputError, match="unknown name 'acoo'; did you mean aco"):
+            MultiSensorTracker.for_scene(scene(), solver="acoo")
+        with pytest.raises(InvalidInputError, match="filter must be a filter"):
+            MultiSensorTracker.for_scene(scene(), "ekf")
+
+    def test_saved_by_another(self, tracker, tmp_path):
+        tracker.save(tmp_path / "state.npz")
+        other = MultiSensorTracker.for_scene(scene(), gate_probability=0.99)
+        with pytest.raises(InvalidInputError, match=r"other settings: gate_probability was '0\.999', is '0\.99'"):
+            other.restore(tmp_path / "state.npz")
+
+    @pytest.mark.parametrize(
+        ("wrong", "message"),
+        [
+            ({"confirmation": "x"}, "confirmation must be 'score' or 'm-of-n'"),
+            ({"deletion": "x"}, "deletion must be"),
+            ({"m": 5, "n": 4}, "m <= n"),
+            ({"false_probability": 0.0}, "false_probability must be a number above 0"),
+            ({"deletion_time": -1.0}, "deletion_time must be a number above 0"),
+            ({"m": 1.5}, "m must be a whole number"),
+        ],
+    )
+    def test_life_cycle(self, wrong, message):
+        with pytest.raises(InvalidInputError, match=message):
+            LifeCycle(**wrong)
+
+
+def test_m_of_n_and_deletion_by_count():
+    view = [[-2e4, 2e4], [-2e4, 2e4]]
+    sensor = PositionSensor(position=np.zeros(3), noise=[30.0, 30.0], field_of_view=view)
+    seen = [1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0]
+    cycle = LifeCycle(confirmation="m-of-n", m=3, n=4, deletion="count", deletion_count=3, missed_probability=1e-9)
+    motion = filters.ConstantVelocity(2.0, dimensions=2, kind="continuous")
+    # multiple hypothesis trackers show only what their best hypothesis holds
+    for kind in (MultiSensorTracker, StaticFusionTracker, NearestNeighbourTracker):
+        tracker = kind([sensor], filters.KalmanFilter(motion), life_cycle=cycle)
+        story = []
+        for k, there in enumerate(seen):
+            tracker.step(10.0 * k, [np.array([[10.0 * k, 500.0]] * there).reshape(-1, 2)])
+            story.append({t.track_id: t.confirmed for t in tracker.tracks}.get(1))
+        assert story[3:9] == [True] * 6
+        assert not any(story[:3])
+        assert story[9] is None
+
+
+def test_count_bits():
+    values = np.array([0, 1, 5, 2**61 + 3], dtype=np.int64).astype(np.uint64)
+    assert count_bits(values).tolist() == [0, 1, 2, 3]
