@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 FORMAT = "assoc.result"
 VERSION = 1
 
+_SHOWN = 10
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ScanAssociation:
     """The association of one scan.
 
@@ -101,6 +103,13 @@ class ScanAssociation:
                 {"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)
             ]
         return content
+
+    def __repr__(self) -> str:
+        when = "" if self.time is None else f", t = {self.time:g} s"
+        return (
+            f"ScanAssociation({self.scan}{when}: {' + '.join(map(str, self.sizes))} measurements, "
+            f"{len(self.targets)} targets, {self.false_alarms} false alarms, {self.solution!r})"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -227,6 +236,18 @@ class Association:
             f"Association({self.solver}: {total['scans']} scans, {total['targets']} targets, "
             f"cost {total['cost']:.6g}, gap {_text(total['gap'])})"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: the summary, and one row for each of the first scans."""
+        from assoc._html import escape, table
+        from assoc._tables import rows
+
+        headers, cells = rows(self.scans[:_SHOWN], [""] * min(len(self.scans), _SHOWN))
+        lines = "<br>".join(escape(line) for line in self.summary().splitlines())
+        numbers = [column for column, header in enumerate(headers) if header != "status"]
+        rest = len(self.scans) - _SHOWN
+        more = f"<p>... and {rest} more scans</p>" if rest > 0 else ""
+        return f"<p>{lines}</p>{table(headers, cells, numbers=numbers)}{more}"
 
 
 def associate(

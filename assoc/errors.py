@@ -17,3 +17,7 @@ class InfeasibleError(AssocError):
 
 class LimitExceededError(AssocError):
     """The work asked for exceeds a stated limit; the message gives the number and what to change."""
+
+
+class MissingExtraError(AssocError, ImportError):
+    """An optional dependency is not installed; the message names the command that installs it."""

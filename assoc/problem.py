@@ -98,6 +98,19 @@ class AssignmentProblem:
         kind = "" if self.dummy else ", no dummies"
         return f"AssignmentProblem({sizes} measurements, {self.num_tuples} tuples{kind})"
 
+    def _repr_html_(self) -> str:
+        """Return what notebooks and reports show: how many tuples of each size there are, and their costs."""
+        from assoc._html import escape, table
+
+        found = np.count_nonzero(self.tuples, axis=1)
+        rows = []
+        for count in np.unique(found):
+            costs = self.costs[found == count]
+            median = float(np.median(costs))
+            rows.append([int(count), costs.size, f"{costs.min():.4g}", f"{median:.4g}", f"{costs.max():.4g}"])
+        headers = ["measurements in a tuple", "tuples", "least cost", "median", "largest"]
+        return f"<p>{escape(repr(self))}</p>{table(headers, rows, numbers=range(5))}"
+
     @classmethod
     def from_dense(cls, tensor: ArrayLike, dummy: bool = True) -> AssignmentProblem:
         """Read a dense cost tensor.

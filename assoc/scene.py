@@ -12,7 +12,7 @@ import numpy as np
 from assoc._scene_file import load_parts, save_parts
 from assoc.errors import InvalidInputError
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
-from assoc.sensors.base import finite_array
+from assoc.sensors.base import ANGLES, finite_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -275,6 +275,27 @@ class Scene:
         return (
             f"Scene({name}{len(self.sensors)} sensors, {self.num_scans} scans, {count} measurements{known})"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks and reports show: one row a sensor."""
+        from assoc._html import escape, table
+
+        rows = []
+        for s, sensor in enumerate(self.sensors):
+            counts = [len(scan[s]) for scan in self.measurements]
+            place = ", ".join(f"{x:g}" for x in sensor.position)
+            sigmas = np.sqrt(np.diagonal(sensor.covariance))
+            noise = ", ".join(
+                f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} m"
+                for name, sigma in zip(sensor.components, sigmas, strict=False)
+            )
+            rows.append(
+                [sensor.name or s + 1, type(sensor).__name__, place, noise, f"{sensor.detection_probability:g}"]
+                + [f"{sensor.false_alarm_rate:g}", f"{np.mean(counts):.3g}"]
+            )
+        headers = ["sensor", "kind", "place (m)", "noise (1 σ)", "P_d"]
+        headers += ["false alarms per scan", "measurements per scan"]
+        return f"<p>{escape(repr(self))}</p>{table(headers, rows, numbers=(4, 5, 6))}"
 
 
 def default_region(sensors: Sequence[Sensor]) -> Array:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 OPTIMALITY_TOLERANCE = 1e-6
 
+_SHOWN = 10
+
 
 class TracePoint(NamedTuple):
     """One line of a solver's history: when, after how much work, and what was known then."""
@@ -102,3 +104,26 @@ class Solution:
             f"Solution({self.solver}: cost {self.cost:.6g}, lower bound {self.lower_bound:.6g}, {self.status}, "
             f"{len(self.tuples)} tuples, {self.num_targets} targets, {1e3 * self.runtime:.3g} ms)"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: the certificate, and the first tuples that are more than a false alarm."""
+        from assoc._html import escape, facts, table
+
+        certificate = {
+            "solver": self.solver,
+            "status": self.status,
+            "cost": f"{self.cost:.6g}",
+            "lower bound": f"{self.lower_bound:.6g}",
+            "gap": f"{self.gap:.3g}",
+            "targets": self.num_targets,
+            "tuples": len(self.tuples),
+            "iterations": self.iterations,
+            "stopped by": self.stopped_by,
+            "runtime": f"{1e3 * self.runtime:.3g} ms",
+        }
+        targets = self.tuples[np.count_nonzero(self.tuples, axis=1) >= 2]
+        headers = [f"sensor {s + 1}" for s in range(self.tuples.shape[1])]
+        shown = table(headers, targets[:_SHOWN].tolist(), numbers=range(len(headers)))
+        rest = len(targets) - _SHOWN
+        more = f"<p>... and {rest} more</p>" if rest > 0 else ""
+        return f"<p>{escape(repr(self))}</p>{facts(certificate)}{shown}{more}"

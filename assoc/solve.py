@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assoc._extras import check_extra
 from assoc._inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
 from assoc._program import (
     Option,
@@ -54,10 +55,12 @@ def _solve(words: list[str]) -> None:
     if "kbest" in settings and (explicit or parameters):
         raise InvalidInputError("--kbest: ranks by itself and takes no --solver and no parameters of solvers")
     files = parsed["files"]
-    outputs = [path for path in (parsed["json"], parsed["csv"]) if path]
+    outputs = [path for path in (parsed["json"], parsed["csv"], parsed["report"]) if path]
     check_distinct(outputs, files)
     for path in outputs:
         check_output(path)
+    if parsed["report"]:
+        check_extra("plotly", "report")
 
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
@@ -67,6 +70,11 @@ def _solve(words: list[str]) -> None:
     names = [files[number] for number, _ in items]
     with writing:
         _write(association, names, parsed["json"], parsed["csv"])
+    if parsed["report"]:
+        from assoc.plotting.report import write_association_report
+
+        each = [sources[number] for number, _ in items]
+        write_association_report(parsed["report"], association, each, names, words=words)
 
     from assoc._tables import print_table
 
@@ -107,6 +115,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--kbest", metavar="K", help="the K best associations of each scan, truly ranked")
     add("--json", metavar="FILE", help="write the result as JSON")
     add("--csv", metavar="FILE", help="write the table as CSV")
+    add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (assoc[report])")
     add(
         "--config",
         metavar="FILE",

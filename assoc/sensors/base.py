@@ -14,6 +14,9 @@ from assoc.errors import InvalidInputError
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+ANGLES = ("azimuth", "elevation")
+"""Components that are angles, in radians; all others are lengths, in metres."""
+
 LARGEST = 1e12
 """Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
 

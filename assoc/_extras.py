@@ -1,0 +1,38 @@
+"""Optional dependencies: imported when they are used, and asked for by name where they are missing."""
+
+from __future__ import annotations
+
+import importlib
+from importlib.util import find_spec
+from types import ModuleType
+
+from assoc.errors import MissingExtraError
+
+
+def check_extra(package: str, extra: str) -> None:
+    """Refuse early, without importing anything, what a missing package would stop later.
+
+    Parameters
+    ----------
+    package : str
+        Name of the top-level package.
+    extra : str
+        The extra of assoc that brings it.
+
+    Raises
+    ------
+    MissingExtraError
+        An ImportError whose one line names the command.
+    """
+    try:
+        found = find_spec(package) is not None
+    except (ImportError, ValueError):  # ValueError: someone put None into sys.modules
+        found = False
+    if not found:
+        raise MissingExtraError(f"{package} is not installed: python -m pip install 'assoc[{extra}]'")
+
+
+def load_extra(module: str, extra: str) -> ModuleType:
+    """Import a module of an optional package, or say how to install it; see `check_extra`."""
+    check_extra(module.partition(".")[0], extra)
+    return importlib.import_module(module)

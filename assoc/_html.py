@@ -1,0 +1,43 @@
+"""HTML from text that nobody vouches for: names in files, words of command lines."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+
+def escape(text: object) -> str:
+    """Return text that shows as it is, in elements and in quoted attributes."""
+    return html.escape(str(text), quote=True)
+
+
+def script_json(content: Any) -> str:
+    """Return JSON that can stand inside a script element, whatever its strings hold."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
+    # no tag, comment or entity can begin inside; JSON reads the escapes back as the same characters
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def table(headers: Sequence[object], rows: Iterable[Sequence[object]], *, numbers: Sequence[int] = ()) -> str:
+    """Return a plain table; the columns ``numbers`` are set flush right."""
+    right = {*numbers}
+
+    def line(cells: Sequence[object], tag: str) -> str:
+        style = [' style="text-align:right"' if column in right else "" for column in range(len(cells))]
+        inner = (f"<{tag}{s}>{escape(cell)}</{tag}>" for s, cell in zip(style, cells, strict=True))
+        return f"<tr>{''.join(inner)}</tr>"
+
+    body = "".join(line(row, "td") for row in rows)
+    return f"<table><thead>{line(headers, 'th')}</thead><tbody>{body}</tbody></table>"
+
+
+def facts(content: Mapping[str, object]) -> str:
+    """Return a table of two columns: what, and its value."""
+    rows = (
+        f'<tr><th scope="row" style="text-align:left">{escape(name)}</th>'
+        f'<td style="text-align:left">{escape(value)}</td></tr>'
+        for name, value in content.items()
+    )
+    return f"<table><tbody>{''.join(rows)}</tbody></table>"

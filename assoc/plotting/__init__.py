@@ -1,0 +1,1 @@
+"""Pictures: functions that draw into matplotlib axes, and the HTML reports."""

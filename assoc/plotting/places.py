@@ -1,0 +1,69 @@
+"""Where to draw a measurement: the point it names, or the ray along which it sees."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:
+    """Positions of measurements; what a sensor does not measure is given.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    measurements : ndarray (n, d)
+    heights : float or ndarray (n,)
+        Heights above the plane z = 0 for sensors that leave them open, metres.
+    distances : float or ndarray (n,)
+        Ground distances from sensors that measure a bearing alone, metres.
+
+    Returns
+    -------
+    ndarray (n, 3)
+        Metres.
+    """
+    z = np.asarray(measurements, dtype=np.float64)
+    height = np.broadcast_to(np.asarray(heights, dtype=np.float64), (len(z),))
+    if isinstance(sensor, PositionSensor):
+        return np.column_stack([z, height]) if sensor.dim == 2 else np.array(z)
+    if isinstance(sensor, BearingSensor):
+        ground, azimuth = np.broadcast_to(np.asarray(distances, dtype=np.float64), (len(z),)), z[:, 0]
+    elif isinstance(sensor, Radar2D):
+        # a target higher than the range is long would have no ground distance: it is drawn above the radar
+        ground, azimuth = np.sqrt(np.maximum(z[:, 0] ** 2 - (height - sensor.position[2]) ** 2, 0.0)), z[:, 1]
+    else:
+        ground, azimuth = z[:, 0] * np.cos(z[:, 2]), z[:, 1]
+        height = sensor.position[2] + z[:, 0] * np.sin(z[:, 2])
+    x, y = sensor.position[0] + ground * np.cos(azimuth), sensor.position[1] + ground * np.sin(azimuth)
+    return np.column_stack([x, y, height])
+
+
+def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array:
+    """How far a ray from the sensor runs until it leaves the region, metres (n,); 0 if it never meets it.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    bearings : ndarray (n,)
+        Azimuths, rad.
+    region : ndarray (3, 2)
+        Bounds of x, y, z.
+    """
+    direction = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = (region[None, :2, :] - sensor.position[None, :2, None]) / direction[:, :, None]
+    # parallel to a side: that side never stops it
+    ends = np.where(np.isnan(ends), np.inf, ends)
+    leave = ends.max(axis=2).min(axis=1)
+    return np.where(np.isfinite(leave), np.maximum(leave, 0.0), 0.0)
+
+
+def measures_height(sensor: Sensor) -> bool:
+    """Whether a measurement says how high the target is."""
+    return sensor.dim == 3

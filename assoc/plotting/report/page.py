@@ -1,0 +1,184 @@
+"""A page that needs nothing but itself: style, data, plotly and our script in one file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import platform
+import shlex
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from typing import Any
+
+import assoc
+from assoc._extras import check_extra, load_extra
+from assoc._files import write_atomically
+from assoc._html import escape, script_json
+
+_VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report says.
+
+    Parameters
+    ----------
+    title, lead : str
+        Heading, and one sentence under it; plain text.
+    sections : sequence of (id, title, html)
+        In order; the HTML of each is ready, text in it escaped.
+    data : mapping
+        What the scripts read, as JSON.
+    scripts : sequence of str
+        Names of files in ``static`` beside ``core.js``, which is always there.
+    """
+
+    title: str
+    lead: str
+    sections: Sequence[tuple[str, str, str]]
+    data: Mapping[str, Any]
+    scripts: Sequence[str] = field(default_factory=tuple)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the page; it appears whole or not at all.
+
+        Raises
+        ------
+        MissingExtraError
+            plotly is not installed.
+        InvalidInputError
+            The file cannot be written.
+        """
+        content = self.html().encode()
+        write_atomically(path, lambda file: file.write(content))
+
+    def html(self) -> str:
+        """Return the whole page."""
+        code = "\n".join(["'use strict';", *(_static(name) for name in ("core.js", *self.scripts))])
+        scripts = [plotly_script(), f"(() => {{\n{code}\n}})();"]
+        body = [
+            f'<section id="{escape(name)}"><h2>{escape(title)}</h2>\n{content}\n</section>'
+            for name, title, content in self.sections
+        ]
+        links = "".join(f'<a href="#{escape(name)}">{escape(title)}</a>' for name, title, _ in self.sections)
+        return "\n".join(
+            [
+                "<!doctype html>",
+                '<html lang="en"><head><meta charset="utf-8">',
+                '<meta name="viewport" content="width=device-width, initial-scale=1">',
+                f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">',
+                f"<title>{escape(self.title)}</title>",
+                f"<style>\n{_static('page.css')}</style></head>",
+                f"<body><header><h1>{escape(self.title)}</h1><p>{escape(self.lead)}</p><nav>{links}</nav></header>",
+                "<noscript><p>The tables can be read; the pictures need JavaScript.</p></noscript>",
+                '<p id="failure" role="alert" hidden></p>',
+                "<main>",
+                *body,
+                "</main>",
+                f'<script type="application/json" id="data">{script_json(self.data)}</script>',
+                *(f"<script>{script}</script>" for script in scripts),
+                "</body></html>\n",
+            ]
+        )
+
+
+def _static(name: str) -> str:
+    return files("assoc.plotting.report").joinpath("static", name).read_text(encoding="utf-8")
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """Nothing from outside is loaded and no script runs but ours, even if text should slip through as a tag."""
+    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    return f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"
+
+
+def check_report() -> None:
+    """Raise the MissingExtraError of a report before any work is done for it."""
+    check_extra("plotly", "report")
+
+
+def plotly_script() -> str:
+    """Return plotly.js as the plotly package ships it.
+
+    Raises
+    ------
+    MissingExtraError
+        The package is not installed.
+    """
+    check_report()
+    text: str = load_extra("plotly.offline", "report").get_plotlyjs()
+    # in a script element these would open a state in which the closing tag no longer closes
+    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+
+
+def made_with(program: str | None, words: Sequence[str] | None) -> dict[str, str]:
+    """Return what the reader needs to make it again: command, versions, machine, date."""
+    content = {}
+    if program is not None and words is not None:
+        content["command"] = shlex.join(["python", "-m", program, *words])
+    content["assoc"] = assoc.__version__
+    content["Python"] = platform.python_version()
+    for name in _VERSIONS:
+        try:
+            content[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    content["machine"] = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    content["made"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    return content
+
+
+def definitions(content: Mapping[str, Any]) -> str:
+    """Return a list of names and values."""
+    items = "".join(
+        f"<div><dt>{escape(name)}</dt><dd>{escape('none' if value is None else value)}</dd></div>"
+        for name, value in content.items()
+    )
+    return f'<dl class="facts">{items}</dl>'
+
+
+def cards(content: Mapping[str, tuple[str, str]]) -> str:
+    """Return the figures of a summary: name -> (value, what it means)."""
+    items = "".join(
+        f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd><p>{escape(note)}</p></div>"
+        for name, (value, note) in content.items()
+    )
+    return f'<dl class="cards">{items}</dl>'
+
+
+def sortable_table(
+    name: str, headers: Sequence[str], rows: Sequence[Sequence[tuple[str, Any]]], *, link: str | None = None
+) -> str:
+    """Return a table that the page's script can sort.
+
+    Parameters
+    ----------
+    name : str
+        Its id.
+    headers : sequence of str
+    rows : sequence of rows
+        Each cell as (text, key to sort by); cells with a number for key are set flush right.
+    link : str, optional
+        Makes row i choose ``link``-i on the page; its first cell is a link.
+    """
+    head = "".join(f'<th scope="col"><button type="button">{escape(header)}</button></th>' for header in headers)
+    lines = []
+    for number, row in enumerate(rows):
+        cells = []
+        for column, (text, key) in enumerate(row):
+            numeric = isinstance(key, (int, float)) and not isinstance(key, bool)
+            inner = escape(text)
+            if link is not None and column == 0:
+                inner = f'<a href="#{link}-{number}">{inner}</a>'
+            cells.append(f'<td data-key="{escape(key)}"{" class=number" if numeric else ""}>{inner}</td>')
+        lines.append(f'<tr data-row="{number}">{"".join(cells)}</tr>')
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(name)}"><table id="{escape(name)}" '
+        f'class="sortable"><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
+    )

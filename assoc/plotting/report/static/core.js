@@ -1,0 +1,158 @@
+// What all reports share: numbers as text, tables that sort, a slider that walks, plots in one style.
+const data = JSON.parse(document.getElementById('data').textContent);
+const byId = (id) => document.getElementById(id);
+
+const COLOURS = ['#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000'];
+const DASHES = ['solid', 'dash', 'dashdot', 'dot', 'longdash', 'longdashdot', '5px,1px'];
+const colourOf = (number) => COLOURS[number % COLOURS.length];
+const dashOf = (number) => DASHES[number % DASHES.length];
+
+// plotly reads tags and entities in its texts: names from files must show as they are
+const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
+
+const short = (value, digits = 4) => {
+  if (value === null || value === undefined) return 'unknown';
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  const text = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 1) : value.toFixed(
+    Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
+  return text.replace('-', '\u2212');
+};
+
+// Times as they are, without the digits that binary fractions add.
+const exact = (value) => String(Number(value.toPrecision(9)));
+
+const element = (tag, content, attributes = {}) => {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  if (Array.isArray(content)) made.append(...content);
+  else if (content !== undefined && content !== null) made.textContent = String(content);
+  return made;
+};
+
+// A table of texts; cells that start like a number are set flush right, and so are their headings.
+const numberClass = (cell) => (/^[\u2212-]?[0-9]/.test(String(cell)) ? { class: 'number' } : {});
+const simpleTable = (headers, rows) => {
+  const first = rows[0] || headers;
+  const body = rows.map((row) => element('tr', row.map((cell) => element('td', cell, numberClass(cell)))));
+  return element('table', [
+    element('thead', [element('tr', headers.map((header, i) => element('th', header, { scope: 'col', ...numberClass(first[i]) })))]),
+    element('tbody', body),
+  ]);
+};
+
+const keyOf = (cell) => {
+  const key = cell.dataset.key;
+  const value = Number(key);
+  return key === '' || key === 'None' ? null : Number.isNaN(value) ? key : value;
+};
+
+const compare = (a, b) => {
+  if (a === null || b === null) return a === b ? 0 : a === null ? 1 : -1;
+  if (typeof a === 'number' && typeof b === 'number') return a - b;
+  return String(a).localeCompare(String(b));
+};
+
+const makeSortable = (table) => {
+  const heads = [...table.tHead.rows[0].cells];
+  const body = table.tBodies[0];
+  heads.forEach((head, column) => {
+    if (body.rows.length && body.rows[0].cells[column].classList.contains('number')) head.classList.add('number');
+    head.querySelector('button').addEventListener('click', () => {
+      const down = head.getAttribute('aria-sort') === 'ascending';
+      heads.forEach((one) => one.removeAttribute('aria-sort'));
+      head.setAttribute('aria-sort', down ? 'descending' : 'ascending');
+      const keyed = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
+      // what is unknown stays last in both directions
+      keyed.sort(([a], [b]) => (a === null || b === null ? compare(a, b) : (down ? -1 : 1) * compare(a, b)));
+      body.append(...keyed.map(([, row]) => row));
+    });
+  });
+};
+
+// Mark a row and bring it into view inside its own box, without moving the page.
+const markRow = (table, number) => {
+  if (!table) return;
+  for (const row of table.tBodies[0].rows) {
+    if (Number(row.dataset.row) !== number) { row.removeAttribute('aria-current'); continue; }
+    row.setAttribute('aria-current', 'true');
+    const box = table.closest('.scroll');
+    const top = row.offsetTop - table.tHead.offsetHeight;
+    if (top < box.scrollTop) box.scrollTop = top;
+    else if (row.offsetTop + row.offsetHeight > box.scrollTop + box.clientHeight) {
+      box.scrollTop = row.offsetTop + row.offsetHeight - box.clientHeight;
+    }
+  }
+};
+
+const onRow = (table, choose) => table.tBodies[0].addEventListener('click', (event) => {
+  const row = event.target.closest('tr');
+  if (!row) return;
+  event.preventDefault();
+  choose(Number(row.dataset.row));
+});
+
+// The slider with its buttons; choose(i) moves it from elsewhere.
+const makeSlider = (count, label, show) => {
+  const range = byId('slider');
+  const text = byId('slider-label');
+  const play = byId('play');
+  let timer = null;
+  const choose = (wanted) => {
+    const number = Math.min(Math.max(wanted, 0), count - 1);
+    range.value = String(number);
+    text.textContent = label(number);
+    range.setAttribute('aria-valuetext', label(number));
+    show(number);
+  };
+  const stop = () => {
+    if (timer !== null) window.clearInterval(timer);
+    timer = null;
+    play.textContent = 'Play';
+    play.setAttribute('aria-pressed', 'false');
+  };
+  range.max = String(count - 1);
+  range.addEventListener('input', () => { stop(); choose(Number(range.value)); });
+  byId('before').addEventListener('click', () => { stop(); choose(Number(range.value) - 1); });
+  byId('after').addEventListener('click', () => { stop(); choose(Number(range.value) + 1); });
+  play.addEventListener('click', () => {
+    if (timer !== null) { stop(); return; }
+    play.textContent = 'Pause';
+    play.setAttribute('aria-pressed', 'true');
+    timer = window.setInterval(() => choose((Number(range.value) + 1) % count), 400);
+  });
+  return (number) => { stop(); choose(number); };
+};
+
+const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13 };
+const AXIS = { zeroline: false, gridcolor: '#e5e8eb', linecolor: '#8c959f', ticks: 'outside', automargin: true, tickcolor: '#8c959f' };
+const CONFIG = { responsive: true, displaylogo: false, displayModeBar: window.innerWidth < 820 ? false : 'hover', modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] };
+const layoutOf = (x, y, more = {}) => ({
+  font: FONT,
+  paper_bgcolor: '#fff',
+  plot_bgcolor: '#fff',
+  margin: { l: 62, r: 14, t: 34, b: 48 },
+  xaxis: { ...AXIS, title: { text: x } },
+  yaxis: { ...AXIS, title: { text: y } },
+  legend: { orientation: 'h', x: 0, xanchor: 'left', y: 1.02, yanchor: 'bottom', font: { size: 12 } },
+  hoverlabel: { align: 'left', font: { size: 12 } },
+  ...more,
+});
+
+// All axes of one value, or of values that differ by rounding alone, need some height.
+const rangeFor = (values) => {
+  const known = values.filter((value) => value !== null);
+  const low = Math.min(...known);
+  const high = Math.max(...known);
+  if (!known.length || high - low > 1e-6 * Math.max(1, Math.abs(low), Math.abs(high))) return undefined;
+  return [low - 1, high + 1];
+};
+
+const fail = (error) => {
+  const box = byId('failure');
+  box.hidden = false;
+  box.textContent = `This report could not be drawn: ${error.message}. Its tables are below.`;
+  console.error(error);
+};
+
+document.querySelectorAll('table.sortable').forEach(makeSortable);

@@ -1,0 +1,204 @@
+"""What the pictures of a report need to know of a scan, in plain numbers that JSON can hold."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.association import ScanAssociation
+from assoc.costs import tuple_costs
+from assoc.plotting.places import distances_to_border, measures_height, places
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scene
+from assoc.sensors import BearingSensor
+from assoc.sensors.base import ANGLES
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+BUDGET = 2_800_000
+"""Bytes that the views of all scans may take in a page; with plotly's 4.8 MB that stays below 8 MB."""
+
+_LINES_OF_TRACE = 200
+
+
+def plain_numbers(values: Array | Sequence[float], decimals: int) -> list[Any]:
+    """Nested lists of rounded numbers, as integers where no decimals are kept; None where not finite."""
+    array = np.round(np.asarray(values, dtype=np.float64), decimals)
+    if not np.isfinite(array).all():
+        return [
+            plain_numbers(one, decimals) if np.ndim(one) else (float(one) if np.isfinite(one) else None)
+            for one in array
+        ]
+    if decimals <= 0 and array.size and np.abs(array).max() < 2**53:
+        array = array.astype(np.int64)
+    content: list[Any] = array.tolist()
+    return content
+
+
+def number(value: float | None) -> float | None:
+    """Return what JSON can hold: None for what is not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def closed_gap(scan: ScanAssociation) -> float | None:
+    """Return the gap, 0 where only rounding is left of it; None without a bound."""
+    gap = scan.solution.gap
+    return 0.0 if gap <= 1e-9 * max(1.0, abs(scan.solution.cost)) else number(gap)
+
+
+def source_view(source: Scene | AssignmentProblem, file: str) -> dict[str, Any]:
+    """Sensors and extent of a source."""
+    if isinstance(source, AssignmentProblem):
+        names = [f"sensor {s + 1}" for s in range(source.num_sensors)]
+        return {"file": file, "title": file, "scene": False, "sensors": [{"name": name} for name in names]}
+    sensors = []
+    for s, sensor in enumerate(source.sensors):
+        sensors.append(
+            {
+                "name": sensor.name or f"sensor {s + 1}",
+                "place": plain_numbers(sensor.position, 1),
+                "components": list(sensor.components[: sensor.dim]),
+                "angles": [name in ANGLES for name in sensor.components[: sensor.dim]],
+                "sigma": np.sqrt(np.diagonal(sensor.covariance)).tolist(),
+                "ray": isinstance(sensor, BearingSensor),
+            }
+        )
+    return {
+        "file": file,
+        "title": source.name or file,
+        "scene": True,
+        "sensors": sensors,
+        "height": any(measures_height(sensor) for sensor in source.sensors),
+        "decimals": _decimals(source),
+    }
+
+
+def _decimals(scene: Scene) -> int:
+    """Decimals of a metre that a reader could tell apart when zoomed in to a hundredth of the noise."""
+    reach = float(np.abs(scene.region).max())
+    return 0 if reach > 20_000 else 1 if reach > 2_000 else 3
+
+
+def _trace(association: ScanAssociation) -> list[list[float | None]]:
+    trace = association.solution.trace
+    step = max(1, math.ceil(len(trace) / _LINES_OF_TRACE))
+    # the last line is the answer and always stays
+    kept = [*trace[:-1:step], *trace[-1:]]
+    return [[one.iteration, number(one.seconds), number(one.cost), number(one.lower_bound)] for one in kept]
+
+
+def scan_view(source: Scene | AssignmentProblem, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:
+    """Figures of a scan, its targets and its history; what can be drawn comes with `scene_view`."""
+    solution = one.solution
+    tuples = one.targets
+    costs: Array
+    if isinstance(source, AssignmentProblem):
+        rows = map(tuple, solution.tuples.tolist())
+        known = dict(zip(rows, source.costs[solution.indices].tolist(), strict=True))
+        costs = np.array([known[tuple(row)] for row in tuples.tolist()])
+    else:
+        costs = tuple_costs(source, one.scan, tuples)
+    return {
+        "source": number_of_source,
+        "scan": one.scan,
+        "time": number(one.time),
+        "sizes": list(one.sizes),
+        "targets": len(tuples),
+        "falseAlarms": one.false_alarms,
+        "cost": number(solution.cost),
+        "bound": number(solution.lower_bound),
+        "gap": closed_gap(one),
+        "status": solution.status,
+        "ms": 1e3 * solution.runtime,
+        "trueTuples": one.true_tuples,
+        "correct": one.correct_tuples,
+        "ranked": [number(other.solution.cost) for other in one.ranked],
+        "tuples": tuples.tolist(),
+        "costs": plain_numbers(costs, 4),
+        "trace": _trace(one),
+        "view": None,
+    }
+
+
+def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, Any]:
+    """Return what is drawn of a scan: truth, measurements, targets with residuals and covariances."""
+    scan = scene.scan(one.scan)
+    labels = one.labels()
+    positions = np.zeros((0, 3)) if one.positions is None else one.positions
+    spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
+    middle = float(scene.region[2].mean())
+    measured, residuals = [], []
+    for s, (sensor, z, label) in enumerate(zip(scene.sensors, scan.measurements, labels, strict=True)):
+        of_target = label >= 0
+        height, distance = np.full(len(z), middle), np.zeros(len(z))
+        if isinstance(sensor, BearingSensor):
+            distance = distances_to_border(sensor, z[:, 0], scene.region)
+        if of_target.any():
+            owner = positions[label[of_target]]
+            height[of_target] = owner[:, 2]
+            distance[of_target] = np.hypot(*(owner[:, :2] - sensor.position[:2]).T)
+        at = places(sensor, z, height, distance)
+        entry: dict[str, Any] = {"at": plain_numbers(at, decimals), "target": label.tolist()}
+        if scan.sources is not None:
+            entry["source"] = scan.sources[s].tolist()
+        measured.append(entry)
+        # one row for each target that this sensor saw, in the order of the targets
+        seen = np.flatnonzero(one.targets[:, s])
+        found = z[one.targets[seen, s] - 1]
+        difference = sensor.residual(found, sensor.measure(positions[seen])) if len(seen) else found
+        residuals.append(_significant(difference))
+    truth = []
+    if scan.truth_ids is not None and scan.truth_positions is not None:
+        truth = [
+            [int(i), *place]
+            for i, place in zip(scan.truth_ids, plain_numbers(scan.truth_positions, decimals), strict=True)
+        ]
+    sigmas = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
+    return {
+        "truth": truth,
+        "measured": measured,
+        "positions": plain_numbers(positions, decimals),
+        "sigmas": plain_numbers(sigmas, 1),
+        "ellipses": _significant(spreads[:, [0, 0, 1], [0, 1, 1]]),
+        "residuals": residuals,
+    }
+
+
+def _significant(values: Array) -> list[Any]:
+    """Nested lists of numbers with four digits."""
+    content: list[Any] = [[float(f"{value:.4g}") for value in row] for row in values.tolist()]
+    return content
+
+
+def thin(views: Iterable[dict[str, Any]], wanted: Sequence[dict[str, Any]], budget: int = BUDGET) -> int:
+    """Attach views to scans until the budget is spent; evenly spaced over the scans when not all fit.
+
+    Parameters
+    ----------
+    views : iterable of dict
+        The view of each scan of `wanted`, made one by one.
+    wanted : sequence of dict
+        Scans of `scan_view`, which get their "view".
+    budget : int
+        Bytes of JSON.
+
+    Returns
+    -------
+    int
+        How many scans kept their view.
+    """
+    sizes = []
+    for view, scan in zip(views, wanted, strict=True):
+        scan["view"] = view
+        sizes.append(len(json.dumps(view, separators=(",", ":"))))
+    step = 1
+    while step < len(sizes) and sum(sizes[::step]) > budget:
+        step += 1
+    for number_of, scan in enumerate(wanted):
+        if number_of % step:
+            scan["view"] = None
+    return len(sizes[::step])

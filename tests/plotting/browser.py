@@ -1,0 +1,80 @@
+"""A real browser without a screen, driven through WebDriver; tests that need it skip where it is missing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+DESKTOP, PHONE = (1280, 900), (390, 844)
+
+
+def _program(*names: str) -> str:
+    for name in names:
+        found = shutil.which(name)
+        if found:
+            return found
+    pytest.skip(f"{names[0]} is not installed (Debian: apt-get install chromium chromium-driver)")
+
+
+@contextmanager
+def opened() -> Iterator[Any]:
+    """Start a headless Chromium; skips the test where it, its driver or selenium is missing."""
+    selenium = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: pip install 'assoc[test]'")
+    from selenium.webdriver.chrome.options import Options
+    from selenium.webdriver.chrome.service import Service
+
+    options = Options()
+    options.binary_location = _program("chromium", "chromium-browser", "google-chrome")
+    driver = _program("chromedriver", "chromium.chromedriver")
+    words = ["--headless=new", "--disable-dev-shm-usage", "--hide-scrollbars", "--enable-unsafe-swiftshader"]
+    words += ["--use-angle=swiftshader", "--disable-background-networking", "--no-first-run"]
+    # root, as in most containers, cannot use the sandbox
+    for word in [*words, *(["--no-sandbox"] if os.geteuid() == 0 else [])]:
+        options.add_argument(word)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = selenium.Chrome(options=options, service=Service(driver, log_output=os.devnull))
+    try:
+        browser.set_page_load_timeout(60)
+        yield browser
+    finally:
+        browser.quit()
+
+
+def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment: str = "") -> None:
+    """Open a page at a size; a phone's is emulated, for windows cannot be that narrow."""
+    phone = size[0] < 500
+    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": phone}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    browser.get_log("browser")  # what an earlier page said
+    browser.get("about:blank")
+    browser.get(page.resolve().as_uri() + fragment)
+
+
+def complaints(browser: Any) -> list[str]:
+    """Return errors and warnings of the console since the page was opened."""
+    return [f"{one['level']}: {one['message']}" for one in browser.get_log("browser") if one["level"] != "INFO"]
+
+
+def screenshot(browser: Any, path: Path) -> bytes:
+    """Keep a picture of the whole page, and return it."""
+    import base64
+
+    page = "const page = document.documentElement; return [page.clientWidth, page.scrollHeight]"
+    size = browser.execute_script(page)
+    clip = {"x": 0, "y": 0, "width": size[0], "height": min(size[1], 6000), "scale": 1}
+    shot = browser.execute_cdp_cmd("Page.captureScreenshot", {"captureBeyondViewport": True, "clip": clip})
+    content = base64.b64decode(shot["data"])
+    path.write_bytes(content)
+    return content
+
+
+def press(browser: Any, element: Any) -> None:
+    """Click an element in the middle of the window, clear of headings that stay at the edge."""
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    element.click()
