@@ -99,9 +99,22 @@ class Cover:
 
 def penalised(packing: Packing) -> Floats:
     """Return weights with a penalty taken off for every row without slack that a column covers."""
-    penalty = 2.0 * float(np.abs(packing.weights).max(initial=0.0)) * packing.cols.shape[1] + 1.0
-    duties = np.where(packing.cols >= 0, ~packing.slack[packing.cols], False).sum(axis=1)
-    return packing.weights - penalty * duties
+    return np.asarray(penalised_weights(packing.cols, packing.weights, packing.slack))
+
+
+@njit
+def penalised_weights(cols: Any, weights: Floats, slack: Any) -> Floats:
+    """The same from arrays."""
+    widest = 0.0
+    for weight in weights:
+        widest = max(widest, abs(weight))
+    penalty = 2.0 * widest * cols.shape[1] + 1.0
+    result = weights.copy()
+    for j in range(result.size):
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0 and not slack[cols[j, s]]:
+                result[j] -= penalty
+    return result
 
 
 @njit

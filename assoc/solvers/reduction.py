@@ -3,7 +3,8 @@
 At each temperature of the dual ascent (bounds.py) the columns of smallest reduced cost are rounded to a
 cover. Between its weight and the bound lies each component's gap: columns with a larger reduced cost cannot
 be in a better solution and are dropped, rows without columns go with them, and components whose gap is
-closed are done. Most components of a gated scene never need more than this.
+closed are done. Most components of a gated scene never need more than this. The whole course is one kernel,
+which comes back now and then for a look at the clock.
 """
 
 from __future__ import annotations
@@ -16,15 +17,20 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers import bounds
-from assoc.solvers.local_search import _add_greedily, _improve, penalised
+from assoc.solvers.bounds import _component_bounds, _hard_sweeps, _reduced_costs, _smooth_passes, _spread
+from assoc.solvers.local_search import _add_greedily, _improve, penalised_weights
 from assoc.solvers.metaheuristic import TOLERANCE, Part, split_components
-from assoc.solvers.packing import Packing, assemble
+from assoc.solvers.packing import Packing, _assemble
 from assoc.solvers.run import Run
 
 Floats = NDArray[np.float64]
 
 # passes at one temperature; the last temperatures get more, because by then few columns are left
-_PASSES = (10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200)
+_PASSES = np.array([10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
+# visits of columns between two looks at the clock: about ten milliseconds
+_VISITS = 3_000_000
+# classes of reduced cost, by which columns are sorted before rounding
+_CLASSES = 256
 
 
 class Reduction:
@@ -36,29 +42,15 @@ class Reduction:
         Optimal columns of the components that are done, as columns of the packing given at the start.
     closed_bound, closed_weight : float
         Sum of their bounds and of their weights.
-    packing : Packing
-        What is left.
-    origin : int array
-        Its columns' places in the packing given at the start.
     """
 
     def __init__(self, packing: Packing, run: Run) -> None:
-        self.packing = packing
-        self.origin = np.arange(packing.num_columns)
-        self.rows = np.arange(packing.num_rows)
         self.closed_columns: list[NDArray[np.int64]] = []
         self.closed_bound = 0.0
         self.closed_weight = 0.0
-        self.passes = 0
         self._run = run
-        self._size = packing.num_rows
         self._whole = packing
         self._proof = np.zeros(packing.num_rows)
-        self._smooth = np.zeros(packing.num_rows)
-        self._hard = np.zeros(packing.num_rows)
-        self._owner = np.full(packing.num_rows, -1, dtype=np.int32)
-        self._weight = np.full(packing.num_components, np.inf)
-        self._bound = np.full(packing.num_components, -np.inf)
 
     @property
     def proof(self) -> Floats | None:
@@ -75,105 +67,185 @@ class Reduction:
 
     def reduce(self) -> list[Part]:
         """Run through all temperatures; return the parts that are still open."""
-        packing = self.packing
-        temperature = bounds.START * bounds.spread(packing)
-        bounds.hard_pass(packing, self._smooth, np.empty(packing.num_columns), 1)
-        for passes in _PASSES:
-            if self.packing.num_columns == 0 or self._run.should_stop():
-                break
-            temperature = self._step(temperature, passes) * bounds.COOLING
-        return self._open_parts()
-
-    def _step(self, temperature: Floats, passes: int) -> Floats:
-        packing = self.packing
-        reduced, primal, slack_primal = bounds.work_arrays(packing)
-        bounds.smooth_pass(packing, self._smooth, reduced, primal, slack_primal, temperature, passes)
-        self.passes += passes
-        duals = self._smooth.copy()
-        bounds.hard_pass(packing, duals, reduced, 2)
-        owner = self._round(packing, reduced, temperature)
-        keep, alive = _compare(
-            packing.cols,
-            packing.weights,
-            packing.slack,
-            packing.col_start,
-            packing.row_start,
-            bounds.component_bounds(packing, duals),
-            duals,
-            owner,
-            reduced,
-            self._bound,
-            self._hard,
-            self._owner,
-            self._weight,
-            TOLERANCE,
+        whole = self._whole
+        num = whole.num_rows
+        columns, closed = np.empty(num, dtype=np.int64), np.empty((num, 2))
+        counts = np.zeros(3, dtype=np.int64)
+        state: Any = _start(
+            whole.cols, whole.weights, whole.slack, whole.col_start, whole.row_start, whole.row_ptr, whole.row_cols
         )
-        if not alive.all():
-            self._close(~alive)
-        if 3 * np.count_nonzero(keep) < 2 * keep.size or not alive.all():
-            temperature = self._shrink(keep, alive, temperature)
-        return temperature
+        while counts[0] < _PASSES.size and state[1].size and not self._run.should_stop():
+            state = _reduce(
+                *state, _PASSES, counts, columns, closed, self._proof, TOLERANCE, whole.granularity, _VISITS
+            )
+        self.closed_columns.append(columns[: counts[1]])
+        self.closed_bound = math.fsum(closed[: counts[2], 0])
+        self.closed_weight = math.fsum(closed[: counts[2], 1])
+        return self._open_parts(*state)
 
-    def _round(self, packing: Packing, reduced: Floats, temperature: Floats) -> NDArray[np.int32]:
-        """A cover from the columns of small reduced cost, improved by insertion."""
-        column_temperature = np.repeat(temperature, np.diff(packing.col_start))
-        candidates = np.flatnonzero(reduced <= 4.0 * column_temperature)
-        order = candidates[np.argsort(reduced[candidates], kind="stable")]
-        owner = np.full(packing.num_rows, -1, dtype=np.int32)
-        _add_greedily(packing.cols, packing.weights, packing.slack, order, owner)
-        weights = penalised(packing) if packing.is_axial else packing.weights
-        loose = np.flatnonzero(owner < 0).astype(np.int32)
-        if loose.size:
-            _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, owner, loose)
-        return owner
-
-    def _close(self, done: NDArray[np.bool_]) -> None:
-        packing = self.packing
-        in_done = np.repeat(done, np.diff(packing.row_start))
-        owner = self._owner[in_done]
-        self.closed_columns.append(self.origin[np.unique(owner[owner >= 0])])
-        self.closed_bound += math.fsum(self._bound[done])
-        self.closed_weight += math.fsum(self._weight[done])
-        self._proof[self.rows[in_done]] = self._hard[in_done]
-
-    def _shrink(self, keep: NDArray[np.bool_], alive: NDArray[np.bool_], temperature: Floats) -> Floats:
-        packing = self.packing
-        # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
-        self._proof[self.rows] = self._hard
-        # rows without slack of components that are done have been covered: they leave as rows with slack do
-        slack = packing.slack | np.repeat(~alive, np.diff(packing.row_start))
-        chosen = np.flatnonzero(keep).astype(np.int32)
-        smaller = assemble(packing.cols[chosen], packing.weights[chosen], slack, chosen)
-        place = np.full(packing.num_columns, -1, dtype=np.int32)
-        place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
-        parent = np.repeat(np.arange(packing.num_components), np.diff(packing.row_start))[smaller.row_origin]
-        first = smaller.row_start[:-1]
-        owner = self._owner[smaller.row_origin]
-        self._owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
-        self._smooth = self._smooth[smaller.row_origin]
-        self._hard = self._hard[smaller.row_origin]
-        self.origin = self.origin[smaller.origin]
-        self.rows = self.rows[smaller.row_origin]
-        self.packing = smaller
-        # the parts of a component start from the same cover and the same multipliers
-        known = np.isfinite(self._weight)[parent[first]] if first.size else np.zeros(0, dtype=bool)
-        self._weight = np.where(
-            known, _cover_weights(smaller.weights, smaller.cols, smaller.row_start, self._owner), np.inf
+    def _open_parts(
+        self, cols: Any, weights: Any, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,
+        origin: Any, rows: Any, smooth: Any, hard: Any, owner: Any, weight: Any, bound: Any, temperature: Any,
+    ) -> list[Part]:  # fmt: skip
+        packing = Packing(
+            cols, weights, slack, col_start, row_start, row_ptr, row_cols, origin, rows, self._whole.granularity
         )
-        self._bound = bounds.component_bounds(smaller, self._hard)
-        return temperature[parent[first]]
-
-    def _open_parts(self) -> list[Part]:
-        packing = self.packing
-        parts = split_components(packing, self._hard, self.origin)
+        parts = split_components(packing, hard, origin.astype(np.int64))
         for c, part in enumerate(parts):
-            if np.isfinite(self._weight[c]):
-                own = self._owner[packing.row_start[c] : packing.row_start[c + 1]]
-                part.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
-                part.weight = float(self._weight[c])
-            part.bound = max(part.bound, float(self._bound[c]))
-        self._proof[self.rows] = self._hard
+            if np.isfinite(weight[c]):
+                own = owner[row_start[c] : row_start[c + 1]]
+                part.best = np.where(own >= 0, own - col_start[c], -1).astype(np.int32)
+                part.weight = float(weight[c])
+            part.bound = max(part.bound, float(bound[c]))
+        self._proof[rows] = hard
         return parts
+
+
+@njit
+def _start(cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any) -> Any:
+    """The state of the reduction at its start."""
+    num, num_rows, parts = weights.size, slack.size, col_start.size - 1
+    smooth = np.zeros(num_rows)
+    reduced = np.empty(num)
+    _reduced_costs(cols, weights, smooth, reduced)
+    _hard_sweeps(slack, row_ptr, row_cols, smooth, reduced, 1)
+    temperature = _spread(weights, slack, col_start, row_start) * bounds.START
+    return (
+        cols, weights, slack, col_start, row_start, row_ptr, row_cols,
+        np.arange(num).astype(np.int32), np.arange(num_rows).astype(np.int32), smooth, np.zeros(num_rows),
+        np.full(num_rows, -1, np.int32), np.full(parts, np.inf), np.full(parts, -np.inf), temperature,
+    )  # fmt: skip
+
+
+@njit
+def _reduce(
+    cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,
+    origin: Any, rows: Any, smooth: Floats, hard: Floats, owner: Any, weight: Floats, bound: Floats,
+    temperature: Floats, passes: Any, counts: Any, closed_columns: Any, closed: Floats, proof: Floats,
+    tolerance: float, granularity: float, most_visits: int,
+) -> Any:  # fmt: skip
+    """Go through temperatures until none is left, nothing is open or the visits are used up; the new state.
+
+    ``counts`` holds the temperatures done, the number of closed columns and that of closed components.
+    """
+    visits = 0
+    while counts[0] < passes.size and weights.size > 0 and visits < most_visits:
+        reduced, primal, slack_primal = np.empty(weights.size), np.empty(weights.size), np.empty(slack.size)
+        visits += _smooth_passes(
+            cols, weights, slack, row_start, col_start, row_ptr, row_cols, smooth, reduced, primal, slack_primal,
+            temperature, passes[counts[0]],
+        )  # fmt: skip
+        duals = smooth.copy()
+        _reduced_costs(cols, weights, duals, reduced)
+        _hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2)
+        new_owner = _round(cols, weights, slack, col_start, row_ptr, row_cols, reduced, temperature)
+        keep, alive = _compare(
+            cols, weights, slack, col_start, row_start,
+            _component_bounds(cols, weights, slack, col_start, row_start, row_ptr, duals), duals, new_owner,
+            reduced, bound, hard, owner, weight, tolerance, granularity,
+        )  # fmt: skip
+        temperature = temperature * bounds.COOLING
+        counts[0] += 1
+        any_closed = False
+        for c in range(alive.size):
+            if not alive[c]:
+                any_closed = True
+                closed[counts[2]] = bound[c], weight[c]
+                counts[2] += 1
+                for r in range(row_start[c], row_start[c + 1]):
+                    j = owner[r]
+                    if j >= 0 and _first_row(cols, j) == r:
+                        closed_columns[counts[1]] = origin[j]
+                        counts[1] += 1
+        kept = 0
+        for j in range(keep.size):
+            kept += keep[j]
+        if 3 * kept >= 2 * keep.size and not any_closed:
+            continue
+        # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
+        for r in range(rows.size):
+            proof[rows[r]] = hard[r]
+        chosen = np.empty(kept, np.int32)
+        place = np.full(keep.size, -1, np.int32)
+        kept = 0
+        for j in range(keep.size):
+            if keep[j]:
+                chosen[kept] = j
+                kept += 1
+        # rows without slack of components that are done have been covered: they leave as rows with slack do
+        free = slack.copy()
+        parent = np.empty(slack.size, np.int32)
+        for c in range(alive.size):
+            parent[row_start[c] : row_start[c + 1]] = c
+            if not alive[c]:
+                free[row_start[c] : row_start[c + 1]] = True
+        (cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row) = _assemble(
+            cols[chosen], weights[chosen], free, chosen
+        )
+        for j in range(column.size):
+            place[column[j]] = j
+        new_owner = np.empty(row.size, np.int32)
+        for r in range(row.size):
+            j = owner[row[r]]
+            new_owner[r] = place[j] if j >= 0 else -1
+        owner, smooth, hard, origin, rows = new_owner, smooth[row], hard[row], origin[column], rows[row]
+        # the parts of a component start from the same cover and the same multipliers
+        first = parent[row[row_start[:-1]]]
+        temperature = temperature[first]
+        new_weight = _cover_weights(weights, cols, row_start, owner)
+        for c in range(new_weight.size):
+            if weight[first[c]] == np.inf:
+                new_weight[c] = np.inf
+        weight = new_weight
+        bound = _component_bounds(cols, weights, slack, col_start, row_start, row_ptr, hard)
+    return (
+        cols, weights, slack, col_start, row_start, row_ptr, row_cols, origin, rows, smooth, hard, owner, weight,
+        bound, temperature,
+    )  # fmt: skip
+
+
+@njit
+def _round(
+    cols: Any, weights: Floats, slack: Any, col_start: Any, row_ptr: Any, row_cols: Any, reduced: Floats,
+    temperature: Floats,
+) -> Any:  # fmt: skip
+    """A cover from the columns of small reduced cost, improved by insertion."""
+    # sorted by counting: classes of 1/64 temperature are fine enough, and ties stay in their order
+    which = np.full(weights.size, _CLASSES, np.int32)
+    start = np.zeros(_CLASSES + 1, np.int64)
+    for c in range(temperature.size):
+        scale = _CLASSES / (4.0 * temperature[c])
+        for j in range(col_start[c], col_start[c + 1]):
+            position = max(reduced[j], 0.0) * scale
+            if position < _CLASSES:
+                which[j] = int(position)
+                start[which[j] + 1] += 1
+    for k in range(_CLASSES):
+        start[k + 1] += start[k]
+    order = np.empty(start[_CLASSES], np.int64)
+    for j in range(weights.size):
+        if which[j] < _CLASSES:
+            order[start[which[j]]] = j
+            start[which[j]] += 1
+    owner = np.full(slack.size, -1, np.int32)
+    _add_greedily(cols, weights, slack, order, owner)
+    loose = np.flatnonzero(owner < 0).astype(np.int32)
+    if loose.size > 0:
+        axial = False
+        for r in range(slack.size):
+            if not slack[r]:
+                axial = True
+                break
+        _improve(cols, penalised_weights(cols, weights, slack) if axial else weights, row_ptr, row_cols, owner, loose)
+    return owner
+
+
+@njit
+def _first_row(cols: Any, j: int) -> int:
+    for s in range(cols.shape[1]):
+        if cols[j, s] >= 0:
+            return int(cols[j, s])
+    return -1
 
 
 @njit
@@ -183,12 +255,8 @@ def _cover_weights(weights: Floats, cols: Any, row_start: Any, owner: Any) -> Fl
     for c in range(result.size):
         for r in range(row_start[c], row_start[c + 1]):
             j = owner[r]
-            if j >= 0:
-                for s in range(cols.shape[1]):
-                    if cols[j, s] >= 0:
-                        if cols[j, s] == r:
-                            result[c] += weights[j]
-                        break
+            if j >= 0 and _first_row(cols, j) == r:
+                result[c] += weights[j]
     return result
 
 
@@ -208,6 +276,7 @@ def _compare(
     owner: Any,
     weight: Floats,
     tolerance: float,
+    granularity: float,
 ) -> Any:
     """Take over better bounds and covers; the columns worth keeping and the components still open."""
     new_weight = _cover_weights(weights, cols, row_start, new_owner)
@@ -226,10 +295,14 @@ def _compare(
         if new_bound[c] >= bound[c]:
             bound[c] = new_bound[c]
             duals[top:end] = new_duals[top:end]
-        gap = weight[c] - new_bound[c]
+        # whole-numbered weights: what is not better by nearly 1 is not better
+        step = 0.999 * granularity
+        gap = weight[c] - new_bound[c] - step
         # the saved bound and multipliers may be better than these; either is a proof
-        if weight[c] - bound[c] <= tolerance * max(1.0, abs(bound[c])):
+        if weight[c] - bound[c] <= max(tolerance * max(1.0, abs(bound[c])), step):
             alive[c] = False
+            if granularity > 0.0:
+                bound[c] = max(bound[c], weight[c])
             continue
         for j in range(col_start[c], col_start[c + 1]):
             keep[j] = reduced[j] <= gap
