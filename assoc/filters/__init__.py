@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from assoc.filters.adaptive import FuzzyAdaptiveEKF, paper_rules, tuned_data
-from assoc.filters.base import Expected, Filter, Update
+from assoc.filters.base import Expected, Filter, History, Update
 from assoc.filters.consistency import bounds, nees
 from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
 from assoc.filters.imm import InteractingMultipleModel, Mixture
@@ -41,6 +41,7 @@ __all__ = [
     "FuzzyRules",
     "FuzzyVariable",
     "Gaussian",
+    "History",
     "InteractingMultipleModel",
     "KalmanFilter",
     "LinearMeasurement",

@@ -7,22 +7,25 @@ one filter serves any number of tracks, hypotheses and threads.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.kernels import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, PLAIN, STATUSES, expect, pairs
+from assoc.filters.kernels import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, PLAIN, STATUSES, expect, follow, pairs
 from assoc.filters.kernels import predict as predict_kernel
 from assoc.filters.kernels import update as update_kernel
 from assoc.filters.measurement import Measurement, Observation, observation
-from assoc.filters.motion import Motion
-from assoc.filters.state import Gaussian, gaussian
+from assoc.filters.motion import LinearMotion, Motion
+from assoc.filters.state import Gaussian, finite, gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _NOTHING2 = np.zeros((0, 0))
 _NOTHING3 = np.zeros((0, 0, 0))
+_FLOAT = np.dtype(np.float64)
+_PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
 
 
 class State(Protocol):
@@ -67,6 +70,21 @@ class Expected(NamedTuple):
     """With the sensor's noise, (B, d, d)."""
 
 
+class History(NamedTuple, Generic[S]):
+    """What `Filter.run` gives: the corrected states of K steps."""
+
+    mean: Array
+    """(K, B, n)."""
+    covariance: Array
+    """(K, B, n, n)."""
+    nis: Array
+    """Normalised innovation squared, (K, B)."""
+    log_likelihood: Array
+    """Of each measurement under its prediction, (K, B)."""
+    state: S
+    """The last one, to go on from."""
+
+
 class Filter(ABC, Generic[S]):
     """A filter: models of motion, and how a state is predicted and corrected.
 
@@ -108,6 +126,54 @@ class Filter(ABC, Generic[S]):
     @abstractmethod
     def expected(self, state: S, sensor: Measurement) -> Expected:
         """Return the expected measurements and their covariances, for gates."""
+
+    def run(self, state: S, measured: Array, sensor: Measurement, dt: float | Sequence[float]) -> History[S]:
+        """Predict and correct through K steps, as a recording or a Monte Carlo study needs it.
+
+        For linear motion and the filters that linearise, all steps are one compiled call.
+
+        Parameters
+        ----------
+        state
+            B targets before the first step.
+        measured : array (K, B, d); (K, d) if there is one target
+        sensor
+            As in `update`.
+        dt : float or sequence of K floats
+            Seconds from the step before to each step.
+
+        Raises
+        ------
+        InvalidInputError
+            As in `update`, or no steps.
+        """
+        z, times = self._steps(state, measured, sensor, dt)
+        done: list[Update[S]] = []
+        for one, step in zip(z, times, strict=True):
+            done.append(self.update(self.predict(state, step), one, sensor))
+            state = done[-1].state
+        return History(
+            np.stack([one.state.mean for one in done]),
+            np.stack([one.state.covariance for one in done]),
+            np.stack([one.nis for one in done]),
+            np.stack([one.log_likelihood for one in done]),
+            state,
+        )
+
+    def _steps(
+        self, state: S, measured: Array, sensor: Measurement, dt: float | Sequence[float]
+    ) -> tuple[Array, list[float]]:
+        """Measurements as (K, B, d), and K time steps."""
+        z = finite(measured, "measured", 2, 3)
+        if z.ndim == 2 and len(state) == 1:
+            z = z[:, None]
+        dim = self.observe(sensor).dim
+        if z.ndim != 3 or z.shape[1:] != (len(state), dim) or len(z) == 0:
+            raise InvalidInputError(f"measured must have shape (K, {len(state)}, {dim}), K > 0, got {z.shape}")
+        times = [float(dt)] * len(z) if isinstance(dt, (int, float)) else [float(step) for step in dt]
+        if len(times) != len(z):
+            raise InvalidInputError(f"dt must be one number or {len(z)}, got {len(times)}")
+        return z, times
 
     def log_likelihood(self, state: S, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood of each of M measurements (M, d) under each of B targets, (B, M)."""
@@ -173,14 +239,14 @@ def measured_array(measured: object, batch: int | None, dim: int, what: str = "m
     return array
 
 
-def complain(status: int) -> NoReturn:
+def complain(status: int, where: str = "") -> NoReturn:
     """Turn what a kernel found into an error."""
     row, status = divmod(status, STATUSES)
     if status == BAD_MEASUREMENT:
-        raise InvalidInputError(f"measured must be finite, row {row} is not")
+        raise InvalidInputError(f"measured must be finite, row {row} is not{where}")
     if status == BAD_COVARIANCE:
-        raise InvalidInputError(f"state: covariance of target {row} is not positive definite")
-    raise InvalidInputError(f"state: mean of target {row} gives no finite measurement")
+        raise InvalidInputError(f"state: covariance of target {row} is not positive definite{where}")
+    raise InvalidInputError(f"state: mean of target {row} gives no finite measurement{where}")
 
 
 class GaussianFilter(Filter[Gaussian]):
@@ -188,19 +254,55 @@ class GaussianFilter(Filter[Gaussian]):
 
     kind = PLAIN
 
+    def __init__(self, motion: Motion) -> None:
+        super().__init__(motion)
+        # both matrices with one look-up, unless a child class has its own idea of them
+        kind = type(motion)
+        self._linear: LinearMotion | None = None
+        if isinstance(motion, LinearMotion) and (kind.jacobian, kind.noise) == _PLAIN_MODELS:
+            self._linear = motion
+
     def start(self, state: Gaussian) -> Gaussian:
         """Return the Gaussian itself."""
         return check_dimension(state, self.motion.dim)
 
     def predict(self, state: Gaussian, dt: float) -> Gaussian:
         """Return the state dt seconds later; see `Filter.predict`."""
-        check_dimension(state, self.motion.dim)
-        motion = self.motion
-        moved = _NOTHING2 if motion.linear else motion.propagate(state.mean, dt)
-        F, Q = motion.jacobian(state.mean, dt), motion.noise(state.mean, dt)
-        mean, P = np.empty(state.mean.shape), np.empty(state.covariance.shape)
-        predict_kernel(state.mean, state.covariance, F, Q, moved, mean, P)
+        before, motion, linear = state.mean, self.motion, self._linear
+        if before.shape[1] != motion.dim:
+            check_dimension(state, motion.dim)
+        moved = _NOTHING2
+        if linear is not None:
+            F, Q = linear.matrices(dt)
+        else:
+            if not motion.linear:
+                moved = motion.propagate(before, dt)
+            F, Q = motion.jacobian(before, dt), motion.noise(before, dt)
+        mean, P = np.empty(before.shape), np.empty(state.covariance.shape)
+        predict_kernel(before, state.covariance, F, Q, moved, mean, P)
         return gaussian(mean, P)
+
+    def run(
+        self, state: Gaussian, measured: Array, sensor: Measurement, dt: float | Sequence[float]
+    ) -> History[Gaussian]:
+        """Predict and correct through K steps; see `Filter.run`."""
+        o, linear = self.observe(sensor), self._linear
+        if linear is None or o.code < 0:
+            return super().run(state, measured, sensor, dt)
+        check_dimension(state, self.motion.dim)
+        z, times = self._steps(state, measured, sensor, dt)
+        models = [linear.matrices(step) for step in (times if len({*times}) > 1 else times[:1])]
+        F, Q = np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
+        K, (B, n) = len(z), state.mean.shape
+        means, Ps, nis, ll = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((K, B)), np.empty((K, B))
+        status = follow(
+            state.mean, state.covariance, F, Q, z, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind,
+            means, Ps, nis, ll,
+        )  # fmt: skip
+        if status != GOOD:
+            step, target = divmod(status // STATUSES, B)
+            complain(status % STATUSES + STATUSES * target, f" at step {step}")
+        return History(means, Ps, nis, ll, gaussian(means[-1], Ps[-1]))
 
     def move(self, state: Gaussian, dt: float) -> tuple[Gaussian, Array]:
         """`predict`, and the covariance P F' of the states before and after it."""
@@ -209,7 +311,8 @@ class GaussianFilter(Filter[Gaussian]):
 
     def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
         """Correct each target with a measurement of its own; see `Filter.update`."""
-        o = self.observe(sensor)
+        seen = self._seen
+        o = seen[1] if seen[0] is sensor else self.observe(sensor)
         return self.correct(state, measured, o, o.covariance)
 
     def correct(self, state: Gaussian, measured: Array, o: Observation, R: Array) -> Update[Gaussian]:
@@ -217,7 +320,9 @@ class GaussianFilter(Filter[Gaussian]):
         mean = state.mean
         if mean.shape[1] != self.motion.dim:
             check_dimension(state, self.motion.dim)
-        z = measured_array(measured, len(mean), o.dim)
+        z = measured
+        if type(z) is not np.ndarray or z.dtype != _FLOAT or not z.flags.c_contiguous or z.shape != (len(mean), o.dim):
+            z = measured_array(measured, len(mean), o.dim)
         given, slopes = _NOTHING2, _NOTHING3
         if o.code < 0:
             given = np.ascontiguousarray(o.model.residual(z, o.model.measure(mean)))

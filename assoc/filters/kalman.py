@@ -36,6 +36,7 @@ class KalmanFilter(GaussianFilter):
         """Put a measurement model in the form that the kernels take."""
         o = super().observe(sensor)
         if o.code not in (LINEAR, _POSITION):
+            self._seen = (None, None)
             raise InvalidInputError(
                 f"sensor must be linear for a Kalman filter, got {type(sensor).__name__}; use ExtendedKalmanFilter"
             )

@@ -285,6 +285,36 @@ def update(
 
 
 @njit
+def follow(
+    mean: Array, P: Array, F: Array, Q: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array,
+    R: Array, kind: int, means: Array, Ps: Array, nis: Array, ll: Array,
+) -> int:  # fmt: skip
+    """Predict and correct a batch through K steps of a linear motion, into the last four arrays.
+
+    F and Q are (K or 1, n, n), z (K, B, d), means and Ps (K, B, ...), nis and ll (K, B). Returns as `update`
+    does, with the target counted through the steps.
+    """
+    K, B, d = z.shape
+    n = mean.shape[1]
+    given, given_H = np.empty((0, 0)), np.empty((0, 0, 0))
+    predicted, predicted_P = np.empty((B, n)), np.empty((B, n, n))
+    v, S, nothing = np.empty((B, d)), np.empty((B, d, d)), np.empty((0, 0))
+    for k in range(K):
+        j = k if len(F) > 1 else 0
+        if k == 0:
+            predict(mean, P, F[j : j + 1], Q[j : j + 1], nothing, predicted, predicted_P)
+        else:
+            predict(means[k - 1], Ps[k - 1], F[j : j + 1], Q[j : j + 1], nothing, predicted, predicted_P)
+        status = update(
+            predicted, predicted_P, z[k], code, place, columns, matrix, R, given, given_H, kind,
+            means[k], Ps[k], v, S, nis[k], ll[k],
+        )  # fmt: skip
+        if status != GOOD:
+            return status + STATUSES * B * k
+    return GOOD
+
+
+@njit
 def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
     """Log-likelihood and squared Mahalanobis distance, each (B, M), of each measurement under each target.
 

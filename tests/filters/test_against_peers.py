@@ -73,6 +73,29 @@ def test_filterpy(kind):
         same(state, theirs.x.ravel(), theirs.P)
 
 
+def test_filterpy_unscented():
+    motion = ConstantVelocity(2.0)
+    F, Q = (one[0] for one in motion.matrices(1.0))
+    options = {"alpha": 0.8, "beta": 2.0, "kappa": 1.0}
+    points = filterpy.MerweScaledSigmaPoints(6, **options)
+    theirs = filterpy.UnscentedKalmanFilter(
+        6, 3, 1.0, hx=lambda x: RADAR.measure(x.reshape(1, -1)[:, :3])[0], fx=lambda x, dt: F @ x, points=points
+    )
+    theirs.Q, theirs.R = Q, RADAR.covariance
+    theirs.x, theirs.P = START.mean[0].copy(), START.covariance[0].copy()
+    ours, state = UnscentedKalmanFilter(motion, **options), START
+    for z in measurements(RADAR):
+        done = ours.update(ours.predict(state, 1.0), z, RADAR)
+        state = done.state
+        theirs.predict()
+        # filterpy corrects with the points that it moved, without the process noise; drawn anew it is what ours is
+        theirs.sigmas_f = points.sigma_points(theirs.x, theirs.P)
+        theirs.update(z)
+        same(state, theirs.x, theirs.P)
+        assert done.log_likelihood[0] == pytest.approx(theirs.log_likelihood, abs=1e-6)
+        np.testing.assert_allclose(done.covariance[0], theirs.S, rtol=1e-9, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", ["kalman", "ekf", "ukf"])
 def test_stone_soup(kind):
     from stonesoup.models.measurement.linear import LinearGaussian

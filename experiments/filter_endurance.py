@@ -1,0 +1,117 @@
+"""Covariances of every filter through 10^5 predictions and corrections: symmetric, positive definite, bounded?
+
+    python -m experiments.filter_endurance [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+A target that stands still is measured by a radar (by a position sensor for the Kalman filter), corrections come in
+bursts of three for a prediction, which is hardest on a covariance. Watched every 100 steps: the least
+eigenvalue of the correlation matrix (above 0: positive definite, whatever the units), and the largest asymmetry, in
+units of the standard deviations.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.filters import (
+    ConstantVelocity,
+    CoordinatedTurn,
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    FuzzyAdaptiveEKF,
+    Gaussian,
+    InteractingMultipleModel,
+    KalmanFilter,
+    ModifiedEKF,
+    Padded,
+    UnscentedKalmanFilter,
+    tuned_data,
+)
+from assoc.filters.base import Filter
+from experiments.claims import Claim
+from experiments.filter_benchmark import PLACE, RADAR
+from experiments.filters.command import main
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+EVERY = 100
+BURST = 3
+PLACE_OF_TARGET = (30e3, 20e3, 5e3)
+
+
+def filters(rng: np.random.Generator) -> dict[str, Filter[Any]]:
+    """Return one filter of each kind."""
+    motion = ConstantVelocity(2.0)
+    data = tuned_data()
+    models = [ExtendedKalmanFilter(Padded(motion, 0.01)), ExtendedKalmanFilter(CoordinatedTurn(2.0, 0.001))]
+    return {
+        "Kalman": KalmanFilter(motion),
+        "EKF": ExtendedKalmanFilter(motion),
+        "modified EKF": ModifiedEKF(motion),
+        "UKF": UnscentedKalmanFilter(motion),
+        "EnKF, N 20": EnsembleKalmanFilter(motion, 20, rng),
+        "fuzzy-adaptive EKF": FuzzyAdaptiveEKF.from_data(
+            CoordinatedTurn(data["acceleration_noise"], data["rate_noise"]), data
+        ),
+        "IMM": InteractingMultipleModel(models, np.array([[0.98, 0.02], [0.1, 0.9]])),
+    }
+
+
+def endure(filter_: Filter[Any], steps: int, rng: np.random.Generator) -> Array:
+    """Least eigenvalue, largest asymmetry and position's deviation (m) every EVERY steps, (steps / EVERY, 3)."""
+    n = filter_.motion.dim
+    sensor: Any = PLACE if isinstance(filter_, KalmanFilter) else RADAR
+    mean = np.zeros(n)
+    mean[:3] = PLACE_OF_TARGET
+    state = filter_.start(Gaussian(mean, np.diag([1e8, 1e8, 1e8, 1e6, 1e6, 1e6, 1.0][:n])))
+    exact = sensor.measure(mean[None, :3])
+    watched = []
+    for k in range(steps):
+        if k % BURST == 0:
+            state = filter_.predict(state, 0.1)
+        state = filter_.update(state, exact + rng.standard_normal((1, 3)) * sensor.noise, sensor).state
+        if k % EVERY == EVERY - 1:
+            P = state.covariance[0]
+            scale = np.sqrt(np.diag(P))
+            unit = P / np.outer(scale, scale)
+            watched.append((np.linalg.eigvalsh(unit).min(), np.abs(unit - unit.T).max(), np.sqrt(np.trace(P[:3, :3]))))
+    return np.array(watched)
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Watch every filter."""
+    steps = 2_000 if quick else 100_000
+    claims, shown = [], {}
+    for name, filter_ in filters(rng).items():
+        shown[name] = endure(filter_, steps, rng)
+        least, asymmetry, deviation = shown[name].T
+        claims += [
+            Claim(f"{name}: least eigenvalue of the correlation in {steps} steps", "", None, least.min(), None,
+                  (1e-12, None)),
+            Claim(f"{name}: largest asymmetry", "", None, asymmetry.max(), None, (None, 1e-12)),
+            Claim(f"{name}: largest deviation of the position after {EVERY} steps", "m", None, deviation.max(), None,
+                  (None, 300.0)),
+        ]  # fmt: skip
+    return claims, shown
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw the least eigenvalues over the steps."""
+    axes = figure.subplots()
+    for name, watched in shown.items():
+        axes.semilogy(EVERY * np.arange(1, len(watched) + 1), watched[:, 0], label=name, linewidth=0.9)
+    axes.set(xlabel="corrections", ylabel="least eigenvalue of the correlation")
+    axes.legend(ncols=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+
+
+TITLE = "Covariances through many steps"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    return main("filter_endurance", TITLE, experiment, draw, (8, 4.5), arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

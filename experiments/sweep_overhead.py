@@ -1,0 +1,137 @@
+"""What a parameter study costs beside its solves, on every backend.
+
+    python -m experiments.sweep_overhead [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+The wall time of a study from the moment when a tenth of its runs is done until its end, less the seconds that those
+runs took in the solver, shared among the workers, is the overhead of these runs: all of it, from design to disk.
+The start of processes comes before and is given apart. Runs that take longer (those of the paper's ant colony)
+travel in smaller batches than short ones (greedy): batches hold 0.2 s of work, 0.5 s on a cluster.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assoc.simulation import simulate
+from assoc.sweeps import Setting, Study
+from assoc.sweeps.sources import Source
+from assoc.sweeps.study import Counts
+from experiments.claims import Claim
+from experiments.filters.command import main
+
+WORKERS = 2
+GOALS = {"one process": 1.0, "joblib": 1.0, "dask": 5.0}
+KINDS = {"greedy": Setting("greedy", {}), "ant colony": Setting("aco", {"mode": "paper"})}
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Measure the overhead of each backend."""
+    scene = Source(simulate("three-radar", int(rng.integers(2**31)), scans=20 if quick else 100), "three-radar")
+    repeats = {"greedy": 12 if quick else 60, "ant colony": 3 if quick else 12}
+    claims, table = [], {}
+    for kind, setting in KINDS.items():
+        study = Study([scene], [setting], repeats[kind])
+        for backend, goal in GOALS.items():
+            overhead, start, solving = _overhead(study, backend)
+            table[kind, backend] = 1e3 * overhead, 1e3 * solving
+            words = f"{kind}, {backend}"
+            claims += [
+                Claim(f"{words}: overhead a run", "ms", goal, 1e3 * overhead, None, (None, goal)),
+                Claim(f"{words}: in the solver, a run", "ms", None, 1e3 * solving),
+                Claim(f"{words}: until a tenth of {study.size} runs is done", "s", None, start),
+            ]
+    return claims, table
+
+
+def _overhead(study: Study, backend: str) -> tuple[float, float, float]:
+    """Seconds of overhead a run, until a tenth of the runs was done, and in the solver a run."""
+    workers = 1 if backend == "one process" else WORKERS
+    marks: list[tuple[float, int, float]] = []
+
+    def progress(counts: Counts) -> None:
+        if 10 * counts.new >= counts.total and not marks:
+            marks.append((time.perf_counter(), counts.new, counts.solving))
+
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="assoc-")))
+        how: dict[str, Any] = {"jobs": workers}
+        if backend == "dask":
+            how = {"scheduler": stack.enter_context(cluster(folder))}
+        begin = time.perf_counter()
+        counts = study.run(folder / "study", progress=progress, **how)
+        end = time.perf_counter()
+    middle, runs, solving = marks[0]
+    runs, solving = counts.new - runs, counts.solving - solving
+    return (end - middle - solving / workers) / runs, middle - begin, solving / runs
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[str]:
+    """A dask scheduler with workers on this machine; its address."""
+    dask = [sys.executable, "-m", "dask"]
+    quiet: dict[str, Any] = {"cwd": folder, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    local = ["--host", "127.0.0.1", "--no-dashboard"]
+    processes = [subprocess.Popen([*dask, "scheduler", *local, "--port", "0", "--scheduler-file", "s.json"], **quiet)]
+    try:
+        deadline = time.monotonic() + 60
+        address = ""
+        while not address:
+            if processes[0].poll() is not None or time.monotonic() > deadline:
+                raise SystemExit("no dask scheduler: pip install 'assoc[dask]'")
+            time.sleep(0.1)
+            try:
+                address = json.loads((folder / "s.json").read_text())["address"]
+            except (OSError, ValueError):
+                continue
+        words = [*dask, "worker", address, *local, "--nthreads", "1", "--no-nanny"]
+        processes += [subprocess.Popen(words, **quiet) for _ in range(WORKERS)]
+        _wait_for_workers(address)
+        yield address
+    finally:
+        # nothing of theirs is needed any more: no orderly farewell, which can take long
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+
+
+def _wait_for_workers(address: str) -> None:
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(WORKERS, timeout=60)
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw the overhead beside the time in the solver."""
+    axes = figure.subplots()
+    places = np.arange(len(shown))
+    overhead, solving = np.array(list(shown.values())).T
+    for shift, values, label in ((-0.2, np.maximum(overhead, 0.0), "overhead"), (0.2, solving, "in the solver")):
+        bars = axes.bar(places + shift, values, 0.38, label=label)
+        axes.bar_label(bars, [f"{value:.2g}" for value in values], fontsize=8)
+    axes.set_xticks(places, [f"{kind}\n{backend}" for kind, backend in shown])
+    axes.set(ylabel="ms a run")
+    axes.margins(y=0.15)
+    axes.legend()
+
+
+TITLE = "Overhead of a study (goal in the column of the paper)"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the measurement; returns its exit code."""
+    return main("sweep_overhead", TITLE, experiment, draw, (8, 4), arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
