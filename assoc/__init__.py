@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
-    from assoc import solvers, sweeps
+    from assoc import plotting, solvers, sweeps
     from assoc.association import Association, associate
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
@@ -37,6 +37,7 @@ __all__ = [
     "build_problem",
     "kbest",
     "marginals",
+    "plotting",
     "solvers",
     "sweeps",
 ]
@@ -58,7 +59,7 @@ def __getattr__(name: str) -> Any:
     """Load a public name from its home on first use (PEP 562)."""
     if name in _HOME:
         value = getattr(importlib.import_module(_HOME[name]), name)
-    elif name in ("solvers", "sweeps"):
+    elif name in ("plotting", "solvers", "sweeps"):
         value = importlib.import_module(f"assoc.{name}")
     else:
         raise AttributeError(f"module 'assoc' has no attribute {name!r}")

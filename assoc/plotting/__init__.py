@@ -1,1 +1,55 @@
-"""Pictures: functions that draw into matplotlib axes, and the HTML reports."""
+"""Pictures: functions that draw into matplotlib axes (extra ``[plot]``), and the HTML reports (extra ``[report]``).
+
+Each function takes ``ax=None`` and returns the axes; nothing is shown or saved. Loaded on first use.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from assoc.plotting.convergence import plot_convergence
+    from assoc.plotting.costs import plot_costs, plot_gates
+    from assoc.plotting.metric import plot_metric
+    from assoc.plotting.overview import plot_overview
+    from assoc.plotting.pheromone import plot_pheromone
+    from assoc.plotting.scene import plot_scene
+    from assoc.plotting.solution import plot_solution
+    from assoc.plotting.study import plot_heat_map
+    from assoc.plotting.tracks import plot_tracks
+
+_HOME = {
+    "plot_convergence": "convergence",
+    "plot_costs": "costs",
+    "plot_gates": "costs",
+    "plot_heat_map": "study",
+    "plot_metric": "metric",
+    "plot_overview": "overview",
+    "plot_pheromone": "pheromone",
+    "plot_scene": "scene",
+    "plot_solution": "solution",
+    "plot_tracks": "tracks",
+}
+
+__all__ = [
+    "plot_convergence",
+    "plot_costs",
+    "plot_gates",
+    "plot_heat_map",
+    "plot_metric",
+    "plot_overview",
+    "plot_pheromone",
+    "plot_scene",
+    "plot_solution",
+    "plot_tracks",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'assoc.plotting' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"assoc.plotting.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

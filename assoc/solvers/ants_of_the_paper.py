@@ -41,11 +41,7 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     InfeasibleError
         No ant completed a tour (possible only without dummies).
     """
-    free = np.flatnonzero(packing.slack)
-    costs = np.concatenate([packing.weights, np.zeros(free.size)])
-    singleton_rows = np.full((free.size, packing.cols.shape[1]), -1, dtype=np.int32)
-    singleton_rows[:, 0] = free
-    nodes = np.concatenate([packing.cols, singleton_rows])
+    nodes, costs = nodes_of(packing)
     if costs.size == 0:
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
     positive = transformed(costs, parameters.visibility, parameters.scale)
@@ -71,6 +67,8 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
                 best, best_weight = tour[tour < packing.num_columns].copy(), weight
                 run.record(cycle, weight, -np.inf)
         _lay(pheromone, positive, tours, lengths, parameters.rho)
+        if run.watch is not None:
+            run.watch(cycle, pheromone.copy())
         if (owners == owners[0]).all() or run.should_stop():
             break
     else:
@@ -86,6 +84,14 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
         # said only now: a run that is stopped does not raise its bound
         run.stopped_by = run.stopped_by or "iterations"
     return Outcome(best, cycle, bound, duals)
+
+
+def nodes_of(packing: Packing) -> tuple[NDArray[np.int32], Floats]:
+    """Rows of the nodes, first the packing's columns, then a false alarm for each row with slack; their costs."""
+    free = np.flatnonzero(packing.slack)
+    alone = np.full((free.size, packing.cols.shape[1]), -1, dtype=np.int32)
+    alone[:, 0] = free
+    return np.concatenate([packing.cols, alone]), np.concatenate([packing.weights, np.zeros(free.size)])
 
 
 def transformed(costs: Floats, kind: str, scale: float) -> Floats:

@@ -33,12 +33,15 @@ class Run:
         Seconds from ``started``.
     callback : callable or None
         Called with each TracePoint; a true answer stops the solver.
+    watch : callable or None
+        Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
     """
 
     rng: np.random.Generator
     offset: float = 0.0
     time_limit: float | None = None
     callback: Callback | None = None
+    watch: Callable[[int, NDArray[np.float64]], object] | None = None
     started: float = field(default_factory=time.perf_counter)
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""

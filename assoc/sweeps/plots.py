@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._extras import load_extra
 from assoc._files import write_atomically
 from assoc.errors import InvalidInputError
 from assoc.sweeps.frame import load, load_traces
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PANELS = (("gap", "mean gap"), ("optimal", "certified optimal, %"), ("iterations", "mean iterations"), ("time", "ms"))
-_FACTORS = {"optimal": 100.0, "time": 1e3}
+FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 _MOST_CELLS = 12
 _MOST_COLUMNS = 6
 _MOST_CURVES = 8
@@ -41,10 +42,11 @@ def draw(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> l
 
     Raises
     ------
+    MissingExtraError
+        matplotlib is not installed.
     InvalidInputError
-        matplotlib is not installed, or a file cannot be written.
+        A file cannot be written, or the study has no runs.
     """
-    figure = _figure()
     frame = load(folder) if frame is None else frame
     if frame.empty:
         raise InvalidInputError(f"{folder}: the study has no runs yet, there is nothing to draw")
@@ -54,27 +56,22 @@ def draw(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> l
         if not varied(part):
             continue
         name = "heatmap.png" if len(parts) == 1 else f"heatmap-{solver}.png"
-        drawn.append(_save(Path(folder) / name, heat_maps(part, figure())))
-    drawn.append(_save(Path(folder) / "convergence.png", convergence(frame, load_traces(folder), figure())))
+        drawn.append(_save(Path(folder) / name, heat_maps(part, new_figure())))
+    drawn.append(_save(Path(folder) / "convergence.png", convergence(frame, load_traces(folder), new_figure())))
     return drawn
 
 
-def _figure() -> Any:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise InvalidInputError(
-            "--plot: needs matplotlib, which is not installed: python -m pip install 'assoc[plot]'"
-        ) from None
+def new_figure() -> Any:
+    """Return an empty figure that belongs to nobody's screen: no pyplot in a program.
 
-    def make() -> Any:
-        # no pyplot: figures of a program belong to nobody's screen
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
-        return figure
-
-    return make
+    Raises
+    ------
+    MissingExtraError
+        matplotlib is not installed.
+    """
+    figure = load_extra("matplotlib.figure", "plot").Figure(layout="constrained")
+    load_extra("matplotlib.backends.backend_agg", "plot").FigureCanvasAgg(figure)
+    return figure
 
 
 def _save(path: Path, figure: Any) -> Path:
@@ -109,7 +106,7 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     groups: list[tuple[str, pd.DataFrame]] = [("", frame)]
     if others and frame.groupby(others).ngroups <= _MOST_COLUMNS:
         groups = [
-            (", ".join(f"{n} {_short(v)}" for n, v in zip(others, values, strict=True)), part)
+            (", ".join(f"{n} {short(v)}" for n, v in zip(others, values, strict=True)), part)
             for values, part in frame.groupby(others)
         ]
     elif others:
@@ -119,7 +116,7 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     for row, (measure, title) in zip(axes, panels, strict=True):
         tables = [_table(part, measure, across, up) for _, part in groups]
         known = np.concatenate([values[~np.isnan(values)] for _, _, values in tables])
-        limits = _limits(known)
+        limits = limits_of(known)
         for ax, (label, _), (xs, ys, values) in zip(row, groups, tables, strict=True):
             image = heat_map(xs, ys, values, limits, ax=ax)
             ax.set_xlabel(across)
@@ -129,29 +126,38 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     return figure
 
 
-def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
+def limits_of(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Ends of the colour scale for values of which at least one is known."""
     low, high = float(values.min()), float(values.max())
     # equal values get one colour in all maps
     return (low, high) if low < high else (low - 0.5, high + 0.5)
 
 
 def heat_map(
-    xs: NDArray[Any], ys: NDArray[Any], values: NDArray[np.float64], limits: tuple[float, float], *, ax: Any
+    xs: NDArray[Any],
+    ys: NDArray[Any],
+    values: NDArray[np.float64],
+    limits: tuple[float, float],
+    *,
+    ax: Any,
+    texts: NDArray[Any] | None = None,
 ) -> Any:
-    """Draw values (rows: ``ys``) with their numbers into axes; returns the image."""
-    image = ax.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=limits[0], vmax=limits[1])
-    ax.set_xticks(range(len(xs)), [_short(x) for x in xs])
-    ax.set_yticks(range(len(ys)), [_short(y) for y in ys])
+    """Draw values (rows: ``ys``) with their numbers, or with given texts, into axes; returns the image."""
+    # cividis grows lighter evenly, also to colour-blind eyes and on grey paper
+    image = ax.imshow(values, origin="lower", aspect="auto", cmap="cividis", vmin=limits[0], vmax=limits[1])
+    ax.set_xticks(range(len(xs)), [short(x) for x in xs])
+    ax.set_yticks(range(len(ys)), [short(y) for y in ys])
     middle = sum(limits) / 2
     for (i, j), value in np.ndenumerate(values):
         if not np.isnan(value):
             color = "black" if value > middle else "white"
-            ax.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8, color=color)
+            text = f"{value:.3g}" if texts is None else texts[i, j]
+            ax.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
     return image
 
 
 def _table(frame: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Any, Any, NDArray[np.float64]]:
-    values = frame.assign(value=_FACTORS.get(measure, 1.0) * measured(frame, measure))
+    values = frame.assign(value=FACTORS.get(measure, 1.0) * measured(frame, measure))
     table = values.pivot_table(index=up, columns=across, values="value", aggfunc="mean", dropna=False)
     return table.columns.to_numpy(), table.index.to_numpy(), table.to_numpy(dtype=float)
 
@@ -161,7 +167,7 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[tuple[str, 
     figure.set_size_inches(0.6 + 3.2 * len(names), 0.6 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), len(names), squeeze=False, sharex="col", sharey="row")
     for row, (measure, title) in zip(axes, panels, strict=True):
-        factor = _FACTORS.get(measure, 1.0)
+        factor = FACTORS.get(measure, 1.0)
         middle = factor * summary[measure].to_numpy(dtype=float)
         low, high = (factor * summary[f"{measure}_{end}"].to_numpy(dtype=float) for end in ("low", "high"))
         spread = np.maximum(0.0, np.stack([middle - low, high - middle]))
@@ -207,7 +213,7 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
         # drawn from the last to the first, so that the best lie on top
         for place, row in reversed([*enumerate(summary.to_dict("records"))]):
             words = [str(row["solver"])] if several or not names else []
-            words += [f"{n} {_short(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
+            words += [f"{n} {short(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if place < _MOST_CURVES:
                 style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": ", ".join(words)}
@@ -244,5 +250,6 @@ def curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
     ax.plot(grid, total / starts.size, drawstyle="steps-post", **style)
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """Return a parameter's value with four digits."""
     return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)

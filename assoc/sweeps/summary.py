@@ -50,7 +50,7 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
         row["infeasible"] = int(runs["cost"].isna().sum())
         for measure in MEASURES:
             table = by_problem(runs, measured(runs, measure))
-            weights = by_problem(runs, _numbers(runs["true_tuples"])) if measure == "correct" else None
+            weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
             row[measure] = weighted_mean(table, weights)
             row[f"{measure}_low"], row[f"{measure}_high"] = mean_interval(table, weights)
         rows.append(row)
@@ -82,9 +82,9 @@ def measured(runs: pd.DataFrame, measure: str) -> Floats:
     ``correct`` is the share of the true tuples of one run; means of it are weighted by their number.
     """
     if measure == "correct":
-        true = _numbers(runs["true_tuples"])
-        return np.divide(_numbers(runs["correct_tuples"]), true, out=np.full(len(runs), np.nan), where=true > 0)
-    values = _numbers(runs[measure])
+        true = numbers(runs["true_tuples"])
+        return np.divide(numbers(runs["correct_tuples"]), true, out=np.full(len(runs), np.nan), where=true > 0)
+    values = numbers(runs[measure])
     if measure == "optimal":
         return np.where(runs["cost"].isna(), np.nan, values)
     if measure == "gap":
@@ -93,7 +93,8 @@ def measured(runs: pd.DataFrame, measure: str) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _numbers(column: pd.Series[Any]) -> Floats:
+def numbers(column: pd.Series[Any]) -> Floats:
+    """Return a column as floats, NaN where it has no value."""
     return column.to_numpy(dtype=float, na_value=np.nan)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from assoc.association import ScanAssociation
 from assoc.costs import tuple_costs
-from assoc.plotting.places import distances_to_border, measures_height, places
+from assoc.plotting.places import measures_height
+from assoc.plotting.solution import measured_places
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sensors import BearingSensor
@@ -127,21 +128,11 @@ def scan_view(source: Scene | AssignmentProblem, number_of_source: int, one: Sca
 def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, Any]:
     """Return what is drawn of a scan: truth, measurements, targets with residuals and covariances."""
     scan = scene.scan(one.scan)
-    labels = one.labels()
     positions = np.zeros((0, 3)) if one.positions is None else one.positions
     spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
-    middle = float(scene.region[2].mean())
     measured, residuals = [], []
-    for s, (sensor, z, label) in enumerate(zip(scene.sensors, scan.measurements, labels, strict=True)):
-        of_target = label >= 0
-        height, distance = np.full(len(z), middle), np.zeros(len(z))
-        if isinstance(sensor, BearingSensor):
-            distance = distances_to_border(sensor, z[:, 0], scene.region)
-        if of_target.any():
-            owner = positions[label[of_target]]
-            height[of_target] = owner[:, 2]
-            distance[of_target] = np.hypot(*(owner[:, :2] - sensor.position[:2]).T)
-        at = places(sensor, z, height, distance)
+    for s, (at, label) in enumerate(measured_places(scene, one)):
+        sensor, z = scene.sensors[s], scan.measurements[s]
         entry: dict[str, Any] = {"at": plain_numbers(at, decimals), "target": label.tolist()}
         if scan.sources is not None:
             entry["source"] = scan.sources[s].tolist()

@@ -1,0 +1,134 @@
+"""Costs of candidate tuples, and how the chosen ones fill their gates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.association import Association, ScanAssociation
+from assoc.errors import InvalidInputError
+from assoc.plotting.axes import axes_or_new, legend
+from assoc.plotting.colours import BLACK, BLUE, GREY, VERMILION
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scene
+from assoc.solution import Solution
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_SPREAD = 0.7
+
+
+def plot_costs(problem: AssignmentProblem, solution: Solution | None = None, *, ax: Any = None) -> Any:
+    """Draw the cost of each candidate tuple by its number of measurements, and which were chosen.
+
+    Parameters
+    ----------
+    problem : AssignmentProblem
+    solution : Solution, optional
+        Of this problem.
+    ax : matplotlib Axes, optional
+        Where to draw; new ones without it.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    InvalidInputError
+        The solution is one of another problem.
+    """
+    if solution is not None and not belongs(solution, problem):
+        raise InvalidInputError("solution: is not one of this problem")
+    ax = axes_or_new(ax)
+    number = np.count_nonzero(problem.tuples, axis=1)
+    across = number.astype(np.float64)
+    for count in np.unique(number):
+        rows = np.flatnonzero(number == count)
+        # side by side in the order of their costs: a column of dots shows how many there are
+        order = np.argsort(problem.costs[rows], kind="stable")
+        across[rows[order]] += _SPREAD * ((np.arange(rows.size) + 0.5) / rows.size - 0.5)
+    ax.plot(across, problem.costs, ".", color=GREY, alpha=0.5, markersize=4, label="candidate tuples")
+    if solution is not None:
+        rows = solution.indices
+        style = {"markerfacecolor": "none", "markeredgewidth": 1.5}
+        ax.plot(across[rows], problem.costs[rows], "o", color=VERMILION, markersize=7, label="chosen", **style)
+    ax.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--", label="false alarm")
+    ax.set_xticks(np.unique(number) if number.size else [])
+    ax.set_xlabel("measurements in the tuple (number)")
+    ax.set_ylabel("cost (nats)")
+    ax.grid(axis="y", alpha=0.25, linewidth=0.6)
+    legend(ax)
+    return ax
+
+
+def belongs(solution: Solution, problem: AssignmentProblem) -> bool:
+    """Whether a solution's indices name its tuples in this problem; they may not after gating otherwise."""
+    rows = solution.indices
+    inside = not rows.size or int(rows.max()) < problem.num_tuples
+    return bool(inside and np.array_equal(problem.tuples[rows], solution.tuples))
+
+
+def plot_gates(
+    scene: Scene,
+    association: Association | Sequence[ScanAssociation],
+    *,
+    gate_probability: float = 0.999,
+    bins: int = 20,
+    ax: Any = None,
+) -> Any:
+    """Draw how far the chosen tuples fill their gates, as the probability that a true tuple is no farther apart.
+
+    Where noise and model are right and the tuples true, all shares are equally likely and the bars level with the line;
+    a heap at the right says that the noise is stated too small or tuples are wrong, one at the left that it is
+    stated too large.
+
+    Parameters
+    ----------
+    scene : Scene
+    association : Association or sequence of ScanAssociation
+        Of this scene.
+    gate_probability : float
+        Where the gate ends.
+    bins : int
+    ax : matplotlib Axes, optional
+        Where to draw; new ones without it.
+
+    Returns
+    -------
+    Axes
+    """
+    from scipy.special import gammainc
+
+    ax = axes_or_new(ax)
+    scans = association.scans if isinstance(association, Association) else association
+    parts = [(np.zeros(0), np.zeros(0)), *(_squares(scene, one) for one in scans)]
+    squares, freedom = (np.concatenate(column) for column in zip(*parts, strict=True))
+    share = gammainc(freedom / 2.0, squares / 2.0)
+    ax.hist(share, bins=bins, range=(0.0, 1.0), color=BLUE, edgecolor="white", label=f"{share.size} tuples")
+    ax.axhline(share.size / bins, color=BLACK, linewidth=1.0, linestyle="--", label="expected of true tuples")
+    ax.axvline(gate_probability, color=VERMILION, linewidth=1.4, linestyle=":", label=f"gate, {gate_probability:g}")
+    ax.set_xlim(0.0, 1.02)
+    ax.set_xlabel("share of the gate (probability)")
+    ax.set_ylabel("tuples (number)")
+    legend(ax)
+    return ax
+
+
+def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
+    """Normalised squared residuals of the targets, and their degrees of freedom (0 left out)."""
+    scan = scene.scan(one.scan)
+    total, freedom = np.zeros(len(one.targets)), np.zeros(len(one.targets))
+    heights = np.zeros(len(one.targets), dtype=np.bool_)
+    for s, sensor in enumerate(scene.sensors):
+        rows = np.flatnonzero(one.targets[:, s])
+        if not rows.size or one.positions is None:
+            continue
+        nu = sensor.residual(scan.measurements[s][one.targets[rows, s] - 1], sensor.measure(one.positions[rows]))
+        total[rows] += np.einsum("ni,ij,nj->n", nu, np.linalg.inv(sensor.covariance), nu)
+        freedom[rows] += sensor.dim
+        heights[rows] |= sensor.dim == 3
+    freedom -= np.where(heights, 3, 2)
+    return total[freedom > 0], freedom[freedom > 0]

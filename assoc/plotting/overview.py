@@ -1,0 +1,52 @@
+"""An association at a glance: the scene, a scan, its candidates, and how the solver closed the gap."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from assoc._extras import load_extra
+from assoc.association import Association
+from assoc.costs import build_problem
+from assoc.errors import InvalidInputError
+from assoc.plotting.convergence import plot_convergence
+from assoc.plotting.costs import belongs, plot_costs
+from assoc.plotting.scene import plot_scene
+from assoc.plotting.solution import plot_solution
+from assoc.scene import Scene
+
+
+def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes: Any = None) -> Any:
+    """Draw the scene, the association of one scan, the costs it chose from, and its convergence.
+
+    Parameters
+    ----------
+    scene : Scene
+    association : Association
+        Of this scene.
+    scan : int
+        Number of the scan that is shown.
+    axes : array of four matplotlib Axes, optional
+        Where to draw; those of a new figure without it.
+
+    Returns
+    -------
+    ndarray of Axes (4,)
+
+    Raises
+    ------
+    InvalidInputError
+        The association does not hold that scan.
+    """
+    found = [one for one in association.scans if one.scan == scan]
+    if not found:
+        raise InvalidInputError(f"scan: the association has no scan {scan!r}")
+    if axes is None:
+        pyplot = load_extra("matplotlib.pyplot", "plot")
+        axes = pyplot.subplots(2, 2, figsize=(11, 9), layout="constrained")[1]
+    four = axes.ravel()
+    plot_scene(scene, ax=four[0]).set_title("Scene")
+    plot_solution(scene, found[0], ax=four[1]).set_title(f"Association of scan {scan}")
+    problem, solution = build_problem(scene, scan), found[0].solution
+    plot_costs(problem, solution if belongs(solution, problem) else None, ax=four[2]).set_title("Candidates and choice")
+    plot_convergence(found[0].solution, ax=four[3]).set_title("Cost and lower bound")
+    return four

@@ -1,0 +1,135 @@
+"""The scene in plan: truth, measurements, sensors, gates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
+from assoc.plotting.colours import BLACK, GREY, colour, marker
+from assoc.plotting.ellipses import ellipses, place_covariances
+from assoc.plotting.places import distances_to_border, places
+from assoc.scene import Scan, Scene
+from assoc.sensors import BearingSensor, Sensor
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def plot_scene(
+    scene: Scene,
+    scan: int | None = None,
+    *,
+    gates: bool = False,
+    gate_probability: float = 0.999,
+    ax: Any = None,
+) -> Any:
+    """Draw where sensors and targets are and what was measured.
+
+    Parameters
+    ----------
+    scene : Scene
+    scan : int, optional
+        One scan alone; without it all measurements are drawn, and the truth as paths.
+    gates : bool
+        Draw around each measurement where its target is with the gate's probability; for a bearing the
+        wedge. Two measurements can be one target where their gates meet.
+    gate_probability : float
+        In (0, 1).
+    ax : matplotlib Axes, optional
+        Where to draw; new ones without it.
+
+    Returns
+    -------
+    Axes
+    """
+    ax = axes_or_new(ax)
+    chosen = [scene.scan(scan)] if scan is not None else [scene.scan(k) for k in range(scene.num_scans)]
+    middle = float(scene.region[2].mean())
+    found = [
+        [_ends(scene, sensor, one.measurements[s], middle) for one in chosen] for s, sensor in enumerate(scene.sensors)
+    ]
+    sites = stacked(sensor.position for sensor in scene.sensors)
+    truth = [] if scene.truth is None else [one.truth_positions for one in chosen]
+    named = [part for row, sensor in zip(found, scene.sensors, strict=True) for part in row if not _bears(sensor)]
+    near, far = stacked([sites, *truth]), stacked(named)
+    unit = unit_of(np.concatenate([near, far]))
+    for s, (sensor, row) in enumerate(zip(scene.sensors, found, strict=True)):
+        ends = unit.factor * stacked(row)
+        label = sensor.name or f"sensor {s + 1}"
+        if _bears(sensor):
+            _rays(ax, unit.factor * sensor.position, ends, color=colour(s), linewidth=0.5, alpha=0.5, label=label)
+            continue
+        size = 3.0 if scan is None else 7.0 - (s % 3)
+        style: dict[str, Any] = {"markerfacecolor": "none"} if scan is not None else {"alpha": 0.5}
+        ax.plot(*ends[:, :2].T, marker(s), color=colour(s), markersize=size, label=label, **style)
+    if gates:
+        _draw_gates(ax, scene, chosen, middle, gate_probability, unit.factor)
+    draw_truth(ax, scene, chosen, unit.factor, paths=len(chosen) > 1)
+    draw_sensors(ax, scene.sensors, unit.factor)
+    plan(ax, box_around(near, far), unit)
+    legend(ax)
+    return ax
+
+
+def _bears(sensor: Sensor) -> bool:
+    return isinstance(sensor, BearingSensor)
+
+
+def _ends(scene: Scene, sensor: Sensor, z: Array, height: float) -> Array:
+    """Places of measurements; for bearings where their rays leave the region."""
+    distance = distances_to_border(sensor, z[:, 0], scene.region) if _bears(sensor) else 0.0
+    return places(sensor, z, height, distance)
+
+
+def _rays(ax: Any, site: Array, ends: Array, **style: Any) -> None:
+    lines = np.full((len(ends), 3, 2), np.nan)
+    lines[:, 0], lines[:, 1] = site[:2], ends[:, :2]
+    ax.plot(*lines.reshape(-1, 2).T, **style)
+
+
+def _draw_gates(ax: Any, scene: Scene, scans: Sequence[Scan], height: float, probability: float, factor: float) -> None:
+    for s, sensor in enumerate(scene.sensors):
+        z = np.concatenate([one.measurements[s] for one in scans])
+        style = {"color": colour(s), "linewidth": 0.8, "linestyle": "--"}
+        if _bears(sensor):
+            # one degree of freedom: the square root of the quantile is that of the normal distribution
+            from scipy.special import ndtri
+
+            half = float(ndtri(0.5 + 0.5 * probability) * np.sqrt(sensor.covariance[0, 0]))
+            for side in (-half, half):
+                _rays(ax, factor * sensor.position, factor * _ends(scene, sensor, z + side, height), **style)
+            continue
+        x, y = ellipses(places(sensor, z, height, 0.0), place_covariances(sensor, z, height), probability)
+        ax.plot(factor * x, factor * y, **style)
+
+
+def draw_truth(ax: Any, scene: Scene, scans: Sequence[Scan], factor: float, *, paths: bool) -> None:
+    """Draw targets where they were: paths over the scans, or a cross each."""
+    if scene.truth is None:
+        return
+    if not paths:
+        where = factor * stacked(one.truth_positions for one in scans)
+        ax.plot(*where[:, :2].T, "+", color=BLACK, markersize=11, markeredgewidth=1.4, label="truth", zorder=4)
+        return
+    known = truth_paths(scene)
+    lines = [np.concatenate([factor * path[:, :2], [[np.nan, np.nan]]]) for path in known.values()]
+    if lines:
+        ax.plot(*np.concatenate(lines).T, color=BLACK, linewidth=1.2, label="truth", zorder=4)
+
+
+def truth_paths(scene: Scene) -> dict[int, Array]:
+    """Positions (n, 3) of each target over the scans, by its id; metres."""
+    paths: dict[int, list[Array]] = {}
+    if scene.truth is not None:
+        for ids, where in zip(scene.truth.target_ids, scene.truth.positions, strict=True):
+            for target, place in zip(ids, where, strict=True):
+                paths.setdefault(int(target), []).append(place)
+    return {target: np.array(path) for target, path in paths.items()}
+
+
+def draw_sensors(ax: Any, sensors: Sequence[Sensor], factor: float) -> None:
+    """Draw where the sensors stand."""
+    sites = factor * stacked(sensor.position for sensor in sensors)
+    ax.plot(*sites[:, :2].T, "^", color=GREY, markersize=9, markeredgecolor=BLACK, label="sensors", zorder=3)

@@ -1,0 +1,245 @@
+"""Every picture of the documentation, drawn anew: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
+
+Pictures are of fixed scenes and seeds. What is timed on the machine is in none of them but the report's screenshot.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import assoc
+from assoc._files import write_atomically
+from assoc.simulation import simulate
+from assoc.sweeps.plots import new_figure
+
+FOLDER = Path(__file__).parents[1] / "docs" / "images"
+LARGEST = 100_000
+"""Bytes that a picture may take."""
+
+_COLOURS = 256
+
+
+@cache
+def _radars() -> tuple[assoc.Scene, assoc.Association]:
+    scene = simulate("three-radar", 0)
+    return scene, assoc.associate(scene, "aco")
+
+
+@cache
+def _ghosts() -> assoc.AssignmentProblem:
+    """Crossing bearings: many tuples are likely, and solvers need some time."""
+    return assoc.build_problem(simulate("bearing-only", 0, targets=30, scans=1), 0)
+
+
+def scene(figure: Any) -> None:
+    """Draw what three radars see in 100 scans."""
+    from assoc.plotting import plot_scene
+
+    plot_scene(_radars()[0], ax=figure.subplots())
+
+
+def solution(figure: Any) -> None:
+    """Draw one scan associated, and one target of it from near."""
+    from assoc.plotting import plot_solution
+
+    figure.set_size_inches(11, 5.2)
+    left, right = figure.subplots(1, 2)
+    one, association = _radars()
+    plot_solution(one, association.scans[50], ax=left).set_title("scan 50")
+    plot_solution(one, association.scans[50], target=0, ax=right).set_title("its first target")
+    left.get_legend().remove()
+
+
+def ghosts(figure: Any) -> None:
+    """Draw three bearing sensors, whose lines of sight cross where nobody is."""
+    from assoc.plotting import plot_solution
+
+    one = simulate("bearing-only", 0, targets=8, scans=1)
+    plot_solution(one, assoc.associate(one, "exact").scans[0], ax=figure.subplots())
+
+
+def gates(figure: Any) -> None:
+    """Draw the gates of a scan near its targets, and how the chosen tuples fill theirs."""
+    from assoc.plotting import plot_gates, plot_scene
+
+    figure.set_size_inches(11, 4.6)
+    left, right = figure.subplots(1, 2)
+    one, association = _radars()
+    plot_scene(one, 50, gates=True, ax=left).set_title("gates around a target, 0.999")
+    place = 1e-3 * association.scans[50].positions[0]
+    left.set_xlim(place[0] - 0.5, place[0] + 0.5)
+    left.set_ylim(place[1] - 0.4, place[1] + 0.4)
+    plot_gates(one, association, ax=right).set_title("100 scans")
+
+
+def costs(figure: Any) -> None:
+    """Draw all candidate tuples of a scan of crossing bearings, and which were chosen."""
+    from assoc.plotting import plot_costs
+
+    plot_costs(_ghosts(), assoc.assign(_ghosts(), "exact"), ax=figure.subplots())
+
+
+def convergence(figure: Any) -> None:
+    """Draw cost and bound of two searches on a hard problem, which neither of them closes."""
+    from assoc.plotting import plot_convergence
+
+    problem = assoc.build_problem(simulate("bearing-only", 0, targets=60, scans=1), 0)
+    limits: dict[str, dict[str, int]] = {"lagrangian": {"iterations": 40}, "tabu": {"iterations": 100}}
+    found = {name: assoc.assign(problem, name, seed=0, **limit) for name, limit in limits.items()}
+    plot_convergence(found, ax=figure.subplots())
+
+
+def pheromone(figure: Any) -> None:
+    """Draw how the ants of the paper agree on a tour."""
+    from assoc.plotting import plot_pheromone
+    from assoc.solvers.pheromone import pheromone_history
+
+    problem = assoc.build_problem(simulate("crowd", 0, targets=8, scans=1), 0)
+    plot_pheromone(pheromone_history(problem, seed=0, alpha=1.0, beta=1.0, rho=0.9), ax=figure.subplots())
+
+
+def heat_map(figure: Any) -> None:
+    """Draw a small study of the ants of the paper, with intervals."""
+    from assoc.plotting import plot_heat_map
+    from assoc.sweeps import Study, grid, load
+    from assoc.sweeps.sources import Source
+
+    source = Source(simulate("three-radar", 0, scans=10), "three-radar")
+    settings = grid("aco", {"mode": ["paper"], "alpha": [1.0, 2.0, 3.0], "rho": [0.3, 0.5, 0.7, 0.9]})
+    with tempfile.TemporaryDirectory() as folder:
+        study = Study([source], settings, repeats=5)
+        study.run(Path(folder) / "study")
+        plot_heat_map(load(Path(folder) / "study"), "iterations", ax=figure.subplots())
+
+
+def tracks(figure: Any) -> None:
+    """Draw the tracks that a multi-sensor tracker makes of the radars' scene, over the truth."""
+    from assoc.plotting import plot_tracks
+
+    one, frame = _tracked()
+    plot_tracks(frame, one, ax=figure.subplots())
+
+
+@cache
+def _tracked() -> tuple[assoc.Scene, Any]:
+    from assoc.tracking import MultiSensorTracker, track_scene
+
+    one = _radars()[0]
+    table, _ = track_scene(MultiSensorTracker.for_scene(one), one)
+    return one, table.to_frame()
+
+
+def metric(figure: Any) -> None:
+    """Draw GOSPA over time, and its parts."""
+    from assoc.metrics import Trajectories, gospa_over_time
+    from assoc.plotting import plot_metric
+
+    figure.set_size_inches(7, 4)
+    one, frame = _tracked()
+    truth = Trajectories.from_scene(one)
+    found = Trajectories(frame["time"], frame["track_id"], frame[["x", "y", "z"]])
+    at, values = gospa_over_time(truth, found, 300.0)
+    parts = {"GOSPA": [one.distance for one in values]}
+    parts |= {name: [getattr(one, name) ** 0.5 for one in values] for name in ("localisation", "missed", "false")}
+    plot_metric(at, parts, name="GOSPA with cutoff 300 m", unit="m", ax=figure.subplots())
+
+
+def overview(figure: Any) -> None:
+    """Draw an association at a glance."""
+    from assoc.plotting import plot_overview
+
+    figure.set_size_inches(11, 9)
+    one = simulate("bearing-only", 0, targets=30, scans=1)
+    plot_overview(one, assoc.associate(one, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
+
+
+PICTURES: dict[str, Callable[[Any], None]] = {
+    "scene": scene,
+    "solution": solution,
+    "ghosts": ghosts,
+    "gates": gates,
+    "costs": costs,
+    "convergence": convergence,
+    "pheromone": pheromone,
+    "heat-map": heat_map,
+    "tracks": tracks,
+    "metric": metric,
+    "overview": overview,
+}
+
+
+def drawn(draw: Callable[[Any], None]) -> bytes:
+    """Return a picture as a small PNG."""
+    figure = new_figure()
+    figure.set_size_inches(7, 5.6)
+    draw(figure)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=90, metadata={"Software": None})
+    return small(content.getvalue())
+
+
+def small(picture: bytes) -> bytes:
+    """Return the same PNG in fewer bytes, with fewer colours only where it must be."""
+    from PIL import Image
+
+    content = io.BytesIO()
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    image.save(content, format="png", optimize=True)
+    if content.tell() > LARGEST:
+        content = io.BytesIO()
+        image.quantize(_COLOURS, dither=Image.Dither.NONE).save(content, format="png", optimize=True)
+    return content.getvalue()
+
+
+def screenshot() -> bytes | None:
+    """Return a picture of a report in headless Chromium; None where that is missing."""
+    if not (shutil.which("chromium") and shutil.which("chromedriver")):
+        return None
+    from assoc.plotting.report import write_association_report
+    from tests.plotting.browser import opened, show
+
+    one, association = _radars()
+    with tempfile.TemporaryDirectory() as folder, opened() as browser:
+        page = Path(folder) / "report.html"
+        words = ["scene.npz", "--solver", "aco", "--report", "report.html"]
+        write_association_report(page, association, one, ["scene.npz"] * len(association.scans), words=words)
+        show(browser, page, (1100, 950), fragment="#scan-50")
+        browser.execute_script("document.querySelector('#targets tr[data-row]').click()")
+        browser.execute_script("window.scrollTo(0, 0)")
+        time.sleep(0.5)
+        return small(browser.get_screenshot_as_png())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw the pictures named, or all."""
+    parser = argparse.ArgumentParser(prog="experiments.gallery", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*PICTURES, "report"]))
+    parser.add_argument("-o", "--output", type=Path, default=FOLDER, metavar="FOLDER")
+    given = parser.parse_args(arguments)
+    names = given.names or [*PICTURES, "report"]
+    for name in names:
+        if name not in (*PICTURES, "report"):
+            parser.error(f"no picture is called {name!r}")
+    given.output.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        picture = screenshot() if name == "report" else drawn(PICTURES[name])
+        if picture is None:
+            print(f"{name:<12} left out: chromium and chromedriver are not installed")
+            continue
+        if len(picture) > LARGEST:
+            raise SystemExit(f"{name}: {len(picture)} bytes, more than {LARGEST}")
+        write_atomically(given.output / f"{name}.png", lambda file, content=picture: file.write(content))
+        print(f"{name:<12} {len(picture) / 1e3:6.1f} kB")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

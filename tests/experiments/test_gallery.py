@@ -1,0 +1,35 @@
+"""The pictures of the documentation: each is committed, small, and drawn by a command that works."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from experiments import gallery
+
+
+def test_committed_pictures_are_those_of_the_gallery():
+    committed = {path.stem: path for path in gallery.FOLDER.glob("*.png")}
+    assert {*gallery.PICTURES, "report"} <= {*committed}
+    assert max(path.stat().st_size for path in committed.values()) <= gallery.LARGEST
+
+
+def test_a_picture_is_drawn_anew(tmp_path, capsys):
+    assert gallery.main(["scene", "-o", str(tmp_path)]) == 0
+    drawn = np.asarray(Image.open(tmp_path / "scene.png").convert("L"), dtype=float)
+    known = np.asarray(Image.open(gallery.FOLDER / "scene.png").convert("L"), dtype=float)
+    # fonts differ between versions of matplotlib, what is drawn does not
+    assert drawn.shape == known.shape and np.abs(drawn - known).mean() < 8.0
+    assert capsys.readouterr().out.startswith("scene")
+    with pytest.raises(SystemExit):
+        gallery.main(["no-such-picture", "-o", str(tmp_path)])
+
+
+def test_pictures_of_many_colours_are_made_small():
+    noise = np.random.default_rng(0).integers(0, 255, (300, 300, 3), dtype=np.uint8)
+    content = io.BytesIO()
+    Image.fromarray(noise).save(content, format="png")
+    assert len(gallery.small(content.getvalue())) < 0.5 * content.tell()
