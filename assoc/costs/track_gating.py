@@ -38,9 +38,7 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    # |v_i| <= sqrt(gate S_ii) for each component of a residual within the gate
-    reach = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
-    turning = np.array(angular)
+    reach, turning = _reach(expected, gate), np.array(angular)
     if len(h) * len(z) <= _BRUTE:
         off = _apart(z[None, :, :], h[:, None, :], turning)
         tracks, found = np.nonzero((off <= reach[:, None, :]).all(axis=2))
@@ -48,6 +46,20 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     tracks, found = _by_tree(h, z, reach, turning)
     inside = (_apart(z[found], h[tracks], turning) <= reach[tracks]).all(axis=1)
     return tracks[inside], found[inside]
+
+
+def _reach(expected: Expected, gate: float) -> Array:
+    """Largest component of a residual within the gate: |v_i| <= sqrt(gate S_ii)."""
+    reach: Array = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
+    return reach
+
+
+def within(
+    expected: Expected, rows: Array, measurements: Array, found: Array, angular: tuple[bool, ...], gate: float
+) -> Array:
+    """Which pairs (row of `expected`, row of `measurements`) may pass a chi-square gate; bool (K,)."""
+    off = _apart(measurements[found], expected.mean[rows], np.array(angular))
+    return np.asarray((off <= _reach(expected, gate)[rows]).all(axis=1))
 
 
 def _apart(a: Array, b: Array, turning: Array) -> Array:

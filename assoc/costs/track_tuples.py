@@ -7,6 +7,7 @@ of (track, z_1, ..., z_S) is the negative logarithm of p(z_1, ..., z_S | track) 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.guard import MAX_TUPLES
-from assoc.costs.track_gating import angular_components, near_pairs
+from assoc.costs.track_gating import angular_components, near_pairs, within
 from assoc.costs.track_scores import ScoreTerms
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Filter
@@ -115,10 +116,16 @@ def grow_track_tuples(
     rows = np.zeros((count, len(sensors)), dtype=np.int32)
     costs = np.zeros(count)
     grown = states
+    alone, ahead = -float(terms.miss.sum()), _ahead(sensors, terms)
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
         gate = gate_of(sensor, gate_probability)
         near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
         parent, found = _join(track, *near, count)
+        if s:
+            # what has corrected the track already narrows its gate
+            angles = angular_components(sensor)
+            inside = within(filter.expected(grown, sensor), parent, z, found, angles, gate)
+            parent, found = parent[inside], found[inside]
         if len(parent) + len(track) > max_tuples:
             raise LimitExceededError(
                 f"about {len(parent) + len(track):.3g} candidate tuples of tracks and measurements, "
@@ -132,11 +139,19 @@ def grow_track_tuples(
         rows = np.concatenate([rows, new])
         track = np.concatenate([track, track[done.track]])
         grown = concatenate([grown, done.states])
-    alone = -float(terms.miss.sum())
-    useful = (costs < alone) | ~rows.any(axis=1)
-    order = np.flatnonzero(useful)
-    order = order[np.lexsort((*rows[order].T[::-1], track[order]))]
+        # what the sensors to come can still take off the cost; then a track all missed must be beaten
+        hopeful = np.flatnonzero((costs - ahead[s + 1] < alone) | ~rows.any(axis=1))
+        if len(hopeful) < len(rows):
+            costs, rows, track, grown = costs[hopeful], rows[hopeful], track[hopeful], grown[hopeful]
+    order = np.lexsort((*rows.T[::-1], track))
     return TrackTuples(track[order], rows[order], costs[order], grown[order])
+
+
+def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms) -> Array:
+    """The most that sensors s, s + 1, ... can take off a cost, (S + 1,): no density is above the noise's own."""
+    peak = [-0.5 * float(np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1]) for sensor in sensors]
+    gain = np.maximum(terms.detection + np.array(peak), terms.miss)
+    return np.append(np.cumsum(gain[::-1])[::-1], 0.0)
 
 
 def _join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:

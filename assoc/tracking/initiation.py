@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,10 +36,10 @@ class Initiation:
         share of the region's diagonal; a bearing alone does not.
     """
 
-    speed: float | tuple[float, ...] = 300.0
-    rest: float = 0.1
-    birth_rate: float = 0.1
-    widest: float = 0.1
+    speed: float | tuple[float, ...] = field(default=300.0, metadata={"help": "usual speed along an axis, m/s"})
+    rest: float = field(default=0.1, metadata={"help": "usual size of further components of the state"})
+    birth_rate: float = field(default=0.1, metadata={"help": "mean number of new targets in a scan"})
+    widest: float = field(default=0.1, metadata={"help": "widest start of a track, as a share of the region"})
 
     def __post_init__(self) -> None:
         for name in ("rest", "birth_rate", "widest"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -47,35 +47,37 @@ class LifeCycle:
     deletion_drop : float
     """
 
-    confirmation: Confirmation = "score"
-    false_probability: float = 1e-6
-    missed_probability: float = 2e-3
-    m: int = 3
-    n: int = 4
-    deletion: Deletion = "time"
-    deletion_time: float | None = None
-    deletion_count: int = 5
-    deletion_drop: float = 25.0
+    confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})
+    false_probability: float = field(default=1e-6, metadata={"help": "share of false tracks confirmed by score"})
+    missed_probability: float = field(default=2e-3, metadata={"help": "share of true tracks given up too early"})
+    m: int = field(default=3, metadata={"help": "m-of-n: scans with a detection"})
+    n: int = field(default=4, metadata={"help": "m-of-n: of the last n scans"})
+    deletion: Deletion = field(default="time", metadata={"help": "what ends a confirmed track"})
+    deletion_time: float | None = field(
+        default=None, metadata={"help": "seconds without a detection (default: from the pace of the scans and P_d)"}
+    )
+    deletion_count: int = field(default=5, metadata={"help": "scans in a row without a detection"})
+    deletion_drop: float = field(default=25.0, metadata={"help": "fall of the score from its best"})
 
     def __post_init__(self) -> None:
         if self.confirmation not in get_args(Confirmation):
             raise InvalidInputError(f"confirmation must be 'score' or 'm-of-n', got {self.confirmation!r}")
         if self.deletion not in get_args(Deletion):
             raise InvalidInputError(f"deletion must be 'time', 'count' or 'score', got {self.deletion!r}")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name == "deletion_time" and value is None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if one.name == "deletion_time" and value is None:
                 continue
-            if isinstance(field.default, float) or field.name == "deletion_time":
+            if isinstance(one.default, float) or one.name == "deletion_time":
                 good = isinstance(value, (int, float, np.floating)) and not isinstance(value, bool)
                 if not good or not 0 < value < math.inf:
-                    raise InvalidInputError(f"{field.name} must be a number above 0, got {value!r}")
-                if field.name.endswith("probability") and value >= 1:
-                    raise InvalidInputError(f"{field.name} must be below 1, got {value!r}")
-            elif isinstance(field.default, int) and (
+                    raise InvalidInputError(f"{one.name} must be a number above 0, got {value!r}")
+                if one.name.endswith("probability") and value >= 1:
+                    raise InvalidInputError(f"{one.name} must be below 1, got {value!r}")
+            elif isinstance(one.default, int) and (
                 not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1
             ):
-                raise InvalidInputError(f"{field.name} must be a whole number above 0, got {value!r}")
+                raise InvalidInputError(f"{one.name} must be a whole number above 0, got {value!r}")
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 

@@ -40,6 +40,9 @@ PROCESS_NOISE = 20.0
 """Default process noise: root of the acceleration's spectral density, m/s^1.5."""
 
 
+TIME_LIMIT = 2.0
+"""Default time limit for the assignment problem of a scan, seconds; only dense scenes come near it."""
+
 _FORGETTING = 0.05
 
 
@@ -58,8 +61,9 @@ class Tracker(ABC):
     solver_parameters : mapping, optional
     seed : int
         Of the solver's randomness; the same seed gives the same tracks.
-    time_limit : float, optional
-        Seconds for each assignment problem.
+    time_limit : float or None
+        Seconds for each assignment problem; when they are over the best solution found is taken (which then
+        depends on the machine). None: as long as it takes.
     life_cycle : LifeCycle, optional
     initiation : Initiation, optional
     gate_probability : float
@@ -84,7 +88,7 @@ class Tracker(ABC):
         solver: str = "exact",
         solver_parameters: Mapping[str, Any] | None = None,
         seed: int = 0,
-        time_limit: float | None = None,
+        time_limit: float | None = TIME_LIMIT,
         life_cycle: LifeCycle | None = None,
         initiation: Initiation | None = None,
         gate_probability: float = GATE_PROBABILITY,

@@ -1,0 +1,305 @@
+"""``python -m assoc.track``: tracks from a scene, or from the radar plots of a CSV file.
+
+This is a program: the package must not import it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from assoc._program import (
+    Option,
+    Parser,
+    given,
+    leave_on_interrupt,
+    options,
+    run,
+    seconds,
+    whole_number,
+    writing,
+)
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc.scene import Scene
+    from assoc.sensors import Sensor
+    from assoc.tracking import Tracker, TrackTable
+
+TRACKERS = {
+    "multi-sensor": "each scan one assignment over tracks and all sensors (default for scenes)",
+    "static": "the sensors of a scan fused first, then assigned to tracks",
+    "mht": "track-oriented multiple hypotheses (default for plots)",
+    "mht-hypothesis": "hypothesis-oriented multiple hypotheses (Reid, Murty)",
+    "nearest-neighbour": "each measurement to the nearest track",
+}
+WINDOWS = ("ctw", "ctw-time", "none")
+# option -> the trackers that take it
+_OWN = {
+    "depth": ("mht", "mht-hypothesis"),
+    "max_branches": ("mht",),
+    "max_hypotheses": ("mht-hypothesis",),
+}
+# option -> what `assoc.recordings.radar_of` calls it, and its unit
+_RADAR = {
+    "detection_probability": ("detection_probability", 1.0),
+    "false_alarms": ("false_alarm_rate", 1.0),
+    "range_noise": ("range_noise", 1.0),
+    "bearing_noise": ("azimuth_noise", math.pi / 180.0),
+}
+GOSPA_CUTOFF = 1_000.0
+_MORE = """
+further options (docs/tracking.md):
+  life of a track    --confirmation --false-probability --missed-probability --m --n
+                     --deletion --deletion-time --deletion-count --deletion-drop
+  new tracks         --speed --rest --birth-rate --widest
+  and the parameters of the solver, which python -m assoc.solve --solver NAME --help describes"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return run(lambda: _track(words), "assoc.track")
+
+
+def _track(words: list[str]) -> None:
+    solver = _named(words, "--solver") or "exact"
+    if {"-h", "--help"} & {*words}:
+        # help must be quick, and the packages that know the further options are not
+        _parser([]).parse_args(words)
+    from assoc.solvers import registry
+    from assoc.tracking import Initiation, LifeCycle
+
+    own = options(registry.parameters(solver))
+    cycle, start = options(LifeCycle), [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
+    for one in start:
+        one.kind = float
+    parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
+    file = parsed["file"]
+    _check_output(parsed["output"], file)
+    settings: dict[str, Any] = {
+        "solver": solver,
+        "solver_parameters": given(own, parsed),
+        "life_cycle": LifeCycle(**given(cycle, parsed)),
+        "initiation": Initiation(**given(start, parsed)),
+        **_common(parsed),
+    }
+    started = time.perf_counter()
+    if _is_npz(file):
+        if parsed["window"] is not None:
+            raise InvalidInputError("--window: groups the plots of a CSV file, a scene has scans already")
+        count, tracker, table, scene = _of_scene(file, parsed, settings)
+    else:
+        count, tracker, table, scene = _of_plots(file, parsed, settings)
+    elapsed = time.perf_counter() - started
+    with writing:
+        table.to_csv(parsed["output"])
+    _report(parsed["output"], count, tracker, table, scene, elapsed)
+
+
+def _named(words: list[str], flag: str) -> str | None:
+    first = Parser(prog="assoc.track", add_help=False, allow_abbrev=False)
+    first.add_argument(flag, dest="value")
+    value = first.parse_known_args(words)[0].value
+    return None if value is None else str(value)
+
+
+def _field(owner: Any, name: str) -> Any:
+    from dataclasses import fields
+
+    return next(one for one in fields(owner) if one.name == name)
+
+
+def _parser(further: Sequence[Option]) -> Parser:
+    lines = [f"  {name:<18} {purpose}" for name, purpose in TRACKERS.items()]
+    parser = Parser(
+        prog="assoc.track",
+        usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
+        description="Make tracks of the measurements of a scene (.npz), or of radar plots (.csv).",
+        epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
+    add("-o", "--output", required=True, metavar="FILE", help="the tracks to write (.csv)")
+    add("--tracker", metavar="NAME", help="one of the trackers below")
+    add("--solver", metavar="NAME", help="solver of the assignment problems (default exact)")
+    add(
+        "--filter",
+        metavar="NAME",
+        default="ekf",
+        help="ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default ekf)",
+    )
+    add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm, fuzzy: m/s^2 (default 20)")
+    add("--seed", metavar="N", help="seed of the solver (default 0)")
+    add("--time-limit", metavar="S", help="seconds for each scan's assignment problem (default 2)")
+    add("--gate-probability", metavar="P", help="share of true measurements that a gate lets through (default 0.999)")
+    add("--all", action="store_true", help="write tentative tracks, too")
+    add("--depth", metavar="N", help="mht: scans until a decision is final (default 3)")
+    add("--max-branches", metavar="N", help="mht: branches of a track tree (default 20)")
+    add("--max-hypotheses", metavar="N", help="mht-hypothesis: hypotheses that are kept (default 20)")
+    plots = parser.add_argument_group("plots")
+    plots.add_argument(
+        "--window", metavar="NAME", help="ctw: by the antenna's turn (default); ctw-time: by its time; none: one by one"
+    )
+    plots.add_argument("--rotation", metavar="S", help="seconds of a turn (default: estimated)")
+    plots.add_argument("--detection-probability", metavar="P", help="of the radar (default 0.8)")
+    plots.add_argument("--range-noise", metavar="M", help="standard deviation, metres (default: from the plots' steps)")
+    plots.add_argument("--bearing-noise", metavar="DEG", help="standard deviation, degrees (default: likewise)")
+    plots.add_argument("--false-alarms", metavar="X", help="false plots in a rotation (default 2.5)")
+    for option in further:
+        option.add_to(parser)
+    return parser
+
+
+def _common(parsed: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    if parsed["seed"] is not None:
+        found["seed"] = whole_number(parsed["seed"], "--seed", 0)
+    if parsed["time_limit"] is not None:
+        found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
+    if parsed["gate_probability"] is not None:
+        found["gate_probability"] = _number(parsed["gate_probability"], "--gate-probability")
+    return found
+
+
+def _number(text: str, label: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidInputError(f"{label}: expected a number, got {text!r}") from None
+
+
+def _check_output(output: str, file: str) -> None:
+    """Refuse before the work what could not be written after it."""
+    if os.path.realpath(output) == os.path.realpath(file):
+        raise InvalidInputError(f"{output}: would overwrite what is read")
+    if Path(output).is_dir():
+        raise InvalidInputError(f"{output}: is a folder, expected a file name to write")
+    if not Path(output).parent.is_dir():
+        raise InvalidInputError(f"{output}: the folder {Path(output).parent} does not exist")
+
+
+def _is_npz(file: str) -> bool:
+    """Whether a file is meant as a scene: by its first bytes, or by its name where it cannot be read."""
+    try:
+        with open(file, "rb") as stream:
+            start = stream.read(4)
+    except OSError:
+        return not file.lower().endswith(".csv")
+    return start == b"PK\x03\x04" or file.lower().endswith(".npz")
+
+
+def _make(
+    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
+) -> Tracker:
+    from assoc.filters.motion import positive
+    from assoc.tracking import TRACKERS as KINDS
+    from assoc.tracking.choices import make_filter
+    from assoc.tracking.tracker import PROCESS_NOISE
+
+    if name not in KINDS:
+        raise InvalidInputError(f"--tracker: unknown name {name!r}; known: {', '.join(KINDS)}")
+    extra: dict[str, Any] = {}
+    for option, takers in _OWN.items():
+        if parsed[option] is None:
+            continue
+        flag = "--" + option.replace("_", "-")
+        if name not in takers:
+            raise InvalidInputError(f"{flag}: is for --tracker {' or '.join(takers)}, not for {name}")
+        extra[option] = whole_number(parsed[option], flag, 1)
+    noise = PROCESS_NOISE
+    if parsed["process_noise"] is not None:
+        noise = positive(_number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
+    return KINDS[name](sensors, made, region=region, **settings, **extra)
+
+
+def _of_scene(
+    file: str, parsed: dict[str, Any], settings: dict[str, Any]
+) -> tuple[int, Tracker, TrackTable, Scene | None]:
+    from assoc.scene import Scene
+    from assoc.tracking import track_scene
+
+    for flag in ("rotation", *_RADAR):
+        if parsed[flag] is not None:
+            raise InvalidInputError(f"--{flag.replace('_', '-')}: describes the radar of plots, a scene knows its own")
+    scene = Scene.load(file)
+    tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+    numbers = _with_progress(range(scene.num_scans), scene.num_scans)
+    table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    return scene.num_scans, tracker, table, scene
+
+
+def _of_plots(
+    file: str, parsed: dict[str, Any], settings: dict[str, Any]
+) -> tuple[int, Tracker, TrackTable, Scene | None]:
+    from assoc.recordings import Window, clustering_time_window, radar_of, read_plots
+    from assoc.tracking import TrackTable
+    from assoc.tracking.windows import step_windows
+
+    name = parsed["tracker"] or "mht"
+    if name in ("multi-sensor", "static"):
+        raise InvalidInputError(
+            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis or nearest-neighbour"
+        )
+    window = parsed["window"] or "ctw"
+    if window not in WINDOWS:
+        raise InvalidInputError(f"--window: unknown name {window!r}; known: {', '.join(WINDOWS)}")
+    radar: dict[str, Any] = {}
+    for flag, (argument, unit) in _RADAR.items():
+        if parsed[flag] is not None:
+            radar[argument] = unit * _number(parsed[flag], "--" + flag.replace("_", "-"))
+    turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
+    recording = read_plots(file)
+    if window == "none":
+        windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
+    else:
+        windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
+    print(recording.summary())
+    tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
+    table = TrackTable()
+    for _ in step_windows(tracker, _with_progress(windows, len(windows))):
+        tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
+        table.add(tracks, tracker.filter.motion.position)
+    return len(windows), tracker, table, None
+
+
+def _with_progress(items: Sequence[Any], count: int) -> Iterator[Any]:
+    """Show a progress bar on stderr if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    from rich.console import Console
+    from rich.progress import track
+
+    yield from track(items, "tracking", total=count, console=Console(stderr=True), transient=True)
+
+
+def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float) -> None:
+    _, ids, _ = table.arrays()
+    print(f"{output}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
+    print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {1e3 * elapsed / max(count, 1):.3g} ms a scan")
+    if scene is None or scene.truth is None:
+        return
+    from assoc.metrics import Trajectories, summarise
+
+    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), GOSPA_CUTOFF)
+    print(
+        f"against the truth (cutoff {GOSPA_CUTOFF:g} m): GOSPA {found.gospa:.4g} m "
+        f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
+        f"false {found.gospa_false:.4g}), "
+        f"{found.identity.switches} identity switches"
+    )
+
+
+if __name__ == "__main__":
+    leave_on_interrupt("assoc.track")
+    raise SystemExit(main())

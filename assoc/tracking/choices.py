@@ -1,0 +1,84 @@
+"""Filters by name, for programs and experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc import filters
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Filter
+from assoc.sensors import PositionSensor, Radar3D, Sensor
+from assoc.tracking.tracker import PROCESS_NOISE
+
+_TURN_NOISE = 0.03
+"""Standard deviation of a turn rate's increment in a step, rad/s."""
+
+
+def planar(sensors: Sequence[Sensor]) -> bool:
+    """Whether no sensor tells a height, so that states of two dimensions are enough."""
+    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim == 3 for one in sensors)
+
+
+def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:
+    return filters.ConstantVelocity(noise, dimensions=2 if flat else 3, kind="continuous")
+
+
+def _turn(noise: float, flat: bool, name: str) -> filters.CoordinatedTurn:
+    if flat:
+        raise InvalidInputError(f"filter: {name!r} needs a sensor that tells heights; use ekf, ukf or enkf")
+    return filters.CoordinatedTurn(noise, _TURN_NOISE)
+
+
+def _imm(noise: float, flat: bool, seed: int) -> Filter[Any]:
+    turn = _turn(noise, flat, "imm")
+    straight = filters.Padded(_velocity(0.25 * noise, flat), _TURN_NOISE)
+    modes: list[Any] = [filters.ExtendedKalmanFilter(straight), filters.ExtendedKalmanFilter(turn)]
+    return filters.InteractingMultipleModel(modes, np.array([[0.95, 0.05], [0.1, 0.9]]))
+
+
+_MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
+    "ekf": lambda noise, flat, seed: filters.ExtendedKalmanFilter(_velocity(noise, flat)),
+    "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, flat)),
+    "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, flat)),
+    "ukf": lambda noise, flat, seed: filters.UnscentedKalmanFilter(_velocity(noise, flat)),
+    "enkf": lambda noise, flat, seed: filters.EnsembleKalmanFilter(_velocity(noise, flat), 100, seed),
+    "imm": _imm,
+    "fuzzy": lambda noise, flat, seed: filters.FuzzyAdaptiveEKF.from_data(
+        _turn(noise, flat, "fuzzy"), filters.tuned_data()
+    ),
+}
+
+FILTERS = tuple(_MAKERS)
+"""Names of the filters."""
+
+
+def make_filter(
+    name: str, sensors: Sequence[Sensor], process_noise: float = PROCESS_NOISE, seed: int = 0
+) -> Filter[Any]:
+    """Make a filter with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
+
+    Parameters
+    ----------
+    name : str
+        One of `FILTERS`.
+    sensors : sequence of Sensor
+        Where none tells a height, states are planar.
+    process_noise : float
+        Root of the acceleration's spectral density, m/s^1.5; of imm and fuzzy the acceleration, m/s^2.
+    seed : int
+        Of the ensemble's noise.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no such filter, or it does not suit the sensors.
+    """
+    if name not in _MAKERS:
+        raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
+    made = _MAKERS[name](process_noise, planar(sensors), seed)
+    for sensor in sensors:
+        made.observe(sensor)
+    return made

@@ -1,0 +1,159 @@
+"""`python -m assoc.track` as a program."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc import track
+from assoc.recordings import Recording, write_plots
+from assoc.scene import Scene
+from assoc.tracking import TRACKERS, MultiSensorTracker
+
+NOISE = ["--range-noise", "100", "--bearing-noise", "0.115"]
+COLUMNS = ["track_id", "time", "x", "y", "z", "vx", "vy", "vz"]
+
+
+def plots(path, turns=20):
+    """Two aircraft on straight paths, a radar that turns in 10 s, and some false plots."""
+    rng = np.random.default_rng(0)
+    rows = []
+    start, velocity = np.array([[30e3, 10e3], [-40e3, 20e3]]), np.array([[-150.0, 60.0], [120.0, 100.0]])
+    for k in range(turns):
+        for i in range(2):
+            t = 10.0 * k
+            for _ in range(2):
+                x, y = start[i] + t * velocity[i]
+                t = 10.0 * k + 10.0 * (np.arctan2(x, y) % (2 * np.pi)) / (2 * np.pi)
+            rows.append((t, np.hypot(x, y) + rng.normal(0, 100), np.arctan2(y, x) + rng.normal(0, 2e-3), 100 + i))
+        if k % 3 == 0:
+            bearing = rng.uniform(0, 2 * np.pi)
+            rows.append((10.0 * k + 10 * bearing / (2 * np.pi), rng.uniform(1e4, 1e5), np.pi / 2 - bearing, 0))
+    times, ranges, azimuths, ids = np.array(sorted(rows)).T
+    write_plots(path, Recording(times, ranges, azimuths, ids.astype(int)))
+
+
+def test_a_scene_as_a_program(run, scene_file, tmp_path):
+    done = run("assoc.track", scene_file, "--tracker", "multi-sensor", "--solver", "aco", "--filter", "ekf",
+               "-o", tmp_path / "tracks.csv")  # fmt: skip
+    assert done.returncode == 0 and done.stderr == ""
+    assert "3 confirmed tracks" in done.stdout and "GOSPA" in done.stdout
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    assert list(table.columns[:8]) == COLUMNS
+    assert table.track_id.nunique() == 3 and table.confirmed.all()
+
+
+def test_program_and_online_use_agree(scene_file, tmp_path, capsys):
+    words = [
+        str(scene_file),
+        "-o",
+        str(tmp_path / "tracks.csv"),
+        "--seed",
+        "3",
+        "--solver",
+        "tabu",
+        "--birth-rate",
+        "0.3",
+    ]
+    assert track.main(words) == 0
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    from assoc.tracking import Initiation
+
+    scene = Scene.load(scene_file)
+    tracker = MultiSensorTracker.for_scene(scene, solver="tabu", seed=3, initiation=Initiation(birth_rate=0.3))
+    rows = []
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        tracker.step(scan.time, scan.measurements)
+        rows += [(t.track_id, t.time, *t.position, *t.velocity) for t in tracker.tracks if t.confirmed]
+    np.testing.assert_allclose(table[COLUMNS].to_numpy(), np.array(rows), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", list(TRACKERS))
+def test_every_tracker(name, scene_file, tmp_path, capsys):
+    assert track.main([str(scene_file), "--tracker", name, "-o", str(tmp_path / "tracks.csv"), "--all"]) == 0
+    assert f"{name}, exact" in capsys.readouterr().out
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    assert table[table.confirmed].track_id.nunique() >= 3
+    assert set(track.TRACKERS) == set(TRACKERS)
+
+
+@pytest.mark.parametrize("name", ["kalman", "ukf", "modified-ekf", "enkf", "imm", "fuzzy", "ekf"])
+def test_every_filter(name, scene_file, tmp_path, capsys):
+    code = track.main([str(scene_file), "--filter", name, "-o", str(tmp_path / "tracks.csv")])
+    captured = capsys.readouterr()
+    if name == "kalman":
+        assert code == 2 and "sensor must be linear for a Kalman filter" in captured.err
+    else:
+        assert code == 0 and "3 confirmed tracks" in captured.out
+
+
+@pytest.mark.parametrize("window", ["ctw", "ctw-time", "none"])
+@pytest.mark.parametrize("name", ["mht", "nearest-neighbour"])
+def test_plots_from_csv(window, name, tmp_path, capsys):
+    plots(tmp_path / "plots.csv")
+    words = [str(tmp_path / "plots.csv"), "--tracker", name, "--window", window, "-o", str(tmp_path / "tracks.csv")]
+    assert track.main([*words, "--rotation", "10", "--false-alarms", "0.5", *NOISE, "--process-noise", "2"]) == 0
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    last = table[table.time == table.time.max()]
+    if window != "none":
+        # one plot at a time, every other aircraft counts as missed: only with windows is this fair
+        assert table.track_id.nunique() == 2
+        where = np.array([[30e3, 10e3], [-40e3, 20e3]]) + table.time.max() * np.array([[-150.0, 60.0], [120.0, 100.0]])
+        away = np.linalg.norm(last[["x", "y"]].to_numpy()[:, None] - where[None], axis=2)
+        assert away.min(axis=0).max() < 1500
+        np.testing.assert_allclose(np.sort(last.vx), [-150, 120], atol=15)
+    assert "plots over" in capsys.readouterr().out
+
+
+BAD = {
+    "no file": (["absent.npz"], "absent.npz: no such file"),
+    "no csv": (["absent.csv"], "absent.csv"),
+    "tracker": (["SCENE", "--tracker", "mth"], "--tracker: unknown name 'mth'; known: multi-sensor"),
+    "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: ekf"),
+    "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
+    "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
+    "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
+    "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is for --tracker mht-hypothesis"),
+    "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
+    "gate": (["SCENE", "--gate-probability", "2"], "gate_probability must be above 0 and below 1"),
+    "noise": (["SCENE", "--process-noise", "-1"], "--process-noise must be a number >= 0"),
+    "life cycle": (["SCENE", "--false-probability", "0"], "false_probability must be a number above 0"),
+    "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
+    "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
+    "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
+    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, none"),
+    "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite what is read"),
+    "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
+}
+
+
+@pytest.mark.parametrize("case", list(BAD))
+def test_bad_input_is_one_line_and_code_2(case, scene_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words, message = BAD[case]
+    if "PLOTS" in words:
+        plots(tmp_path / "plots.csv", 6)
+    words = [{"SCENE": str(scene_file), "PLOTS": "plots.csv"}.get(word, word) for word in words]
+    if "-o" not in words:
+        words += ["-o", "tracks.csv"]
+    assert track.main(words) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "tracks.csv").exists()
+
+
+def test_too_many_tuples_is_code_3(scene_file, tmp_path, monkeypatch, capsys):
+    from assoc.tracking import single_scan, tracker
+
+    monkeypatch.setattr(tracker.Tracker.__init__, "__kwdefaults__", {
+        **tracker.Tracker.__init__.__kwdefaults__, "max_tuples": 5})  # fmt: skip
+    assert single_scan
+    assert track.main([str(scene_file), "-o", str(tmp_path / "tracks.csv")]) == 3
+    assert "more than max_tuples = 5" in capsys.readouterr().err
+
+
+def test_help_is_quick_and_lists_trackers(run):
+    done = run("assoc.track", "--help")
+    assert done.returncode == 0
+    for name in TRACKERS:
+        assert name in done.stdout
