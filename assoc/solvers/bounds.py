@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 START = 0.06
 COOLING = 0.5
 LEVELS = 11
-PASSES = 200
+PASSES = 1000
 # over-relaxation: the kernel takes total ** 1.5 as total * sqrt(total)
 RELAXATION = 1.5
 

@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.local_search import _improve, penalised
-from assoc.solvers.max_min_ants import _walk
+from assoc.solvers.max_min_ants import random_cover
 from assoc.solvers.metaheuristic import Part, incomplete
 
 if TYPE_CHECKING:
     from assoc.solvers.genetic import GeneticParameters
 
 Floats = NDArray[np.float64]
+
+# generations without improvement after which a population is renewed
+_RENEWAL = 20
 
 
 class Breeding:
@@ -48,39 +51,23 @@ class Breeding:
             self._admit(part, owner, weight)
             if part.closed:
                 return
-        # a population that has become one family starts anew around its best
-        if part.stalled and part.stalled % 20 == 0:
+        # a population that has become one family starts anew, around its best and without it by turns
+        if part.stalled and part.stalled % _RENEWAL == 0:
             keep = int(np.argmin(self.fitness))
-            self.members, self.fitness = self.members[keep : keep + 1], self.fitness[keep : keep + 1]
+            kept = slice(keep, keep + (part.stalled // _RENEWAL) % 2)
+            self.members, self.fitness = self.members[kept], self.fitness[kept]
             self._populate(part, rng)
 
     def _populate(self, part: Part, rng: np.random.Generator) -> None:
-        packing = part.packing
         members = [*self.members]
         fitness = [*self.fitness]
-        if part.best is not None and not members:
+        if part.best is not None and not members and part.iterations == 0:
             members.append(part.best.copy())
             fitness.append(part.weight)
-        pheromone, slack_pheromone = np.ones(packing.num_columns), np.ones(packing.num_rows)
         while len(members) < self.parameters.population:
             # random greedy solutions, strict and loose ones by turns
             strictness = 2.0 ** (len(members) % 10)
-            owner, _ = _walk(
-                packing.cols,
-                self.weights,
-                packing.slack,
-                packing.row_ptr,
-                packing.row_cols,
-                part.reduced,
-                part.duals,
-                pheromone,
-                slack_pheromone,
-                1.0,
-                strictness,
-                part.temperature,
-                1,
-                rng,
-            )
+            owner = random_cover(part, self.weights, strictness, rng)
             weight = part.polish(owner)
             part.offer(owner, weight)
             members.append(owner)

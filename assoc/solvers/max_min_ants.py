@@ -74,6 +74,28 @@ class Colony:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)
 
 
+def random_cover(part: Part, weights: Floats, strictness: float, rng: np.random.Generator) -> NDArray[np.int32]:
+    """Return a random greedy cover, as one ant builds it where no pheromone lies; the larger the stricter."""
+    packing = part.packing
+    owner, _ = _walk(
+        packing.cols,
+        weights,
+        packing.slack,
+        packing.row_ptr,
+        packing.row_cols,
+        part.reduced,
+        part.duals,
+        np.ones(packing.num_columns),
+        np.ones(packing.num_rows),
+        1.0,
+        strictness,
+        part.temperature,
+        1,
+        rng,
+    )
+    return owner
+
+
 @njit
 def _update(pheromone: Floats, slack_pheromone: Floats, owner: Any, share: float, lowest: float) -> None:
     """Eq. 9 in hyper-cube form with max-min limits."""

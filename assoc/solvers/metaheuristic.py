@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from assoc.errors import InfeasibleError
 from assoc.solvers import dimensionwise
-from assoc.solvers.bounds import component_bounds, dual_bound, hard_pass, reduced_costs
+from assoc.solvers.bounds import certified_bound, component_bounds, dual_bound, hard_pass, reduced_costs
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.cluster_steps import ClusterSteps
 from assoc.solvers.feasibility import infeasible
+from assoc.solvers.linear_program import linear_program_duals
 from assoc.solvers.local_search import Cover
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
@@ -32,6 +33,8 @@ Owner = NDArray[np.int32]
 
 TOLERANCE = 1e-9
 _PROOF_NODES = 2000
+# columns up to which the linear program is solved: some seconds at the most
+_LINEAR_PROGRAM = 200_000
 
 
 @dataclass(slots=True)
@@ -82,6 +85,21 @@ class Part:
         if self.weight < np.inf:
             return min(max((self.weight - self.bound) / 4.0, TOLERANCE * max(1.0, abs(self.bound))), widest)
         return widest
+
+    def take_over(self, duals: Floats) -> None:
+        """Take over feasible multipliers if their bound is better."""
+        bound = certified_bound(self.packing, duals)
+        if bound > self.bound:
+            self.bound, self.duals, self.reduced = bound, duals, reduced_costs(self.packing, duals)
+
+    def sharpen(self, run: Run) -> None:
+        """Take the multipliers of the linear program itself, where that is not too large."""
+        if self.packing.num_columns > _LINEAR_PROGRAM:
+            return
+        duals = linear_program_duals(self.packing, run)
+        if duals is not None:
+            hard_pass(self.packing, duals, np.empty(self.packing.num_columns), 1)
+            self.take_over(duals)
 
     def offer_greedy(self) -> None:
         """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
@@ -171,12 +189,13 @@ def solve_by(
         A part has no complete cover, or none was found.
     """
     # without a solution at the time limit there would be nothing to return: the bound gets a share of the time
-    duals = dual_bound(
-        packing, run=Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
-    )
+    share = Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
+    duals = dual_bound(packing, run=share)
     parts = split_components(packing, duals, np.arange(packing.num_columns))
     for part in parts:
         part.offer_greedy()
+        if not part.closed and not share.should_stop():
+            part.sharpen(share)
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
     done = len(parts)

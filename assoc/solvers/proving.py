@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.solvers.bounds import certified_bound, dual_bound, reduced_costs
+from assoc.solvers.bounds import dual_bound
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.feasibility import infeasible
 from assoc.solvers.metaheuristic import Part, complete, split_part
@@ -86,11 +86,9 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
 
 def _sharpen(part: Part, run: Run) -> list[Part]:
     """Ascend anew, with time enough at every temperature, on a part that the reduction left open."""
-    duals = dual_bound(part.packing, run=run)
-    bound = certified_bound(part.packing, duals)
-    if bound > part.bound:
-        part.bound, part.duals = bound, duals
-        part.reduced = reduced_costs(part.packing, duals)
+    part.take_over(dual_bound(part.packing, run=run))
+    if not part.closed and not run.should_stop():
+        part.sharpen(run)
     return (None if part.closed else split_part(part, share=0.9)) or [part]
 
 

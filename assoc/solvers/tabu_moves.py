@@ -14,12 +14,18 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.local_search import Cover, insert, insertion_gain, penalised
-from assoc.solvers.metaheuristic import Part
+from assoc.solvers.max_min_ants import random_cover
+from assoc.solvers.metaheuristic import Part, incomplete
 
 if TYPE_CHECKING:
     from assoc.solvers.tabu import TabuParameters
 
 Floats = NDArray[np.float64]
+
+# every third restart is from a new solution, the others from the best
+_FRESH = 3
+# new solutions of which the best is taken
+_COVERS = 12
 
 
 class TabuSearch:
@@ -30,16 +36,24 @@ class TabuSearch:
         self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
         self.until = np.zeros(part.packing.num_columns, dtype=np.int64)
         self.clock = 1
+        self.restarts = 0
         self.owner: NDArray[np.int32] | None = None if part.best is None else part.best.copy()
 
     def iterate(self, part: Part, rng: np.random.Generator) -> None:
         """Some moves, then exact sub-steps on the best solution they met."""
         packing, p = part.packing, self.parameters
+        forced = -1
         if self.owner is None:
-            self.owner = part.best.copy() if part.best is not None else Cover.empty(packing).owner
+            self.owner = self._afresh(part, rng)
         elif part.best is not None and part.stalled and part.stalled % p.restart == 0:
-            self.owner = part.best.copy()
+            self.restarts += 1
             self.until[:] = 0
+            if self.restarts % _FRESH == 0:
+                # far from the best, where no chain of moves from it leads
+                self.owner = self._afresh(part, rng)
+            else:
+                self.owner = part.best.copy()
+                forced = self._force(part, rng)
         best = self.owner.copy()
         self.clock = _moves(
             packing.cols,
@@ -54,6 +68,7 @@ class TabuSearch:
             p.moves,
             p.tenure,
             part.temperature,
+            forced,
             rng,
         )
         weight = part.polish(best)
@@ -62,6 +77,41 @@ class TabuSearch:
             weight += part.improve(best, rng, p.clusters)
             if part.offer(best, weight):
                 self.owner = best
+
+
+    def _afresh(self, part: Part, rng: np.random.Generator) -> NDArray[np.int32]:
+        """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
+        best, least = part.best, np.inf
+        for number in range(_COVERS):
+            owner = random_cover(part, self.weights, 2.0 ** (number % 6), rng)
+            weight = part.polish(owner)
+            if weight - part.bound > part.tolerance:
+                weight += part.improve(owner, rng, self.parameters.clusters)
+            part.offer(owner, weight)
+            if weight < least and not incomplete(part, owner):
+                best, least = owner, weight
+            if part.closed:
+                break
+        return Cover.empty(part.packing).owner if best is None else best.copy()
+
+    def _force(self, part: Part, rng: np.random.Generator) -> int:
+        """Return a column to insert and hold: on a row that costs much more than its multiplier allows.
+
+        The excess of the present solution over the bound is the sum of the reduced costs of its columns and
+        of -u over its uncovered rows: where a term is large, something better is near.
+        """
+        assert self.owner is not None
+        packing, owner = part.packing, self.owner
+        excess = np.where(owner >= 0, part.reduced[owner], -part.duals) + 1e-3 * part.temperature
+        excess = np.maximum(excess, 0.0)
+        row = int(rng.choice(excess.size, p=excess / excess.sum()))
+        columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
+        columns = columns[columns != owner[row]]
+        if columns.size == 0:
+            return -1
+        reduced = part.reduced[columns]
+        likely = np.exp(-(reduced - reduced.min()) / part.temperature)
+        return int(rng.choice(columns, p=likely / likely.sum()))
 
 
 @njit
@@ -78,9 +128,13 @@ def _moves(
     moves: int,
     tenure: int,
     temperature: float,
+    forced: int,
     rng: Any,
 ) -> int:
-    """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that."""
+    """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
+
+    A ``forced`` column is inserted first and held for a third of the moves.
+    """
     num, num_sensors = cols.shape
     gain = np.empty(num)
     for j in range(num):
@@ -89,24 +143,28 @@ def _moves(
     ejected = np.empty(num_sensors, np.int32)
     current = 0.0
     record = 0.0
-    for _ in range(moves):
+    for move in range(moves):
         clock += 1
-        chosen = -1
+        held = forced if 3 * move < moves else -1
+        chosen = forced if move == 0 else -1
         least = np.inf
-        for j in range(num):
+        for j in range(num if chosen < 0 else 0):
             if gain[j] < least and (until[j] < clock or current + gain[j] < record - 1e-9):
                 inside = False
                 for s in range(num_sensors):
                     if cols[j, s] >= 0:
                         inside = owner[cols[j, s]] == j
                         break
+                for s in range(num_sensors):
+                    if held >= 0 and cols[j, s] >= 0 and owner[cols[j, s]] == held:
+                        inside = True
                 if not inside:
                     least = gain[j]
                     chosen = j
         if chosen < 0:
             # everything is tabu: a random column is forced in
             chosen = rng.integers(0, num)
-            if owner[_first(cols, chosen)] == chosen:
+            if owner[_first(cols, chosen)] == chosen or chosen == held:
                 continue
         current += gain[chosen]
         count = 0

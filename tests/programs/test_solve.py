@@ -165,3 +165,34 @@ def test_on_a_terminal_the_table_is_drawn(scene_file):
     assert process.wait(60) == 0
     text = shown.decode()
     assert "─" in text and "associating" in text and "lower bound" in text
+
+
+def test_kbest_ranks_every_scan(run, scene_file, tmp_path):
+    json_file, csv_file = tmp_path / "o.json", tmp_path / "o.csv"
+    done = run("assoc.solve", scene_file, "--kbest", 3, "--scans", "0:2", "--json", json_file, "--csv", csv_file)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[0].split()[:2] == ["scan", "rank"]
+    content = json.loads(json_file.read_text())
+    assert (content["solver"], content["parameters"]) == ("kbest", {"k": 3})
+    scene = assoc.Scene.load(scene_file)
+    rows = table(csv_file)
+    assert [(row["scan"], row["rank"]) for row in rows] == [(s, r) for s in "01" for r in "123"]
+    for number, scan in enumerate(content["scans"]):
+        expected = assoc.kbest(assoc.build_problem(scene, number), 3)
+        assert [one["cost"] for one in scan["ranked"]] == pytest.approx([one.cost for one in expected])
+        assert [one["rank"] for one in scan["ranked"]] == [1, 2, 3]
+        assert scan["cost"] == scan["ranked"][0]["cost"] == float(rows[3 * number]["cost"])
+        assert scan["ranked"][2]["tuples"] == expected[2].tuples.tolist()
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["--kbest", "0"], "--kbest: expected a whole number >= 1, got '0'"),
+        (["--kbest", "2", "--solver", "aco"], "--kbest: ranks by itself and takes no --solver"),
+    ],
+)
+def test_kbest_refuses(run, scene_file, words, message):
+    done = run("assoc.solve", scene_file, *words)
+    assert done.returncode == 2
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1

@@ -1,0 +1,52 @@
+"""Multipliers from the linear program itself, by HiGHS's simplex or interior point method.
+
+Where the smoothed ascent (bounds.py) ends a little below the LP bound, as it does on scenes full of ghosts,
+that little can be most of the gap, and everything that follows is paid for by it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.solvers.packing import Packing
+from assoc.solvers.run import Run
+
+# columns from which the interior point method is quicker than the dual simplex method
+_LARGE = 15_000
+
+
+def linear_program_duals(packing: Packing, run: Run) -> NDArray[np.float64] | None:
+    """Return optimal multipliers of the LP relaxation, shape (R,), or None if they cannot be had in time.
+
+    Rounding may leave reduced costs a little negative: ``bounds.certified_bound`` charges for that.
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_array
+
+    num, num_sensors = packing.cols.shape
+    rows = packing.cols.ravel()
+    used = rows >= 0
+    columns = np.repeat(np.arange(num), num_sensors)[used]
+    matrix = csr_array((np.ones(columns.size), (rows[used], columns)), shape=(packing.num_rows, num))
+    slack = packing.slack
+    free, must = np.flatnonzero(slack), np.flatnonzero(~slack)
+    left = run.remaining()
+    answer = linprog(
+        packing.weights,
+        A_ub=matrix[free] if free.size else None,
+        b_ub=np.ones(free.size) if free.size else None,
+        A_eq=matrix[must] if must.size else None,
+        b_eq=np.ones(must.size) if must.size else None,
+        bounds=(0.0, None),
+        method="highs-ipm" if num > _LARGE else "highs-ds",
+        options={"time_limit": max(left, 0.0)} if left < np.inf else {},
+    )
+    if answer.status != 0:
+        return None
+    duals = np.zeros(packing.num_rows)
+    if free.size:
+        duals[free] = np.minimum(answer.ineqlin.marginals, 0.0)
+    if must.size:
+        duals[must] = answer.eqlin.marginals
+    return duals
