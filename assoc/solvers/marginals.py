@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.complete import Complete
+from assoc.solvers.front import _limit
 from assoc.solvers.kbest import checked_k, rank
 from assoc.solvers.partition import log_partition
+from assoc.solvers.run import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,14 +35,14 @@ class Marginals:
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Share of the tuple's solutions in the weight of the k best.
+        Share of the tuple's solutions in the weight of the k best of its cluster.
     lower, upper : float arrays, shape (T,)
         The probability among all solutions lies between.
     unseen : float
-        Share of the whole weight that solutions beyond the k best can have at most: the width of each
-        interval.
-    solutions : tuple of Solution
-        The k best.
+        Share of the weight that solutions beyond the k best can have at most, in the cluster where that is
+        largest: the width of the widest interval.
+    listed : int
+        Solutions that were listed, of all clusters together.
     """
 
     tuples: NDArray[np.int32]
@@ -47,7 +50,7 @@ class Marginals:
     lower: Floats
     upper: Floats
     unseen: float
-    solutions: tuple[Solution, ...]
+    listed: int
 
     def to_frame(self) -> pd.DataFrame:
         """One row per tuple that can have a probability: the sensors' indices, probability, lower, upper."""
@@ -66,9 +69,10 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     problem : AssignmentProblem
         Costs are negative log likelihood ratios, so that a solution weighs exp(-cost).
     k : int, default 100
-        Solutions to list.
+        Solutions to list for each cluster of tuples (``problem.components()``); clusters are independent, so
+        that k of each say more than any number of the whole.
     time_limit : float, optional
-        Seconds for the ranking; with fewer solutions proved the intervals are wider.
+        Seconds for the rankings; with fewer solutions proved the intervals are wider.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
 
     Notes
     -----
-    With all solutions x of cost c(x),
+    With all solutions x of a cluster and their costs c(x),
 
         P(t) = sum_{x contains t} exp(-c(x)) / sum_x exp(-c(x)).
 
@@ -97,30 +101,64 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     a = 1 is the plain partition function, a = 0 the number of solutions times the weight of the next; U is
     the least of several.
     """
-    # one more than is listed: its cost bounds all that are not
-    ranking = rank(problem, checked_k(k) + 1, time_limit)
-    listed = ranking.solutions[:k]
-    rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
-    best = min(solution.cost for solution in listed)
-    weights = np.exp(best - np.array([solution.cost for solution in listed]))
-    total = float(weights.sum())
+    checked_k(k)
+    run = Run(np.random.default_rng(0), time_limit=_limit(time_limit))
     tuples, place = np.unique(problem.tuples, axis=0, return_inverse=True)
-    own = np.zeros(len(tuples))
-    for solution, weight in zip(listed, weights, strict=True):
-        own[place.reshape(-1)[solution.indices]] += weight
-    others = _others(problem, ranking.columns, listed, rest)
-    # what every listed solution has, it has with certainty up to the others; sums lose digits
-    own = np.minimum(own, total)
+    place = place.reshape(-1)
+    probability, lower, upper = np.ones((3, len(tuples)))
+    unseen, listed = 0.0, 0
+    for cluster, which in _clusters(problem):
+        left = None if time_limit is None else max(run.remaining(), 1e-3)
+        own, share, count = _of_cluster(cluster, k, left)
+        listed += count
+        unseen = max(unseen, share)
+        # tuples that are listed twice are one: each solution has it once, at whichever place
+        total = np.bincount(place[which], own, len(tuples))
+        touched = np.unique(place[which])
+        probability[touched] = np.minimum(total[touched], 1.0)
+        lower[touched] = probability[touched] * (1.0 - share)
+        upper[touched] = np.minimum(lower[touched] + share, 1.0)
+    return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed)
+
+
+def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
+    """Independent clusters as problems of their own, small ones first, and the rows of their tuples.
+
+    A single measurement that no tuple connects has nothing to decide and is left out. Without dummies the
+    measurements of the smallest sensor bind all clusters together.
+    """
+    if not problem.dummy:
+        yield problem, np.arange(problem.num_tuples)
+        return
+    for which in sorted(problem.components(), key=len):
+        tuples = problem.tuples[which]
+        columns, sizes = [], []
+        for column in tuples.T:
+            used, number = np.unique(column, return_inverse=True)
+            number = number.reshape(-1)
+            # index 0 stays the dummy, whether it occurs or not
+            columns.append(number if used[0] == 0 else number + 1)
+            sizes.append(int(np.count_nonzero(used)))
+        if sum(sizes) > 1:
+            yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
+
+
+def _of_cluster(problem: AssignmentProblem, k: int, time_limit: float | None) -> tuple[Floats, float, int]:
+    """Each tuple's share in the weight of the k best, the share of the unseen rest, and how many are listed."""
+    # one more than is listed: its cost bounds all that are not
+    ranking = rank(problem, k + 1, time_limit)
+    solutions = ranking.solutions[:k]
+    rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
+    best = min(solution.cost for solution in solutions)
+    weights = np.exp(best - np.array([solution.cost for solution in solutions]))
+    total = float(weights.sum())
+    own = np.zeros(problem.num_tuples)
+    for solution, weight in zip(solutions, weights, strict=True):
+        own[solution.indices] += weight
+    others = _others(problem, ranking.columns, solutions, rest)
     share = others / (total + others) if others < np.inf else 1.0
-    lower = own / total * (1.0 - share)
-    return Marginals(
-        tuples=tuples.astype(np.int32),
-        probability=own / total,
-        lower=lower,
-        upper=np.minimum(lower + share, 1.0),
-        unseen=share,
-        solutions=tuple(listed),
-    )
+    # what every listed solution has, it has with certainty up to the others; sums lose digits
+    return np.minimum(own / total, 1.0), share, len(solutions)
 
 
 def _others(problem: AssignmentProblem, columns: Complete, listed: list[Solution], rest: float) -> float:
