@@ -48,7 +48,7 @@ class AcoParameters(Parameters):
     beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
     rho: float = field(default=0.9, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
     iterations: int = field(default=1000, metadata={"help": "cycles on one component at the most"})
-    patience: int = field(default=60, metadata={"help": "cycles without improvement before a component is left"})
+    patience: int = field(default=150, metadata={"help": "cycles without improvement before a component is left"})
     visibility: str = field(
         default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
     )

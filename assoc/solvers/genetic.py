@@ -39,7 +39,7 @@ class GeneticParameters(Parameters):
     tournament: int = field(default=2, metadata={"help": "a parent is the best of so many"})
     mutation: float = field(default=0.05, metadata={"help": "share of a child's tuples that are given up"})
     iterations: int = field(default=1000, metadata={"help": "generations on one component at the most"})
-    patience: int = field(default=60, metadata={"help": "generations without improvement before a component is left"})
+    patience: int = field(default=150, metadata={"help": "generations without improvement before a component is left"})
     clusters: int = field(default=10, metadata={"help": "exact sub-steps on each child"})
 
     def __post_init__(self) -> None:

@@ -6,6 +6,8 @@ that little can be most of the gap, and everything that follows is paid for by i
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,11 @@ def linear_program_duals(packing: Packing, run: Run) -> NDArray[np.float64] | No
 
     Rounding may leave reduced costs a little negative: ``bounds.certified_bound`` charges for that.
     """
-    from scipy.optimize import linprog
+    from scipy import optimize
     from scipy.sparse import csr_array
+
+    # its stubs cannot follow which of the optional arguments are None
+    linprog: Any = optimize.linprog
 
     num, num_sensors = packing.cols.shape
     rows = packing.cols.ravel()

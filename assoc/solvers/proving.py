@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from assoc.solvers.bounds import dual_bound
 from assoc.solvers.branch_and_bound import Search
+from assoc.solvers.breeding import Breeding
 from assoc.solvers.feasibility import infeasible
+from assoc.solvers.genetic import GeneticParameters
 from assoc.solvers.metaheuristic import Part, complete, split_part
 from assoc.solvers.packing import Packing
 from assoc.solvers.reduction import Reduction
@@ -26,7 +28,8 @@ _TURNS = 3
 class _Task:
     part: Part
     search: Search | None = None
-    heuristic: TabuSearch | None = None
+    heuristics: tuple[TabuSearch, Breeding] | None = None
+    improvements: int = 0
     turns: int = 0
 
     @property
@@ -126,14 +129,18 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
 
 
 def _search_better(task: _Task, run: Run) -> bool:
-    """One iteration of tabu search and exact sub-steps on the incumbent; whether it became better."""
+    """One iteration of a metaheuristic and exact sub-steps on the incumbent; whether it became better.
+
+    Tabu search and breeding take turns: they get stuck in different places.
+    """
     part = task.part
     if part.best is None or part.packing.num_rows < _LARGE:
         return False
-    if task.heuristic is None:
-        task.heuristic = TabuSearch(part, TabuParameters())
+    if task.heuristics is None:
+        task.heuristics = TabuSearch(part, TabuParameters()), Breeding(part, GeneticParameters())
     before = part.weight
-    task.heuristic.iterate(part, run.rng)
+    task.heuristics[task.improvements % 2].iterate(part, run.rng)
+    task.improvements += 1
     part.refine(run, TabuParameters.clusters)
     part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
     return part.stalled == 0

@@ -35,7 +35,7 @@ class TabuParameters(Parameters):
     tenure: int = field(default=7, metadata={"help": "moves for which an ejected tuple may not return"})
     moves: int = field(default=100, metadata={"help": "moves in one iteration"})
     iterations: int = field(default=1000, metadata={"help": "iterations on one component at the most"})
-    patience: int = field(default=60, metadata={"help": "iterations without improvement before a component is left"})
+    patience: int = field(default=150, metadata={"help": "iterations without improvement before a component is left"})
     restart: int = field(default=5, metadata={"help": "iterations without improvement before a restart"})
     clusters: int = field(default=10, metadata={"help": "exact sub-steps at the end of an iteration"})
 

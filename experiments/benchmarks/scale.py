@@ -33,8 +33,8 @@ def measure(targets: int, seed: int) -> dict[str, float | str]:
     from experiments.instances import scenes
 
     with one_core():
-        for warm in (0, 1):
-            assoc.assign(assoc.build_problem(scenes.radar_field(50, warm), 0), time_limit=LIMIT)
+        for warm, few in ((0, 50), (1, 50), (2, 300), (3, 1_000)):
+            assoc.assign(assoc.build_problem(scenes.radar_field(few, warm), 0), time_limit=LIMIT)
         scene = scenes.radar_field(targets, seed)
         start = time.perf_counter()
         problem = assoc.build_problem(scene, 0)
