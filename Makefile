@@ -1,6 +1,7 @@
 # make demo   simulate the three-radar scene, associate it with the ant colony, print the result
 # make test   install what the tests need and run them
 # make lint   ruff, mypy and import-linter
+# make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
@@ -9,7 +10,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint bench bench-quick clean
+.PHONY: demo test lint docs bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -24,6 +25,9 @@ lint: $(VENV)/.installed-lint
 	$(PY) -m mypy
 	$(VENV)/bin/lint-imports
 
+docs: $(VENV)/.installed-docs
+	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 bench: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks
 
@@ -31,7 +35,7 @@ bench-quick: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks --quick
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo docs/_build
 
 # the stamps make a changed pyproject.toml (a new dependency, say) reach an environment that exists already
 $(VENV)/.created:
@@ -49,4 +53,8 @@ $(VENV)/.installed-test: $(VENV)/.installed
 
 $(VENV)/.installed-lint: $(VENV)/.installed
 	$(PIP) -e ".[test,lint]"
+	@touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(PIP) -e ".[docs]"
 	@touch $@

@@ -72,7 +72,7 @@ class Adaptive:
 class FuzzyAdaptiveEKF(Filter[Adaptive]):
     """An EKF with Q scaled by q and R by r, which fuzzy rules infer from the last innovations.
 
-    The rules' input is |sum of the last W innovations|^2 / W, each component in units of its standard
+    The rules' input is ``|sum of the last W innovations|^2`` / W, each component in units of its standard
     deviation, averaged over the components: equation 36 of the paper for W = 1. Its mean is 1 when the
     filter is right; with W > 1 it grows only with innovations of one direction, as those of a manoeuvre, and
     not with large noise.

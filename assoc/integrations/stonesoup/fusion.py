@@ -44,8 +44,8 @@ class FusionFeeder(DetectionFeeder):  # type: ignore[misc]
         Of the scan yielded last.
     """
 
-    reader: Reader = Property(doc="Source of detections: a reader, a simulator, or a feeder that merges several.")
-    sensors: Sequence[AdaptedSensor] = Property(doc="What detects: see :func:`assoc.integrations.stonesoup.adapt`.")
+    reader: Reader = Property(doc="A reader, a simulator, or a feeder that merges several readers.")
+    sensors: Sequence[AdaptedSensor] = Property(doc="What detects, each made by `adapt`.")
     solver: str = Property(default="exact", doc="One of ``assoc.solvers.names()``.")
     parameters: Mapping[str, Any] = Property(default_factory=dict, doc="Parameters of the solver.")
     seed: int = Property(default=0, doc="The same seed gives the same fusion.")

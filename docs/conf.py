@@ -1,0 +1,46 @@
+"""Sphinx configuration: `make docs`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+# tutorials run in kernels of their own: they must find this tree too
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+
+import assoc  # noqa: E402
+
+project = "assoc"
+author = copyright = "The assoc developers"
+version = release = assoc.__version__
+
+extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb"]
+exclude_patterns = ["_build", "benchmarks-quick.md"]
+nitpicky = False
+
+html_theme = "furo"
+html_title = f"assoc {release}"
+html_show_sphinx = False
+html_theme_options = {"navigation_with_keys": True}
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 3
+
+# tutorials are executed at every build, and an error in one fails the build
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+nb_output_stderr = "remove-warn"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+# an extra that is not installed takes only its own details from the page
+OPTIONAL = ("stonesoup", "ordered_set", "matplotlib", "plotly", "optuna", "distributed")
+autodoc_mock_imports = [name for name in OPTIONAL if not find_spec(name)]

@@ -1,0 +1,69 @@
+"""A solver of one's own: registered once, it is one of them; its answers are checked and certified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.solvers import Outcome, Parameters, registry
+
+
+@dataclass(frozen=True)
+class LastParameters(Parameters):
+    skip: int = field(default=0, metadata={"help": "columns to leave out"})
+
+    def __post_init__(self) -> None:
+        self._require(self.skip >= 0, "skip", "a whole number of at least 0")
+
+
+def last_first(packing, parameters, run):
+    """Columns from the last to the first, each taken if it still fits."""
+    chosen, used = [], set()
+    for column in range(packing.num_columns - 1 - parameters.skip, -1, -1):
+        rows = {int(r) for r in packing.cols[column] if r >= 0}
+        if not rows & used:
+            chosen.append(column)
+            used |= rows
+    return Outcome(np.array(chosen, dtype=np.int64), 1)
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setattr(registry, "_REGISTERED", {})
+    assoc.solvers.register("last", LastParameters, last_first)
+
+
+PROBLEM = assoc.AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], [-3.0, -2.0, -4.0, -0.5], [2, 2])
+
+
+def test_it_is_called_by_name_checked_and_bounded(registered):
+    assert assoc.solvers.names()[-1] == "last"
+    solution = assoc.assign(PROBLEM, "last")
+    assert sum(solution.tuples[:, 0]) == 3  # both measurements of the first sensor, each once
+    assert -5.0 - 1e-9 <= solution.lower_bound <= solution.cost
+    assert solution.solver == "last" and solution.parameters == {"skip": 0}
+    nothing = assoc.assign(PROBLEM, "last", skip=4)
+    assert nothing.cost == 0.0 and len(nothing.tuples) == 4
+
+
+def test_wrong_parameters_and_taken_names_are_refused(registered):
+    with pytest.raises(InvalidInputError, match="skip: expected a whole number"):
+        assoc.assign(PROBLEM, "last", skip=-1)
+    with pytest.raises(InvalidInputError, match="skpi: no parameter of solver 'last'; did you mean skip"):
+        assoc.assign(PROBLEM, "last", skpi=1)
+    for name in ("last", "exact"):
+        with pytest.raises(InvalidInputError, match=f"the name '{name}' is taken"):
+            assoc.solvers.register(name, LastParameters, last_first)
+
+
+def test_an_infeasible_answer_is_caught(registered):
+    def everything(packing, parameters, run):
+        return Outcome(np.arange(packing.num_columns), 1)
+
+    assoc.solvers.register("all", LastParameters, everything)
+    with pytest.raises(InfeasibleError, match="does not use every measurement exactly once"):
+        assoc.assign(PROBLEM, "all")
