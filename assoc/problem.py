@@ -254,7 +254,9 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
 def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> None:
     if tuples.shape[0] == 0:
         return
-    low, high = tuples.min(axis=0), tuples.max(axis=0)
+    # sensor by sensor in memory: numpy is slow along the short axis of a long array
+    columns = np.ascontiguousarray(tuples.T)
+    low, high = columns.min(axis=1), columns.max(axis=1)
     least = 0 if dummy else 1
     for sensor in np.flatnonzero((low < least) | (high > sizes)):
         column = tuples[:, sensor]
@@ -263,8 +265,9 @@ def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: b
             f"tuples: row {row}, sensor {sensor + 1}: index {column[row]} is outside {least}..{sizes[sensor]}"
         )
     if dummy and low.max() == 0:
-        empty = ~tuples.any(axis=1)
-        if empty.any():
+        used = np.bitwise_or.reduce(columns, axis=0)
+        if not used.all():
+            empty = used == 0
             raise InvalidInputError(f"tuples: row {int(np.argmax(empty))} is the all-dummy tuple")
 
 
@@ -294,7 +297,7 @@ def _with_singletons(
     total = int(sizes.sum())
     offsets = np.cumsum(sizes) - sizes
     present = np.zeros(total, dtype=bool)
-    singles = np.flatnonzero(np.count_nonzero(tuples, axis=1) == 1)
+    singles = np.flatnonzero((np.ascontiguousarray(tuples.T) != 0).sum(axis=0, dtype=np.int16) == 1)
     if singles.size:
         listed = tuples[singles]
         sensor = np.argmax(listed != 0, axis=1)

@@ -33,6 +33,8 @@ LEVELS = 11
 PASSES = 1000
 # over-relaxation: the kernel takes total ** 1.5 as total * sqrt(total)
 RELAXATION = 1.5
+# columns of a reduced cost of more temperatures than this weigh less than 1e-5
+NEAR = 12.0
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
@@ -186,7 +188,7 @@ def _hard_sweeps(slack: Any, row_ptr: Any, row_cols: Any, duals: Floats, reduced
 
 
 @njit
-def gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
+def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
     """Sum of ``values[places[first:end]]`` in four strands, which do not wait for each other."""
     a = b = c = d = 0.0
     k = first
@@ -219,42 +221,82 @@ def _smooth_passes(
     passes: int,
 ) -> int:
     scale = np.empty(slack.size)
-    _reduced_costs(cols, weights, duals, reduced)
+    near_ptr = np.empty(slack.size + 1, np.int64)
+    near_cols = np.empty(row_cols.size, np.int32)
+    place = np.empty(weights.size, np.int32)
     visits = 0
     for c in range(row_start.size - 1):
         t = temperature[c]
         top, end = row_start[c], row_start[c + 1]
-        for j in range(col_start[c], col_start[c + 1]):
-            primal[j] = math.exp(min(-reduced[j] / t, 500.0))
-        for r in range(top, end):
-            slack_primal[r] = math.exp(min(duals[r] / t, 500.0)) if slack[r] else 0.0
-        scale[top:end] = 1.0
-        for sweep in range(passes):
-            # the first passes at a new temperature are plain: over-relaxing far from the fixed point can diverge
-            plain = sweep < 5
-            worst = 0.0
+        done = 0
+        worst = 1.0
+        while done < passes and worst >= 0.01:
+            # columns far above the minimum weigh nothing: they are left out and looked at again now and then
+            _near(
+                cols, weights, row_ptr, row_cols, duals, reduced, top, end, col_start[c], col_start[c + 1],
+                NEAR * t, place, near_ptr, near_cols,
+            )  # fmt: skip
+            for j in range(col_start[c], col_start[c + 1]):
+                if place[j] >= 0:
+                    primal[place[j]] = math.exp(min(-reduced[j] / t, 500.0))
             for r in range(top, end):
-                first, last = row_ptr[r], row_ptr[r + 1]
-                total = slack_primal[r] + gathered_sum(primal, row_cols, first, last)
-                if not 1e-200 < total < 1e200:
-                    continue
-                worst = max(worst, abs(total - 1.0))
-                # total ** -1.5, where over-relaxed; the logarithm is left to the end of the passes
-                factor = 1.0 / total if plain else 1.0 / (total * math.sqrt(total))
-                if 1e-3 < total < 1e3 and 1e-200 < scale[r] < 1e200:
-                    scale[r] *= factor
-                else:
-                    duals[r] -= t * math.log(total) * (1.0 if plain else RELAXATION)
-                slack_primal[r] *= factor
-                for k in range(first, last):
-                    primal[row_cols[k]] *= factor
+                slack_primal[r] = math.exp(min(duals[r] / t, 500.0)) if slack[r] else 0.0
+            scale[top:end] = 1.0
+            stop = min(passes, max(10, 2 * done))
+            while done < stop and worst >= 0.01:
+                # the first passes at a new temperature are plain: over-relaxing far from the fixed point can diverge
+                plain = done < 5
+                worst = 0.0
+                for r in range(top, end):
+                    first, last = near_ptr[r], near_ptr[r + 1]
+                    total = slack_primal[r] + _gathered_sum(primal, near_cols, first, last)
+                    if not 1e-200 < total < 1e200:
+                        continue
+                    worst = max(worst, abs(total - 1.0))
+                    # total ** -1.5, where over-relaxed; the logarithm is left to the end of the passes
+                    factor = 1.0 / total if plain else 1.0 / (total * math.sqrt(total))
+                    if 1e-3 < total < 1e3 and 1e-200 < scale[r] < 1e200:
+                        scale[r] *= factor
+                    else:
+                        duals[r] -= t * math.log(total) * (1.0 if plain else RELAXATION)
+                    slack_primal[r] *= factor
+                    for k in range(first, last):
+                        primal[near_cols[k]] *= factor
+                visits += near_ptr[end] - near_ptr[top]
+                done += 1
             visits += row_ptr[end] - row_ptr[top]
-            if worst < 0.01:
-                break
-        for r in range(top, end):
-            if scale[r] != 1.0:
-                duals[r] += t * math.log(scale[r])
+            for r in range(top, end):
+                if scale[r] != 1.0:
+                    duals[r] += t * math.log(scale[r])
     return visits
+
+
+@njit
+def _near(
+    cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, duals: Floats, reduced: Floats, top: int, end: int,
+    first: int, last: int, limit: float, place: Any, near_ptr: Any, near_cols: Any,
+) -> None:  # fmt: skip
+    """Number the columns of a component whose reduced cost is at most ``limit``, and list them by row."""
+    count = 0
+    for j in range(first, last):
+        value = weights[j]
+        for s in range(cols.shape[1]):
+            r = cols[j, s]
+            if r >= 0:
+                value -= duals[r]
+        reduced[j] = value
+        place[j] = -1
+        if value <= limit:
+            place[j] = first + count
+            count += 1
+    position = row_ptr[top]
+    for r in range(top, end):
+        near_ptr[r] = position
+        for k in range(row_ptr[r], row_ptr[r + 1]):
+            # written whether near or not: no branch to predict
+            near_cols[position] = place[row_cols[k]]
+            position += place[row_cols[k]] >= 0
+    near_ptr[end] = position
 
 
 @njit

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from assoc.solvers.run import Outcome, Parameters, Run
 
 if TYPE_CHECKING:
+    from assoc.solvers.local_search import Cover
     from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
@@ -194,7 +195,7 @@ class _Search:
         from assoc.solvers.cluster_search import ClusterSearch
         from assoc.solvers.local_search import Cover
 
-        if self.columns is None or self._gap_closed():
+        if self.columns is None or self._gap_closed() or self.run.should_stop():
             return
         search = ClusterSearch.of(self.packing, self.best)
         cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.place, self.columns)))
@@ -245,12 +246,26 @@ class _Search:
         if columns is None:
             return
         cover = Cover.of(self.packing, columns)
-        if self.parameters.polish:
-            cover.improve()
-            improve(self.packing, cover.owner)
-        if cover.weight < self.weight:
-            self.weight = cover.weight
-            self.columns = self.place[cover.columns()]
+        better = self._offer(cover)
+        if not self.parameters.polish:
+            return
+        if better:
+            # it may be good enough as it is, for the gap asked for or for the caller
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed() or self.run.should_stop():
+                return
+        cover.improve()
+        improve(self.packing, cover.owner)
+        self._offer(cover)
+
+    def _offer(self, cover: Cover) -> bool:
+        """Keep a cover if it is the best so far; whether it was."""
+        weight = cover.weight
+        if weight >= self.weight:
+            return False
+        self.weight = weight
+        self.columns = self.place[cover.columns()]
+        return True
 
     def _drop_columns(self) -> bool:
         """Drop what no better solution can use; True if that was worth it."""

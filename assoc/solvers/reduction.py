@@ -20,7 +20,7 @@ from assoc.solvers import bounds
 from assoc.solvers.bounds import _component_bounds, _hard_sweeps, _reduced_costs, _smooth_passes, _spread
 from assoc.solvers.local_search import _add_greedily, _improve, penalised_weights
 from assoc.solvers.metaheuristic import TOLERANCE, Part, split_components
-from assoc.solvers.packing import Packing, _assemble
+from assoc.solvers.packing import Packing, _assemble, _find
 from assoc.solvers.run import Run
 
 Floats = NDArray[np.float64]
@@ -146,10 +146,14 @@ def _reduce(
         )  # fmt: skip
         temperature = temperature * bounds.COOLING
         counts[0] += 1
-        any_closed = False
+        kept = 0
+        for j in range(keep.size):
+            kept += keep[j]
+        # assembling anew pays when much is gone; till then what is closed is closed again at every temperature
+        if 3 * kept >= 2 * keep.size and counts[0] < passes.size:
+            continue
         for c in range(alive.size):
             if not alive[c]:
-                any_closed = True
                 closed[counts[2]] = bound[c], weight[c]
                 counts[2] += 1
                 for r in range(row_start[c], row_start[c + 1]):
@@ -157,11 +161,6 @@ def _reduce(
                     if j >= 0 and _first_row(cols, j) == r:
                         closed_columns[counts[1]] = origin[j]
                         counts[1] += 1
-        kept = 0
-        for j in range(keep.size):
-            kept += keep[j]
-        if 3 * kept >= 2 * keep.size and not any_closed:
-            continue
         # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
         for r in range(rows.size):
             proof[rows[r]] = hard[r]
@@ -261,6 +260,38 @@ def _cover_weights(weights: Floats, cols: Any, row_start: Any, owner: Any) -> Fl
 
 
 @njit
+def _best_of_both(
+    cols: Any, weights: Floats, top: int, end: int, owner: Any, other: Any, parent: Any, gain: Floats
+) -> float:  # fmt: skip
+    """Take over from another complete cover of a component what is lighter there; the weight then.
+
+    Where two covers differ, the columns of both fall into groups that share no row: each can be exchanged alone.
+    """
+    for r in range(top, end):
+        parent[r] = r
+        gain[r] = 0.0
+    for r in range(top, end):
+        for j in (owner[r], other[r]):
+            if j >= 0:
+                one, two = _find(parent, r), _find(parent, _first_row(cols, j))
+                parent[max(one, two)] = min(one, two)
+    for r in range(top, end):
+        root = _find(parent, r)
+        if owner[r] >= 0 and _first_row(cols, owner[r]) == r:
+            gain[root] += weights[owner[r]]
+        if other[r] >= 0 and _first_row(cols, other[r]) == r:
+            gain[root] -= weights[other[r]]
+    total = 0.0
+    for r in range(top, end):
+        root = _find(parent, r)
+        if gain[root] > 0.0:
+            owner[r] = other[r]
+        if owner[r] >= 0 and _first_row(cols, owner[r]) == r:
+            total += weights[owner[r]]
+    return total
+
+
+@njit
 def _compare(
     cols: Any,
     weights: Floats,
@@ -282,6 +313,7 @@ def _compare(
     new_weight = _cover_weights(weights, cols, row_start, new_owner)
     keep = np.zeros(weights.size, np.bool_)
     alive = np.ones(bound.size, np.bool_)
+    parent, gain = np.empty(slack.size, np.int32), np.empty(slack.size)
     for c in range(bound.size):
         top, end = row_start[c], row_start[c + 1]
         complete = True
@@ -289,7 +321,9 @@ def _compare(
             if not slack[r] and new_owner[r] < 0:
                 complete = False
                 break
-        if complete and new_weight[c] < weight[c]:
+        if complete and weight[c] < np.inf:
+            weight[c] = _best_of_both(cols, weights, top, end, owner, new_owner, parent, gain)
+        elif complete:
             weight[c] = new_weight[c]
             owner[top:end] = new_owner[top:end]
         if new_bound[c] >= bound[c]:
