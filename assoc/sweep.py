@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from assoc._extras import check_extra
 from assoc._program import Parser, run
 from assoc.errors import InvalidInputError
 
@@ -27,13 +28,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _sweep(words: list[str]) -> None:
     parser = _parser()
     given = {name: value for name, value in vars(parser.parse_args(words)).items() if value is not None}
+    if "report" in given:
+        check_extra("plotly", "report")
+    given["words"] = words
     if "summary" in given:
         _summary(given)
         return
     from assoc.sweeps.options import check_outputs, read
 
     options = read(given)
-    check_outputs(options.output, given.get("csv"))
+    check_outputs(options.output, given.get("csv"), given.get("report"))
     if options.tune is not None:
         _tune(options, given)
         return
@@ -50,7 +54,7 @@ def _parser() -> Parser:
         prog="assoc.sweep",
         usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
         "       python -m assoc.sweep --config STUDY.toml\n"
-        "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE]",
+        "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE] [--report FILE]",
         description="Run a design of solver parameters over scenes and problems, with repeats, and keep every\n"
         "result as it comes. The same command again runs only what is missing.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -81,19 +85,21 @@ def _parser() -> Parser:
     add("--target", metavar="NAME", help="of --tune: gap (mean gap) or time (time to optimum); default gap")
     add("--summary", metavar="FOLDER", help="print the table of a study and run nothing")
     add("--csv", metavar="FILE", help="write the table as CSV")
+    add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (assoc[report])")
     add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
     return parser
 
 
 def _summary(given: dict[str, Any]) -> None:
-    strange = sorted({*given} - {"summary", "csv", "plot", "files"})
+    strange = sorted({*given} - {"summary", "csv", "plot", "report", "words", "files"})
     if strange or given["files"]:
         raise InvalidInputError(
-            f"--summary: runs nothing and goes only with --plot and --csv, not with {(strange or given['files'])[0]}"
+            "--summary: runs nothing and goes only with --plot, --csv and --report, "
+            f"not with {(strange or given['files'])[0]}"
         )
     from assoc.sweeps.options import check_outputs
 
-    check_outputs(None, given.get("csv"))
+    check_outputs(None, given.get("csv"), given.get("report"))
     _report(given["summary"], given, None)
 
 
@@ -122,6 +128,10 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
 
         for path in draw(folder, frame):
             print(f"drawn: {path}")
+    if "report" in given:
+        from assoc.plotting.report import write_sweep_report
+
+        write_sweep_report(given["report"], folder, frame, words=given["words"])
 
 
 def _tune(options: Any, given: dict[str, Any]) -> None:
@@ -130,7 +140,7 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
     with _watched(options.output) as progress:
         report = options.tuning(progress)
     print_report(report)
-    if "plot" in given or "csv" in given:
+    if {"plot", "csv", "report"} & {*given}:
         _report(options.output, given, None)
 
 

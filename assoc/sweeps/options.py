@@ -207,9 +207,10 @@ def _of_file(file: str, key: str, value: Any) -> Any:
     return float(value) if key in _NUMBERS else value
 
 
-def check_outputs(folder: str | None, csv: str | None) -> None:
+def check_outputs(folder: str | None, *files: str | None) -> None:
     """Refuse before the work what could not be written after it."""
     if folder is not None and os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
-    if csv is not None:
-        check_output(csv, folder)
+    for file in files:
+        if file is not None:
+            check_output(file, folder)

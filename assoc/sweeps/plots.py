@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -199,11 +200,7 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     Figure
         The same.
     """
-    best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
-    traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
-    excess = traces["cost"] - traces["best"]
-    # what rounding leaves is no excess
-    traces = traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
+    traces = with_excess(frame, traces)
     summary = summarize(frame).sort_values(["gap", "time"], kind="stable")
     names = varied(frame)
     several = frame["solver"].nunique() > 1
@@ -212,11 +209,9 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     for ax, column, label in zip(axes, ("iteration", "seconds"), ("iteration", "ms"), strict=True):
         # drawn from the last to the first, so that the best lie on top
         for place, row in reversed([*enumerate(summary.to_dict("records"))]):
-            words = [str(row["solver"])] if several or not names else []
-            words += [f"{n} {short(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if place < _MOST_CURVES:
-                style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": ", ".join(words)}
+                style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": title(row, names, several)}
             curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
             ax.set_xscale("log")
@@ -231,10 +226,42 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     return figure
 
 
+def title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -> str:
+    """Return what a setting (a row of a summary) is called among the others of its study."""
+    words = [str(row["solver"])] if several or not names else []
+    words += [f"{n} {short(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
+    return ", ".join(words)
+
+
+def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
+    """Traces of the runs of a frame, with the cost above the best known of their scan in the column ``excess``."""
+    best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
+    traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
+    excess = traces["cost"] - traces["best"]
+    # what rounding leaves is no excess
+    return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
+
+
 def curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
-    """Draw the mean excess of runs over iterations or seconds; a run counts with what it has found by then."""
-    if traces.empty:
-        return
+    """Draw the mean excess of runs over iterations or milliseconds; see `mean_excess`."""
+    if not traces.empty:
+        ax.plot(*mean_excess(traces, column), drawstyle="steps-post", **style)
+
+
+def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Average the excess of runs over time; a run counts with what it has found by then.
+
+    Parameters
+    ----------
+    traces : DataFrame
+        Of `with_excess`, not empty.
+    column : {"iteration", "seconds"}
+
+    Returns
+    -------
+    at, excess : arrays (n,)
+        Iterations, or milliseconds; mean cost above the best known.
+    """
     factor = 1e3 if column == "seconds" else 1.0
     at = np.maximum(factor * traces[column].to_numpy(dtype=float), 1e-3)
     run = traces.groupby(["scene", "scan", "repeat"]).ngroup().to_numpy()
@@ -247,7 +274,7 @@ def curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
     for rows in np.split(order, starts[1:]):
         place = np.searchsorted(at[rows], grid, side="right") - 1
         total += excess[rows][np.maximum(place, 0)]
-    ax.plot(grid, total / starts.size, drawstyle="steps-post", **style)
+    return grid, total / starts.size
 
 
 def short(value: Any) -> str:

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
-from assoc.plotting.report.association import write_association_report
-from assoc.plotting.report.page import check_report
+import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["check_report", "write_association_report"]
+if TYPE_CHECKING:
+    from assoc.plotting.report.association import write_association_report
+    from assoc.plotting.report.sweep import write_sweep_report
+
+_HOME = {"write_association_report": "association", "write_sweep_report": "sweep"}
+
+__all__ = ["write_association_report", "write_sweep_report"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'assoc.plotting.report' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"assoc.plotting.report.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
