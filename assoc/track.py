@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from assoc._extras import check_extra
 from assoc._program import (
     Option,
     Parser,
@@ -83,6 +84,9 @@ def _track(words: list[str]) -> None:
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
     _check_output(parsed["output"], file)
+    if parsed["report"]:
+        check_extra("plotly", "report")
+        _check_output(parsed["report"], file)
     settings: dict[str, Any] = {
         "solver": solver,
         "solver_parameters": given(own, parsed),
@@ -100,6 +104,12 @@ def _track(words: list[str]) -> None:
     elapsed = time.perf_counter() - started
     with writing:
         table.to_csv(parsed["output"])
+    if parsed["report"]:
+        from assoc.plotting.report import write_tracking_report
+
+        used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
+        more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+        write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
     _report(parsed["output"], count, tracker, table, scene, elapsed)
 
 
@@ -129,6 +139,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
     add("-o", "--output", required=True, metavar="FILE", help="the tracks to write (.csv)")
+    add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (assoc[report])")
     add("--tracker", metavar="NAME", help="one of the trackers below")
     add("--solver", metavar="NAME", help="solver of the assignment problems (default exact)")
     add(

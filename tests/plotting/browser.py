@@ -40,7 +40,7 @@ def opened() -> Iterator[Any]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = selenium.Chrome(options=options, service=Service(driver, log_output=os.devnull))
     try:
-        browser.set_page_load_timeout(60)
+        browser.set_page_load_timeout(240)  # machines can be busy
         yield browser
     finally:
         browser.quit()

@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from assoc.plotting.report.association import write_association_report
     from assoc.plotting.report.sweep import write_sweep_report
+    from assoc.plotting.report.tracking import write_tracking_report
 
-_HOME = {"write_association_report": "association", "write_sweep_report": "sweep"}
+_HOME = {
+    "write_association_report": "association",
+    "write_sweep_report": "sweep",
+    "write_tracking_report": "tracking",
+}
 
-__all__ = ["write_association_report", "write_sweep_report"]
+__all__ = ["write_association_report", "write_sweep_report", "write_tracking_report"]
 
 
 def __getattr__(name: str) -> Any:

@@ -9,23 +9,15 @@ from typing import Any
 from assoc._html import escape
 from assoc.association import Association, ScanAssociation
 from assoc.errors import InvalidInputError
-from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
+from assoc.plotting.report.page import CONTROLS, Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 
 Source = Scene | AssignmentProblem
 
-_CONTROLS = """<div class="controls">
-<div class="buttons"><button type="button" id="before" aria-label="scan before">&#9664;</button>
-<button type="button" id="play" aria-pressed="false">Play</button>
-<button type="button" id="after" aria-label="next scan">&#9654;</button></div>
-<input type="range" id="slider" min="0" max="0" value="0" step="1" aria-label="scan">
-<output id="slider-label" for="slider"></output>
-</div>"""
-
 _SCENE = (
-    _CONTROLS
+    CONTROLS
     + """<div class="controls"><div class="buttons" id="dimensions" hidden>
 <button type="button" id="plan" aria-pressed="true">Plan</button>
 <button type="button" id="space" aria-pressed="false">3-D</button></div>

@@ -21,6 +21,15 @@ from assoc._html import escape, script_json
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
+CONTROLS = """<div class="controls">
+<div class="buttons"><button type="button" id="before" aria-label="before">&#9664;</button>
+<button type="button" id="play" aria-pressed="false">Play</button>
+<button type="button" id="after" aria-label="next">&#9654;</button></div>
+<input type="range" id="slider" min="0" max="0" value="0" step="1" aria-label="scan or time">
+<output id="slider-label" for="slider"></output>
+</div>"""
+"""The slider of a report, with its buttons; ``makeSlider`` in core.js moves it."""
+
 
 @dataclass(frozen=True)
 class Page:

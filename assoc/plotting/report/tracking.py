@@ -1,0 +1,244 @@
+"""The report of a tracker: tracks over the truth, a metric over time, the life of each track."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._html import escape
+from assoc.errors import InvalidInputError
+from assoc.metrics import Gospa, Trajectories, gospa_over_time
+from assoc.plotting.places import places
+from assoc.plotting.report.page import CONTROLS, Page, cards, check_report, definitions, made_with, sortable_table
+from assoc.plotting.report.views import plain_numbers
+from assoc.plotting.scene import truth_paths
+from assoc.scene import Scene
+from assoc.sensors import BearingSensor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+GOSPA_CUTOFF = 1_000.0
+
+_NEEDED = ("track_id", "time", "x", "y")
+_INSTANTS = 300
+_MOST_POINTS = 40_000
+_MOST_MEASUREMENTS = 30_000
+
+_SCENE = (
+    CONTROLS
+    + """<div class="controls"><div class="buttons"><button type="button" id="nearer" disabled>Zoom to track</button>
+<button type="button" id="whole">Whole scene</button></div></div>
+<div id="scene-plot" class="plot large"></div><p class="note" id="detail" aria-live="polite"></p>"""
+)
+
+_METRIC = '<div id="metric-plot" class="plot small"></div>'
+_COUNTS = '<div id="counts-plot" class="plot small"></div>'
+
+
+def write_tracking_report(
+    path: str | os.PathLike[str],
+    tracks: pd.DataFrame,
+    scene: Scene | None = None,
+    *,
+    name: str = "",
+    settings: Mapping[str, Any] | None = None,
+    cutoff: float = GOSPA_CUTOFF,
+    words: Sequence[str] | None = None,
+) -> None:
+    """Write tracks as one HTML file that works without a network.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; it appears whole or not at all.
+    tracks : DataFrame
+        Columns track_id, time, x, y (seconds, metres) at least; the others of a tracks.csv are used where they are.
+    scene : Scene, optional
+        Where the tracks were made from; its truth and measurements are drawn, and the truth gives the metric.
+    name : str
+        Heading, where the scene has no name.
+    settings : mapping, optional
+        How the tracker was set, to be shown.
+    cutoff : float
+        Of GOSPA, metres.
+    words : sequence of str, optional
+        The command line of ``python -m assoc.track`` that made it, to be shown.
+
+    Raises
+    ------
+    MissingExtraError
+        plotly is not installed; an ImportError that names the command.
+    InvalidInputError
+        A column is missing, or the file cannot be written.
+    """
+    check_report()
+    missing = [column for column in _NEEDED if column not in tracks.columns]
+    if missing:
+        raise InvalidInputError(f"tracks: the column {missing[0]!r} is missing")
+    frame = tracks.sort_values(["track_id", "time"], kind="stable")
+    if "z" not in frame.columns:
+        frame = frame.assign(z=0.0)
+    truth = {} if scene is None else truth_paths(scene)
+    known = scene is not None and bool(truth)
+    times, values = _gospa(frame, scene, cutoff) if known and scene is not None else (np.zeros(0), [])
+    rows = _lives(frame, values)
+    made = made_with("assoc.track", words)
+    command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
+    shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
+    sections = [("summary", "Summary", _summary(frame, len(rows), values, cutoff))]
+    if len(frame) or known:
+        sections.append(("scene", "Tracks over time", _SCENE))
+    if known:
+        sections.append(("metric", f"GOSPA over time, cutoff {cutoff:g} m", _METRIC))
+    sections += [
+        ("numbers", "Number of tracks over time", _COUNTS),
+        ("life", "Life of the tracks", _table(rows, known)),
+        ("settings", "Settings", f"{command}{shown}<h3>Made with</h3>{definitions(made)}"),
+    ]
+    title = (scene.name if scene is not None else "") or name or "Tracks"
+    data = _data(frame, scene, truth)
+    data["gospa"] = {
+        "times": plain_numbers(times, 6),
+        "distance": plain_numbers([one.distance for one in values], 4),
+        **{part: plain_numbers(np.sqrt([getattr(one, part) for one in values]), 4) for part in Gospa._fields[1:4]},
+    }
+    Page(title, f"{len(rows)} tracks", sections, data, ["tracks.js"]).write(path)
+
+
+def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, list[Gospa]]:
+    found = Trajectories(*(frame[name].to_numpy() for name in ("time", "track_id", ["x", "y", "z"])))
+    return gospa_over_time(Trajectories.from_scene(scene), found, cutoff)
+
+
+def _data(frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array]) -> dict[str, Any]:
+    """Instants of the slider, paths of tracks and targets, measurements of the scans."""
+    reach = np.abs(frame[["x", "y"]].to_numpy(dtype=float)).max() if len(frame) else 0.0
+    decimals = 0 if reach > 20_000 else 1 if reach > 2_000 else 3
+    step = max(1, len(frame) // _MOST_POINTS)
+    paths = []
+    for number_of, track in _by_track(frame):
+        # thinned tracks keep their last point
+        kept = np.unique(np.r_[np.arange(0, len(track), step), len(track) - 1])
+        part = track.iloc[kept]
+        paths.append({"id": number_of, **_path(part["time"], part[["x", "y", "z"]], decimals)})
+    if scene is not None and scene.num_scans <= _INSTANTS:
+        instants = np.unique(scene.times)
+    elif len(frame):
+        instants = np.linspace(frame["time"].min(), frame["time"].max(), min(_INSTANTS, len(frame)))
+    else:
+        instants = np.zeros(0) if scene is None else scene.times[:: max(1, scene.num_scans // _INSTANTS)]
+    return {
+        "instants": plain_numbers(instants, 6),
+        "tracks": paths,
+        "truth": _truth(scene, truth, decimals),
+        "measured": _measured(scene, decimals),
+        "sensors": []
+        if scene is None
+        else [
+            {"name": one.name or f"sensor {s + 1}", "place": plain_numbers(one.position, 1)}
+            for s, one in enumerate(scene.sensors)
+        ],
+    }
+
+
+def _by_track(frame: pd.DataFrame) -> list[tuple[int, pd.DataFrame]]:
+    return [(int(str(name)), rows) for name, rows in frame.groupby("track_id")]
+
+
+def _path(times: Any, where: Any, decimals: int) -> dict[str, Any]:
+    points = np.asarray(where, dtype=float)
+    return {
+        "t": plain_numbers(np.asarray(times, dtype=float), 4),
+        **{axis: plain_numbers(points[:, i], decimals) for i, axis in enumerate("xyz")},
+    }
+
+
+def _truth(scene: Scene | None, truth: Mapping[int, Array], decimals: int) -> list[dict[str, Any]]:
+    if scene is None or scene.truth is None:
+        return []
+    seen: dict[int, list[float]] = {}
+    for time, ids in zip(scene.times, scene.truth.target_ids, strict=True):
+        for target in ids:
+            seen.setdefault(int(target), []).append(float(time))
+    step = max(1, sum(map(len, seen.values())) // _MOST_POINTS)
+    return [
+        {"id": target, **_path(seen[target][::step], path[::step], decimals)} for target, path in truth.items()
+    ]
+
+
+def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
+    """Places that the measurements of each scan name; none where they name only directions, or are too many."""
+    if scene is None:
+        return []
+    count = sum(len(z) for scan in scene.measurements for z in scan)
+    named = [s for s, sensor in enumerate(scene.sensors) if not isinstance(sensor, BearingSensor)]
+    if not named or count > _MOST_MEASUREMENTS:
+        return []
+    middle = float(scene.region[2].mean())
+    found = []
+    for time, scan in zip(scene.times, scene.measurements, strict=True):
+        at = np.concatenate([places(scene.sensors[s], scan[s], middle, 0.0)[:, :2] for s in named])
+        found.append({"t": float(time), "at": plain_numbers(at, decimals)})
+    return found
+
+
+def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]:
+    """What became of each track; and the target that it followed most, where the truth is known."""
+    pairs: dict[int, Counter[int]] = {}
+    for one in values:
+        for target, track in one.pairs.tolist():
+            pairs.setdefault(int(track), Counter())[int(target)] += 1
+    lives = []
+    for number_of, track in _by_track(frame):
+        where, times = track[["x", "y", "z"]].to_numpy(dtype=float), track["time"].to_numpy(dtype=float)
+        length = float(np.linalg.norm(np.diff(where, axis=0), axis=1).sum())
+        began, ended = float(times[0]), float(times[-1])
+        life: dict[str, Any] = {"track": number_of, "first": began, "last": ended, "rows": len(track)}
+        life["started"] = float(track["started"].iloc[0]) if "started" in track else began
+        life["detected"] = float(track["last_detection"].iloc[-1]) if "last_detection" in track else None
+        life["hits"] = int(track["hits"].iloc[-1]) if "hits" in track else None
+        life["score"] = float(track["score"].iloc[-1]) if "score" in track else None
+        life["speed"] = length / (ended - began) if ended > began else None
+        target, share = None, None
+        if number_of in pairs:
+            target, times_paired = pairs[number_of].most_common(1)[0]
+            share = times_paired / len(track)
+        lives.append({**life, "target": target, "share": share})
+    return lives
+
+
+def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
+    columns = [("track", "track", "d"), ("started", "started, s", "g"), ("first", "first row, s", "g")]
+    columns += [("detected", "last detection, s", "g"), ("last", "last row, s", "g"), ("rows", "rows", "d")]
+    columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
+    columns += [("target", "target followed", "d"), ("share", "share of its rows", ".0%")] if known else []
+    used = [one for one in columns if any(life[one[0]] is not None for life in lives) or one[0] == "track"]
+    rows = [
+        [("" if life[key] is None else format(life[key], style), life[key]) for key, _, style in used] for life in lives
+    ]
+    note = '<p class="note">No track was made.</p>' if not lives else ""
+    return note + sortable_table("track-table", [header for _, header, _ in used], rows, link="track")
+
+
+def _summary(frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float) -> str:
+    content = {"Tracks": (f"{count:,}", f"{len(frame):,} rows")}
+    if len(frame):
+        spans = frame.groupby("track_id")["time"].agg(["min", "max"])
+        middle = float((spans["max"] - spans["min"]).median())
+        whole = float(frame["time"].max() - frame["time"].min())
+        content["Median life"] = (f"{middle:.4g} s", f"of {whole:.4g} s")
+    if values:
+        mean = float(np.mean([one.distance for one in values]))
+        content["GOSPA"] = (f"{mean:.4g} m", f"mean over {len(values)} instants, cutoff {cutoff:g} m")
+        notes = {"localisation": "errors of tracks", "missed": "targets without a track", "false": "tracks of nothing"}
+        for part, note in notes.items():
+            value = float(np.mean([getattr(one, part) for one in values])) ** 0.5
+            content[part.capitalize()] = (f"{value:.4g} m", f"part of GOSPA: {note}")
+    return cards(content)

@@ -1,0 +1,110 @@
+"""The report of a tracker: figures against plain readings of the table, and the page in a browser."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.plotting.report import write_tracking_report
+from assoc.scene import Scene
+from assoc.simulation import simulate
+from tests.plotting.browser import DESKTOP, PHONE, complaints, press, screenshot, show
+from tests.plotting.test_association_report import EVIL, data_of, parsed
+
+
+def tracks_of(scene):
+    """Tracks on the targets, 30 m beside; one that is nobody's, for three scans."""
+    rows = [
+        {"track_id": 10 + t, "time": time, "x": p[t, 0] + 30.0, "y": p[t, 1], "z": p[t, 2], "hits": k + 1}
+        for k, (time, p) in enumerate(zip(scene.times, scene.truth.positions, strict=True))
+        for t in range(3)
+    ]
+    rows += [{"track_id": 99, "time": time, "x": 9e4, "y": 9e4, "z": 0.0, "hits": 1} for time in scene.times[2:5]]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    made = simulate("three-radar", 2, scans=30)
+    return Scene(made.sensors, made.times, made.measurements, made.region, made.truth, EVIL)
+
+
+@pytest.fixture(scope="module")
+def page(scene, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "tracks.html"
+    frame = tracks_of(scene).sample(frac=1.0, random_state=0)
+    write_tracking_report(path, frame, scene, settings={"tracker": "none"}, cutoff=100.0, words=["x.npz", EVIL])
+    return path
+
+
+def test_metric_lives_and_paths(page, scene):
+    data = data_of(page)
+    gospa = data["gospa"]
+    assert gospa["times"] == scene.times.tolist() and gospa["missed"] == [0.0] * 30
+    for k in range(30):
+        # three errors of 30 m; a false track costs half the square of the cutoff
+        squares = 3 * 30.0**2 + (100.0**2 / 2 if 2 <= k < 5 else 0.0)
+        assert gospa["distance"][k] == pytest.approx(np.sqrt(squares), rel=1e-3)
+    assert [one["id"] for one in data["tracks"]] == [10, 11, 12, 99] and len(data["truth"]) == 3
+    assert data["tracks"][3]["t"] == scene.times[2:5].tolist()
+    assert data["truth"][1]["x"] == pytest.approx([p[1, 0] for p in scene.truth.positions], abs=0.51)
+    text = " ".join(parsed(page).text)
+    assert "python -m assoc.track" in text and text.count(EVIL) >= 2 and "100%" in text
+    assert sum(tag == "script" for tag, _ in parsed(page).tags) == 3
+
+
+def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
+    frame = tracks_of(scene)[["track_id", "time", "x", "y"]]
+    write_tracking_report(tmp_path / "one.html", frame, name="plots.csv")
+    data = data_of(tmp_path / "one.html")
+    assert data["gospa"]["times"] == [] and data["truth"] == [] and len(data["tracks"]) == 4
+    assert "GOSPA" not in " ".join(parsed(tmp_path / "one.html").text)
+    write_tracking_report(tmp_path / "none.html", frame.iloc[:0])
+    assert "No track was made" in " ".join(parsed(tmp_path / "none.html").text)
+    with pytest.raises(InvalidInputError, match="'y' is missing"):
+        write_tracking_report(tmp_path / "bad.html", frame.drop(columns="y"))
+    assert not (tmp_path / "bad.html").exists()
+
+
+def test_long_recordings_are_thinned(tmp_path):
+    count = 200_000
+    frame = pd.DataFrame({"track_id": np.arange(count) % 50, "time": np.arange(count) * 0.1})
+    frame = frame.assign(x=np.sin(frame["time"]) * 1e5, y=np.cos(frame["time"]) * 1e5)
+    write_tracking_report(tmp_path / "long.html", frame)
+    assert (tmp_path / "long.html").stat().st_size < 8_000_000
+    assert data_of(tmp_path / "long.html")["tracks"][7]["t"][-1] == pytest.approx(frame["time"][count - 50 + 7])
+
+
+def test_the_program_writes_it(tmp_path):
+    simulate("three-radar", 2, scans=6).save(tmp_path / "scene.npz")
+    words = ["scene.npz", "-o", "tracks.csv", "--report", "tracks.html"]
+    command = [sys.executable, "-W", "error", "-m", "assoc.track", *words]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    frame = pd.read_csv(tmp_path / "tracks.csv")
+    data = data_of(tmp_path / "tracks.html")
+    assert {one["id"] for one in data["tracks"]} == {*frame["track_id"]} and len(data["instants"]) == 6
+    assert "python -m assoc.track " + " ".join(words) in " ".join(parsed(tmp_path / "tracks.html").text)
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_it_works_in_a_browser(browser, page, pictures, size):
+    show(browser, page, size)
+    assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"
+    assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
+    assert browser.find_element("tag name", "h1").text == EVIL
+    found = "return document.getElementById('scene-plot').data.find((t) => t.name === 'tracks').text"
+    assert browser.execute_script(found) == ["10", "11", "12"]
+    press(browser, browser.find_elements("css selector", "#track-table tbody tr")[3])
+    # a track that is not there any more takes the slider to its beginning
+    assert browser.execute_script("return document.getElementById('slider').value") == "2"
+    assert browser.execute_script(found) == ["10", "11", "12", "99"]
+    press(browser, browser.find_element("id", "after"))
+    assert "t = 3 s" in browser.find_element("id", "slider-label").text
+    screenshot(browser, pictures / f"tracks-{size[0]}.png")
+    assert complaints(browser) == []
