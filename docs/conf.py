@@ -25,6 +25,8 @@ nitpicky = False
 html_theme = "furo"
 html_title = f"assoc {release}"
 html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["tables.css"]
 html_theme_options = {"navigation_with_keys": True}
 
 myst_enable_extensions = ["colon_fence"]
