@@ -107,6 +107,10 @@ class Bank:
             hits=self.hits + hit,
         )
 
+    def sworn(self) -> Bank:
+        """The same tracks, all confirmed."""
+        return replace(self, confirmed=np.ones(len(self), dtype=np.bool_))
+
     def confirm(self, life_cycle: LifeCycle) -> Bank:
         """Confirm the tracks whose time has come."""
         return replace(self, confirmed=self.confirmed | life_cycle.confirms(self.score, self.detections))

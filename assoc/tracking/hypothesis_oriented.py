@@ -87,6 +87,11 @@ class HypothesisOrientedMHT(Tracker):
         p = np.exp(self._weight - self._weight.max())
         return np.asarray(p / p.sum())
 
+    def _adopt(self, bank: Bank) -> None:
+        super()._adopt(bank)
+        self._history = np.zeros((len(bank), self._history.shape[1]), dtype=np.int32)
+        self._members = [np.arange(len(bank))]
+
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")

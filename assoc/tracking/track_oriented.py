@@ -75,6 +75,11 @@ class TrackOrientedMHT(Tracker):
         rows = np.flatnonzero(self._chosen)
         return self._bank[rows[np.argsort(self._bank.track_id[rows], kind="stable")]]
 
+    def _adopt(self, bank: Bank) -> None:
+        super()._adopt(bank)
+        self._history = np.zeros((len(bank), self._history.shape[1]), dtype=np.int32)
+        self._born, self._chosen = np.full(len(bank), -1), np.ones(len(bank), dtype=np.bool_)
+
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")

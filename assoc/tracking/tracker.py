@@ -19,6 +19,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
+from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.sensors import Sensor
@@ -149,6 +150,39 @@ class Tracker(ABC):
 
     def _current(self) -> Bank:
         return self._bank
+
+    def begin(self, time: float, tracks: Gaussian, score: float = 20.0) -> Array:
+        """Take over targets that are known, from another system or a plan, before the first step.
+
+        Parameters
+        ----------
+        time : float
+            To which the states belong, seconds.
+        tracks : Gaussian
+            Means and covariances in the order of the filter's motion model.
+        score : float
+            What their track scores start with; they are confirmed.
+
+        Returns
+        -------
+        int64 array
+            Their ids.
+
+        Raises
+        ------
+        InvalidInputError
+            The tracker has begun already, or the states have the wrong dimension.
+        """
+        if self._time is not None:
+            raise InvalidInputError("begin: the tracker has begun already")
+        when, states = self._checked_time(time), self.filter.start(tracks)
+        bank = Bank.new(states, self._new_ids(len(tracks)), np.full(len(tracks), float(score)), when)
+        self._time = when
+        self._adopt(bank.sworn())
+        return bank.track_id
+
+    def _adopt(self, bank: Bank) -> None:
+        self._bank = bank
 
     def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
         """Take one scan in.

@@ -132,6 +132,24 @@ def test_scans_without_measurements_and_time_standing_still(kind):
     assert not tracker.tracks and len(ended) == before
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_known_targets_are_taken_over(kind):
+    one = scene()
+    first, last = one.scan(0), one.scan(one.num_scans - 1)
+    velocity = (one.scan(1).truth_positions - first.truth_positions) / (one.times[1] - one.times[0])
+    mean = np.concatenate([first.truth_positions, velocity], axis=1)
+    tracker = kind.for_scene(one)
+    ids = tracker.begin(first.time, filters.Gaussian(mean, np.diag([1e3] * 3 + [1e2] * 3)))
+    assert ids.tolist() == [1, 2, 3] and all(track.confirmed for track in tracker.tracks)
+    run(tracker, one, 1)
+    places = {track.track_id: track.position for track in tracker.tracks if track.confirmed}
+    assert set(places) == {1, 2, 3}
+    for target, i in zip(last.truth_ids, ids, strict=True):
+        assert np.linalg.norm(places[int(i)] - last.truth_positions[target]) < 250
+    with pytest.raises(InvalidInputError, match="begun already"):
+        tracker.begin(0.0, filters.Gaussian(mean, np.eye(6)))
+
+
 def some_filters():
     cv = filters.ConstantVelocity(20.0, kind="continuous")
     turn = filters.CoordinatedTurn(20.0, 0.05)

@@ -1,0 +1,1 @@
+"""Scenes and peers of the tracker experiments."""

@@ -1,0 +1,93 @@
+"""What a multi-sensor tracker must reach on the three-radar scene, and its time with a thousand targets."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc import simulation
+from assoc.scene import Scene, Truth
+from assoc.tracking import MultiSensorTracker, Tracker
+from experiments.trackers.running import through
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+NEAR = 400.0
+"""A track within this distance of a target is that target's; further from every target it is false, metres."""
+
+
+class ThreeRadar(NamedTuple):
+    """Sums over seeds of the three-radar scene."""
+
+    late: int
+    """Targets without a confirmed track after their second scan."""
+    lost: int
+    """Instants after the second scan at which a target has no confirmed track."""
+    instants: int
+    false: int
+    """Confirmed tracks that were far from every target when they were confirmed."""
+    multi: float
+    """Mean squared position error of tracks."""
+    best: float
+    """The same of the best radar alone."""
+
+
+def three_radar(seed: int, scans: int, single: bool) -> ThreeRadar:
+    """One seed; `single` also tracks with each radar alone, the same tracker with one sensor."""
+    scene = simulation.simulate("three-radar", seed, scans=scans)
+    run = through(MultiSensorTracker.for_scene(scene), scene)
+    late = lost = instants = false = 0
+    known: set[int] = set()
+    errors = []
+    for k in range(scene.num_scans):
+        ids, places = run.confirmed[k]
+        truth = scene.scan(k).truth_positions
+        assert truth is not None
+        away = np.linalg.norm(truth[:, None] - places[None], axis=2)
+        near = away.min(axis=1, initial=np.inf)
+        if k >= 1:
+            late += int((near > NEAR).sum()) if k == 1 else 0
+            lost += int((near > NEAR).sum())
+            instants += len(near)
+            errors.append(near[near <= NEAR])
+        for column, i in enumerate(ids.tolist()):
+            if i not in known:
+                known.add(i)
+                false += bool(away[:, column].min() > NEAR)
+    multi = float(np.mean(np.concatenate(errors) ** 2))
+    best = min(_alone(scene, s) for s in range(len(scene.sensors))) if single else np.nan
+    return ThreeRadar(late, lost, instants, false, multi, best)
+
+
+def _alone(scene: Scene, s: int) -> float:
+    """Mean squared position error with one radar, where it has a track of the target."""
+    truth = scene.truth
+    assert truth is not None and truth.sources is not None
+    one = Scene(
+        sensors=[scene.sensors[s]],
+        times=scene.times,
+        measurements=[[scan[s]] for scan in scene.measurements],
+        region=scene.region,
+        truth=Truth(truth.target_ids, truth.positions, [[scan[s]] for scan in truth.sources]),
+    )
+    run = through(MultiSensorTracker.for_scene(one), one)
+    errors = []
+    for k in range(1, one.num_scans):
+        away = np.linalg.norm(truth.positions[k][:, None] - run.confirmed[k][1][None], axis=2)
+        near = away.min(axis=1, initial=np.inf)
+        errors.append(near[near <= 2 * NEAR])
+    return float(np.mean(np.concatenate(errors) ** 2))
+
+
+def thousand(kind: type[Tracker], targets: int, scans: int, seed: int) -> tuple[Array, Array, int]:
+    """Many targets, three radars: CPU seconds and confirmed tracks of each scan, targets tracked at the end."""
+    scene = simulation.simulate(
+        "crowd", seed, targets=targets, scans=scans, sensor="radar", width=10_000.0, height=5_000.0, noise=100.0
+    )
+    run = through(kind.for_scene(scene), scene)
+    truth = scene.scan(scans - 1).truth_positions
+    assert truth is not None
+    away = np.linalg.norm(truth[:, None] - run.confirmed[-1][1][None], axis=2)
+    counts = np.array([len(ids) for ids, _ in run.confirmed])
+    return run.seconds, counts, int((away.min(axis=1, initial=np.inf) < 3 * 100.0).sum())

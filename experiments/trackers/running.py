@@ -1,0 +1,64 @@
+"""Running our trackers and keeping what is judged: tracks, decisions, time per scan."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.filters import ConstantVelocity, Gaussian, KalmanFilter
+from assoc.metrics import Trajectories
+from assoc.scene import Scene
+from assoc.tracking import Initiation, Tracker, TrackTable
+from experiments.trackers.plane import ACCELERATION, SPEED, START_DEVIATION, Plane
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A tracker's way through a scene.
+
+    Attributes
+    ----------
+    tracks : Trajectories
+        The confirmed tracks.
+    confirmed : list over scans of (ids (n,), positions (n, 3))
+    seconds : array (K,)
+        CPU time of each scan.
+    """
+
+    tracks: Trajectories
+    confirmed: list[tuple[Array, Array]]
+    seconds: Array
+
+
+def through(tracker: Tracker, scene: Scene, scans: int | None = None) -> Run:
+    """Take a scene in, scan by scan."""
+    table, confirmed, seconds = TrackTable(), [], []
+    for k in range(scene.num_scans if scans is None else scans):
+        scan = scene.scan(k)
+        # CPU time: what else the machine does is not the tracker's
+        begin = time.process_time()
+        tracker.step(scan.time, scan.measurements)
+        seconds.append(time.process_time() - begin)
+        tracks = [track for track in tracker.tracks if track.confirmed]
+        table.add(tracks, tracker.filter.motion.position)
+        places = np.array([track.position for track in tracks]).reshape(-1, 3)
+        confirmed.append((np.array([track.track_id for track in tracks], dtype=np.int64), places))
+    return Run(Trajectories(*table.arrays()), confirmed, np.array(seconds))
+
+
+def in_plane(kind: type[Tracker], plane: Plane, **options: Any) -> Iterator[tuple[float, Array]]:
+    """Our tracker on a plane: CPU seconds and positions of confirmed tracks (n, 2) of each scan."""
+    motion = ConstantVelocity(ACCELERATION, dimensions=2, kind="continuous")
+    tracker = kind([plane.sensor], KalmanFilter(motion), initiation=Initiation(speed=SPEED), **options)
+    tracker.begin(0.0, Gaussian(plane.start, np.diag(START_DEVIATION**2)))
+    for k, z in enumerate(plane.measurements, start=1):
+        begin = time.process_time()
+        tracker.step(float(k), [z])
+        elapsed = time.process_time() - begin
+        yield elapsed, np.array([track.position[:2] for track in tracker.tracks if track.confirmed]).reshape(-1, 2)

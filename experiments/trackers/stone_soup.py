@@ -1,0 +1,87 @@
+"""Stone Soup's multi-frame assignment and global nearest neighbour on the same detections.
+
+Both are given the targets at time 0, as ours are, and neither starts or ends tracks.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from stonesoup.dataassociator.mfa import MFADataAssociator
+from stonesoup.dataassociator.neighbour import GNNWith2DAssignment
+from stonesoup.hypothesiser.mfa import MFAHypothesiser
+from stonesoup.hypothesiser.probability import PDAHypothesiser
+from stonesoup.models.measurement.linear import LinearGaussian
+from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
+from stonesoup.predictor.kalman import KalmanPredictor
+from stonesoup.types.detection import Detection
+from stonesoup.types.mixture import GaussianMixture
+from stonesoup.types.numeric import Probability
+from stonesoup.types.state import GaussianState, TaggedWeightedGaussianState
+from stonesoup.types.track import Track
+from stonesoup.updater.kalman import KalmanUpdater
+
+from experiments.trackers.plane import ACCELERATION, NOISE, START_DEVIATION, Plane
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_START = datetime(2026, 1, 1)
+
+
+def _parts(plane: Plane, gate: float) -> tuple[Any, Any, Any]:
+    axis = ConstantVelocity(ACCELERATION**2)
+    model = LinearGaussian(ndim_state=4, mapping=(0, 2), noise_covar=NOISE**2 * np.eye(2))
+    predictor = KalmanPredictor(CombinedLinearGaussianTransitionModel([axis, axis]))
+    updater = KalmanUpdater(model)
+    sensor = plane.sensor
+    hypothesiser = PDAHypothesiser(
+        predictor,
+        updater,
+        clutter_spatial_density=sensor.false_alarm_rate / sensor.volume,
+        prob_detect=Probability(sensor.detection_probability),
+        prob_gate=Probability(gate),
+    )
+    return model, updater, hypothesiser
+
+
+def _scans(plane: Plane, model: Any) -> Iterator[tuple[datetime, set[Any]]]:
+    for k, measured in enumerate(plane.measurements, start=1):
+        when = _START + timedelta(seconds=k)
+        yield when, {Detection(z[:, None], timestamp=when, measurement_model=model) for z in measured}
+
+
+def multi_frame(plane: Plane, window: int, gate: float) -> Iterator[tuple[float, Array]]:
+    """Multi-frame assignment: seconds and estimated positions (T, 2) of each scan."""
+    model, updater, inner = _parts(plane, gate)
+    associator = MFADataAssociator(MFAHypothesiser(inner), slide_window=window)
+    covariance = np.diag((START_DEVIATION**2)[[0, 2, 1, 3]])
+    tracks = set()
+    for x in plane.start:
+        prior = TaggedWeightedGaussianState(x[[0, 2, 1, 3], None], covariance, _START, weight=Probability(1), tag=[])
+        tracks.add(Track([GaussianMixture([prior])]))
+    for when, detections in _scans(plane, model):
+        started = time.process_time()
+        for track, hypotheses in associator.associate(tracks, detections, when).items():
+            components = [updater.update(one) if one else one.prediction for one in hypotheses]
+            track.append(GaussianMixture(components))
+        elapsed = time.process_time() - started
+        best = [max(track.state.components, key=lambda one: float(one.weight)) for track in tracks]
+        yield elapsed, np.array([np.asarray(one.mean, dtype=float)[[0, 2], 0] for one in best]).reshape(-1, 2)
+
+
+def nearest(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
+    """Global nearest neighbour by 2-D assignment of likelihoods: seconds and positions of each scan."""
+    model, updater, hypothesiser = _parts(plane, gate)
+    associator = GNNWith2DAssignment(hypothesiser)
+    covariance = np.diag((START_DEVIATION**2)[[0, 2, 1, 3]])
+    tracks = {Track(GaussianState(x[[0, 2, 1, 3], None], covariance, _START)) for x in plane.start}
+    for when, detections in _scans(plane, model):
+        started = time.process_time()
+        for track, one in associator.associate(tracks, detections, when).items():
+            track.append(updater.update(one) if one else one.prediction)
+        elapsed = time.process_time() - started
+        yield elapsed, np.array([np.asarray(track.mean, dtype=float)[[0, 2], 0] for track in tracks]).reshape(-1, 2)

@@ -1,0 +1,50 @@
+import math
+
+import numpy as np
+import pytest
+
+from assoc.costs import track_gating
+from assoc.costs.track_scores import log_birth, sequential_threshold
+from assoc.filters.base import Expected
+
+
+@pytest.mark.parametrize("angular", [(False, False, False), (False, True, False)])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_pair_within_the_gate_is_left_out(angular, seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    tracks, found, gate = 120, 150, 16.0
+    h = np.stack(
+        [rng.uniform(0, 1000, tracks), rng.uniform(-math.pi, math.pi, tracks), rng.normal(0, 1, tracks)], axis=1
+    )
+    z = np.stack([rng.uniform(0, 1000, found), rng.uniform(-math.pi, math.pi, found), rng.normal(0, 1, found)], axis=1)
+    root = rng.normal(0, 1, (tracks, 3, 3)) * np.array([20.0, 0.05, 0.1])[:, None]
+    S = root @ root.transpose(0, 2, 1)
+    v = z[None] - h[:, None]
+    if angular[1]:
+        v[..., 1] -= 2 * math.pi * np.round(v[..., 1] / (2 * math.pi))
+    square = np.einsum("bmi,bij,bmj->bm", v, np.linalg.inv(S), v)
+    wanted = set(zip(*np.nonzero(square <= gate), strict=True))
+    assert wanted
+    boxed = set(zip(*track_gating.near_pairs(Expected(h, S), z, angular, gate), strict=True))
+    monkeypatch.setattr(track_gating, "_BRUTE", 0)
+    rows, columns = track_gating.near_pairs(Expected(h, S), z, angular, gate)
+    assert set(zip(rows, columns, strict=True)) == boxed >= wanted
+    assert (np.diff(rows * 1000 + columns) > 0).all()
+    # the box is not everything
+    assert len(boxed) < 0.3 * tracks * found
+    inside = track_gating.within(Expected(h, S), rows, z, columns, angular, gate)
+    assert inside.all()
+
+
+def test_birth_integrated_over_a_linear_position():
+    rng = np.random.default_rng(0)
+    root = rng.normal(0, 5, (3, 3))
+    P = root @ root.T + np.eye(3)
+    # the integral of exp(-x' P^-1 x / 2) over space, times birth rate / volume
+    found = log_birth(P[None], 1e9, 0.2)[0]
+    assert found == pytest.approx(0.5 * np.linalg.slogdet(2 * math.pi * P)[1] + math.log(0.2 / 1e9))
+    assert log_birth(1e30 * P[None], 1e9, 0.2)[0] == pytest.approx(math.log(0.2))
+
+
+def test_walds_threshold():
+    assert sequential_threshold(1e-6, 0.5) == pytest.approx(math.log(0.5e6))
