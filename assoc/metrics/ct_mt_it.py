@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from assoc.errors import InvalidInputError
+from assoc.metrics.plot_identity import identity_after_each
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
-MEMORY = 6
-"""A track's identity is the majority of its last plots, of this many."""
-
 
 @dataclass(frozen=True, eq=False)
 class CtMtIt:
@@ -68,18 +64,12 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
             f"windows, sources, tracks and confirmed must have one shape (n,), got {shapes}"
         )
     window, source, track, sure = columns
-    recent: dict[int, deque[int]] = {}
+    correct = sure.astype(bool) & (source >= 0) & (identity_after_each(source, track) == source)
     previous: dict[int, int] = {}
-    correct = np.zeros(len(window), dtype=bool)
     kept = np.zeros(len(window), dtype=bool)
-    for row in range(len(window)):
-        aircraft, taker = int(source[row]), int(track[row])
-        if taker >= 0:
-            plots = recent.setdefault(taker, deque(maxlen=MEMORY))
-            plots.append(aircraft)
-            correct[row] = aircraft >= 0 and bool(sure[row]) and _majority(plots) == aircraft
-            kept[row] = aircraft >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
+    for row, (aircraft, taker) in enumerate(zip(source.tolist(), track.tolist(), strict=True)):
         if aircraft >= 0:
+            kept[row] = taker >= 0 and bool(sure[row]) and previous.get(aircraft) == taker
             previous[aircraft] = taker
     real, given = source >= 0, track >= 0
     names, index = np.unique(window, return_inverse=True)
@@ -103,12 +93,3 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
 def _mean(rate: Array) -> float:
     known = rate[~np.isnan(rate)]
     return float(known.mean()) if len(known) else float("nan")
-
-
-def _majority(plots: deque[int]) -> int:
-    """The aircraft of most plots, of equals the most recent; -1 if there are only false plots."""
-    votes = Counter(aircraft for aircraft in plots if aircraft >= 0)
-    if not votes:
-        return -1
-    most = max(votes.values())
-    return next(aircraft for aircraft in reversed(plots) if votes.get(aircraft, 0) == most)

@@ -18,7 +18,9 @@ from assoc.metrics import (
     association_accuracy,
     ct_mt_it,
     identity,
+    identity_after_each,
     label_switches,
+    plot_identity_switches,
     rmse,
     summarise,
     track_rmse,
@@ -98,6 +100,29 @@ def test_label_switches():
     assert label_switches(sources, [7, 8, -1, 9, 7, -1, 6]) == 1
     with pytest.raises(InvalidInputError, match="one shape|both have shape"):
         label_switches([0, 1], [0])
+
+
+def test_identity_switches_of_plots():
+    every = np.ones(40, dtype=bool)
+    sources = np.tile([0, 1], 20)
+    true = sources + 5
+    assert plot_identity_switches(sources, true, every) == 0
+    # one plot each gone astray is no switch
+    stray = true.copy()
+    stray[20:22] = [6, 5]
+    assert plot_identity_switches(sources, stray, every) == 0
+    assert label_switches(sources, stray) == 4
+    # a swap gives two, a track begun anew one, also after a pause
+    swapped = np.where(np.arange(40) < 20, true, 6 - sources)
+    assert plot_identity_switches(sources, swapped, every) == 2
+    anew = np.where((np.arange(40) >= 24) & (sources == 0), 9, true)
+    anew[16:24] = -1
+    assert plot_identity_switches(sources, anew, every) == 1
+    # what is not confirmed does not count
+    assert plot_identity_switches(sources, swapped, np.arange(40) < 20) == 0
+    assert identity_after_each([-1, 0, 1, 1, -1, 1], [3, 3, 3, 3, -1, 4]).tolist() == [-1, 0, 1, 1, -1, 1]
+    with pytest.raises(InvalidInputError, match="one shape"):
+        plot_identity_switches(sources, true, every[:3])
 
 
 def test_ct_mt_it_by_hand():
