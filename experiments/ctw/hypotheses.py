@@ -9,7 +9,8 @@ import numpy as np
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.recordings import Window
 from assoc.sensors import Radar2D
-from assoc.tracking import Initiation, LifeCycle, TrackOrientedMHT
+from assoc.tracking import Decision, HypothesisOrientedMHT, Initiation, LifeCycle, TrackOrientedMHT
+from experiments.ctw.judging import Taken
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -22,14 +23,21 @@ class HypothesisTracker:
     radar : Radar2D
     clock : float, optional
         Seconds from window to window; without it each plot has its own time stamp.
+    kind : type
+        `TrackOrientedMHT` or `HypothesisOrientedMHT`.
     process_noise : float
         m/s^1.5.
     options
-        Further settings of `TrackOrientedMHT`.
+        Further settings of the tracker.
     """
 
     def __init__(
-        self, radar: Radar2D, clock: float | None = None, process_noise: float = 10.0, **options: Any
+        self,
+        radar: Radar2D,
+        clock: float | None = None,
+        kind: type[TrackOrientedMHT | HypothesisOrientedMHT] = TrackOrientedMHT,
+        process_noise: float = 5.0,
+        **options: Any,
     ) -> None:
         reach = float(radar.field_of_view[0, 1])
         settings: dict[str, Any] = {
@@ -37,19 +45,36 @@ class HypothesisTracker:
             "region": np.array([[-reach, reach], [-reach, reach], [0.0, 0.0]]),
             "life_cycle": LifeCycle(deletion_time=60.0, false_probability=1e-3),
             "initiation": Initiation(speed=200.0, birth_rate=0.1),
+            "depth": 4,
             **options,
         }
         motion = ConstantVelocity(process_noise, kind="continuous", dimensions=2)
-        self.tracker = TrackOrientedMHT([radar], ExtendedKalmanFilter(motion), **settings)
+        self.tracker = kind([radar], ExtendedKalmanFilter(motion), **settings)
         self.clock = clock
-        self.steps = 0
+        self.rows: list[Array] = []
+        self.final: list[Decision] = []
 
     def take(self, window: Window) -> tuple[Array, Array]:
         """Take a window; return the track of each plot (-1: a false plot) and whether it is confirmed then."""
-        self.steps += 1
+        self.rows.append(window.rows)
         if self.clock is None:
             done = self.tracker.step(float(window.times[-1]), [window.measurements], times=[window.times])
         else:
-            done = self.tracker.step(self.steps * self.clock, [window.measurements])
-        ids = done.assigned[0]
-        return np.where(ids > 0, ids, -1), done.confirmed[0]
+            done = self.tracker.step(len(self.rows) * self.clock, [window.measurements])
+        self.final.extend(done.final)
+        return _tracks(done), done.confirmed[0]
+
+    def decided(self) -> Taken:
+        """What the tracker has decided for good about every window, with the depth's delay."""
+        final = sorted([*self.final, *self.tracker.flush()], key=lambda one: one.scan)
+        return Taken(
+            np.repeat([one.scan for one in final], [len(one.assigned[0]) for one in final]),
+            np.concatenate([self.rows[one.scan] for one in final]),
+            np.concatenate([_tracks(one) for one in final]),
+            np.concatenate([one.confirmed[0] for one in final]),
+        )
+
+
+def _tracks(done: Decision) -> Array:
+    ids = done.assigned[0]
+    return np.where(ids > 0, ids, -1)
