@@ -6,7 +6,7 @@ The problem: tracks of nearly constant velocity; position measurements for the K
 elevation) for the others, N = 100 for the ensemble. The others take one track at a time; ours takes all tracks in
 one call, which is how its filters are meant to be used, and, stated apart, one track at a time: all steps of its
 recording in one call, and a step a call. Each row is a prediction and an update together, the median of repeated runs,
-in which the packages take turns, so that what else the machine does meets all of them.
+in which the packages take turns. Times are the processor's: they do not count what else the machine does.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ KINDS: dict[str, tuple[Callable[[ConstantVelocity], Filter[Any]], Sensor]] = {
 
 
 def microseconds(step: Callable[[], object], repeats: int, rounds: int = 1) -> float:
-    """Return the time of a step in microseconds, the median of the rounds."""
+    """Return the processor time of a step in microseconds, the median of the rounds."""
     step()
     times = []
     for _ in range(rounds):
-        begin = time.perf_counter()
+        begin = time.process_time()
         for _ in range(repeats):
             step()
-        times.append((time.perf_counter() - begin) / repeats)
+        times.append((time.process_time() - begin) / repeats)
     return 1e6 * float(np.median(times))
 
 
@@ -234,7 +234,7 @@ def draw(figure: Any, shown: Any) -> None:
         values = [row[name] for row in shown.values()]
         bars = axes.bar(np.arange(len(shown)) + 0.17 * i, values, 0.16, label=name)
         axes.bar_label(bars, [f"{value:.3g}" for value in values], fontsize=7)
-    axes.set(yscale="log", ylabel="microseconds a prediction and update")
+    axes.set(yscale="log", ylabel="microseconds of processor time")
     axes.set_xticks(np.arange(len(shown)) + 0.34, list(shown))
     axes.set_ylim(0.3, 10 * max(max(row.values()) for row in shown.values()))
     axes.legend(ncols=3, fontsize=8)

@@ -28,7 +28,7 @@ from assoc.filters import (
 from experiments.claims import Claim
 from experiments.filters.b1 import ratio_interval
 from experiments.filters.command import main, rmse, rmse_interval
-from experiments.filters.manoeuvres import SCENARIOS, Batch, errors, imm, smoothed_errors
+from experiments.filters.manoeuvres import SCENARIOS, Batch, Flight, errors, imm, smoothed_errors
 from experiments.filters.tune_fuzzy import fuzzy_filter
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -47,6 +47,15 @@ def fixed(turns: bool, quick: bool) -> Iterator[tuple[str, Motion]]:
         yield f"velocity {noise:g}", ConstantVelocity(noise)
     for noise in (1.0, 4.0) if quick else (0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0):
         yield f"acceleration {noise:g}", ConstantAcceleration(noise)
+
+
+def straight_flight(flight: Flight, settled: float = 5.0) -> Array:
+    """Whether the target flies straight, and has for `settled` seconds, at each of the errors' steps."""
+    t = np.arange(2, flight.steps + 1)
+    straight = np.ones(len(t), dtype=bool)
+    for turn in flight.turns:
+        straight &= (t < turn.start) | (t > turn.end + settled)
+    return straight
 
 
 def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
@@ -88,6 +97,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
             row(f"IMM, smoothed over {LAG} steps", late_mixed),
             ratio(f"IMM, both smoothed over {LAG} steps", late_mixed, 1.08, late_tuned),
         ]
+        straight = straight_flight(flight)
+        for phase, rows in (("straight flight", straight), ("turns and 5 s after", ~straight)):
+            for what, squared in (("tuned rules", tuned), ("IMM", mixed)):
+                claims.append(Claim(f"{name}: RMSE in {phase}, {what}", "m", None, rmse(squared[rows])))
         shown[name] = {"best fixed EKF": plain, "paper's rules": literal, "tuned rules": tuned, "IMM": mixed}
     return claims, shown
 
