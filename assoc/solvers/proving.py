@@ -22,6 +22,9 @@ from assoc.solvers.tabu_moves import TabuSearch
 # rows from which a heuristic pays beside the branching, and turns of branching between its iterations
 _LARGE = 30
 _TURNS = 3
+# columns up to which a part is branched on before anything else, and for how many nodes
+_SMALL = 400
+_SHORT = 50
 
 
 @dataclass(slots=True)
@@ -40,17 +43,35 @@ class _Task:
         bound = part.bound if self.search is None else max(part.bound, self.search.lower_bound)
         return min(bound, part.weight)
 
+    def take_over(self) -> bool:
+        """Take the branching's incumbent where it is better than the part's; whether it was."""
+        search, part = self.search, self.part
+        if search is None or search.columns is None or search.weight >= part.weight:
+            return False
+        part.weight = search.weight
+        part.best = _owner(part.packing, search.columns)
+        return True
+
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
     reduction = Reduction(packing, run)
     parts = reduction.reduce()
-    tasks = [_Task(piece) for part in parts for piece in _sharpen(part, run)]
+    tasks: list[_Task] = []
+    settled: list[_Task] = []
+    nodes = 0
+    for part in parts:
+        task = _branch_shortly(part, min(_SHORT, node_limit - nodes), run)
+        if task.search is not None:
+            nodes += task.search.nodes
+        if part.closed or (task.search is not None and task.search.done):
+            settled.append(task)
+        else:
+            tasks.extend(_Task(piece) for piece in _sharpen(part, run))
     columns = reduction.closed_columns
     weight, bound = reduction.closed_weight, reduction.closed_bound
-    _record(run, 0, weight, bound, tasks)
-    tasks = _improve(tasks, patience, run)
-    nodes = 0
+    _record(run, nodes, weight, bound, settled + tasks)
+    tasks = settled + _improve(tasks, patience, run)
     while tasks:
         task = tasks.pop(0)
         part = task.part
@@ -61,9 +82,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             # about ten milliseconds of work between two looks at the clock
             task.search.run(min(max(1, 200_000 // max(part.packing.num_columns, 1)), node_limit - nodes))
             nodes += task.search.nodes - before
-            if task.search.columns is not None and task.search.weight < part.weight:
-                part.weight = task.search.weight
-                part.best = _owner(part.packing, task.search.columns)
+            if task.take_over():
                 _record(run, nodes, weight, bound, [task, *tasks])
             if not task.search.done:
                 task.turns += 1
@@ -85,6 +104,17 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     _record(run, nodes, weight, bound, [])
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     return Outcome(chosen, nodes, bound, None if parts else reduction.proof)
+
+
+def _branch_shortly(part: Part, nodes: int, run: Run) -> _Task:
+    """Branch at once: a small part is mostly done before its bound could be made any better."""
+    task = _Task(part)
+    if part.closed or part.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
+        return task
+    task.search = Search(part.packing, part.duals, part.weight, part.tolerance)
+    task.search.run(nodes)
+    task.take_over()
+    return task
 
 
 def _sharpen(part: Part, run: Run) -> list[Part]:
