@@ -1,6 +1,7 @@
 """Every picture of the documentation, drawn anew: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
 Pictures are of fixed scenes and seeds. What is timed on the machine is in none of them but the report's screenshot.
+`stonesoup-fusion.png` takes its experiment's full run, which draws it: ``experiments.stonesoup_fusion --figure``.
 """
 
 from __future__ import annotations

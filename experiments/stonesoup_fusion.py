@@ -198,7 +198,7 @@ def compare(seeds: list[int], ways: tuple[Way, ...] = WAYS) -> tuple[Array, Arra
 
 def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
     """Compare the ways on the same scenes."""
-    seeds = rng.integers(2**31, size=2 if quick else 6).tolist()
+    seeds = rng.integers(2**31, size=2 if quick else 10).tolist()
     values, seconds = compare(seeds)
     claims = []
     for way, mine in zip(WAYS, values, strict=True):
