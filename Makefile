@@ -2,6 +2,7 @@
 # make test   install what the tests need and run them
 # make lint   ruff, mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
+# make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
@@ -10,7 +11,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint docs bench bench-quick clean
+.PHONY: demo test lint docs fuzz bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -27,6 +28,10 @@ lint: $(VENV)/.installed-lint
 
 docs: $(VENV)/.installed-docs
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+fuzz: $(VENV)/.installed-test
+	$(PY) -m tests.trust.fuzzing --count 20000 --processes 2
+	$(PY) -m tests.trust.differential --count 3000
 
 bench: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks

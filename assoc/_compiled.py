@@ -8,7 +8,11 @@ and home), numba would fail at import; the cache then goes to a temporary folder
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import hashlib
+import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -56,7 +60,10 @@ class _PackageCacheLocator:
             if locator is not None:
                 break
         else:
-            _CONFIG.CACHE_DIR = tempfile.mkdtemp(prefix="assoc-numba-")
+            # for the processes that this one starts, too; it goes when this process ends
+            folder = tempfile.mkdtemp(prefix="assoc-numba-")
+            atexit.register(shutil.rmtree, folder, ignore_errors=True)
+            _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
             locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
         stamp = _source_stamp(path.parent.name == "solvers")
         locator.get_source_stamp = lambda: stamp
@@ -66,9 +73,34 @@ class _PackageCacheLocator:
 _CACHES._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
 
 
+_FUNCTION_CACHE: Any = caching.FunctionCache
+
+
+class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
+    """numba's cache of one kernel, which is a help and never an obstacle."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep compiled code; on a full disk, say, it is compiled again next time."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load compiled code; what cannot be read (a file cut by a crash) is compiled again, and replaced."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            # an index that cannot be read cannot be added to either
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+
 def njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``."""
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    kernel: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    if not _CONFIG.DISABLE_JIT:
+        kernel._cache = _KernelCache(function)
+    return kernel
 
 
 class _Loads(event.Listener):

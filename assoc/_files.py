@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import math
 import os
 import tempfile
@@ -23,6 +24,8 @@ SIZE_LIMIT = 4 * 1024**3
 _HEADER_LIMIT = 10_000
 # deflate cannot expand by more than about 1032; a member that claims more is a lie or a trap
 _LARGEST_EXPANSION = 1_100
+# arrays of scenes and problems compress by 3 to 10, and only small ones of equal numbers by much more
+_USUAL_EXPANSION, _SMALL = 100, 128 * 1024**2
 
 _KINDS = {"float": "fiu", "int": "iu", "str": "U", "bool": "b"}
 _TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_, "bool": np.bool_}
@@ -73,6 +76,9 @@ def write_atomically(path: str | os.PathLike[str], writer: Callable[[IO[bytes]],
     try:
         with os.fdopen(handle, "wb") as file:
             writer(file)
+            # on the disk before it takes the name: a crash of the machine must not leave an empty file under it
+            file.flush()
+            os.fsync(file.fileno())
         # mkstemp makes private files; give the file the mode that a plain open() would have given
         umask = os.umask(0)
         os.umask(umask)
@@ -80,8 +86,14 @@ def write_atomically(path: str | os.PathLike[str], writer: Callable[[IO[bytes]],
         os.replace(name, target)
     except BaseException as error:
         Path(name).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise InvalidInputError(f"{target}: cannot be written ({error.strerror or error})") from error
+        # an archive that cannot be closed on a full disk complains of that, and has the disk's complaint as context
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, OSError):
+            cause = cause.__context__
+        if cause is not None and isinstance(error, Exception):
+            raise InvalidInputError(
+                f"{target}: cannot be written ({cause.strerror or cause}); what was there before is unchanged"
+            ) from error
         raise
 
 
@@ -143,7 +155,7 @@ def load_npz(
             f"{file}: is not a readable npz file ({_one_line(error)}), "
             f"expected a file of format {format_name!r}"
         ) from error
-    except (OSError, EOFError, zlib.error, RuntimeError, ValueError, NotImplementedError) as error:
+    except (OSError, EOFError, zlib.error, lzma.LZMAError, RuntimeError, ValueError, NotImplementedError) as error:
         raise InvalidInputError(f"{file}: cannot be read ({_one_line(error)})") from error
 
 
@@ -177,6 +189,9 @@ def _read(
     total = sum(members[name].file_size for name in wanted)
     if total > SIZE_LIMIT:
         raise InvalidInputError(f"{file}: its arrays take {total} bytes, the limit is {SIZE_LIMIT}")
+    packed = sum(members[name].compress_size for name in wanted)
+    if total > _SMALL and total > _USUAL_EXPANSION * packed:
+        raise InvalidInputError(f"{file}: its arrays claim to unpack from {packed} to {total} bytes, which none do")
     return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
 
 
@@ -208,6 +223,9 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
             raise InvalidInputError(
                 f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values"
             )
+        if dtype.itemsize == 0:
+            # numpy makes room for one character each, which no check of sizes against the file would see
+            raise InvalidInputError(f"{file}: the field {name!r} holds texts without room for a character")
         if len(shape) != spec.ndim:
             raise InvalidInputError(
                 f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}"

@@ -57,6 +57,11 @@ def run(program: Callable[[], None], name: str) -> int:
         # the reader of our output (head, less) has seen enough; keep Python from flushing into it again
         sys.stdout = None
         return DONE
+    except OSError as error:
+        # what the rooms do not expect: a full disk behind stdout, say
+        print(f"{name}: error: {one_line(error.strerror or error)}", file=sys.stderr)
+        sys.stdout = None
+        return BAD_INPUT
     return DONE
 
 

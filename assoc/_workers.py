@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import pickle
 import signal
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
+
+from assoc.errors import LimitExceededError
 
 _task: Callable[[Any], Any] | None = None
 
@@ -22,6 +28,11 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
         Small and picklable.
     jobs : int
         Number of processes; 1 works in this one. They are spawned: forking would copy the threads' locks.
+
+    Raises
+    ------
+    LimitExceededError
+        A process died.
     """
     jobs = min(jobs, len(items))
     if jobs <= 1:
@@ -30,11 +41,20 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
         return
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(task,))
+    # a process that dies before it has read a large task from its pipe would leave this one writing for ever
+    handle, path = tempfile.mkstemp(prefix="assoc-task-")
+    with os.fdopen(handle, "wb") as file:
+        pickle.dump(task, file, pickle.HIGHEST_PROTOCOL)
+    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path,))
     try:
         waiting: list[Future[Any]] = [executor.submit(_run, item) for item in items]
         for future in waiting:
             yield future.result()
+    except BrokenProcessPool:
+        raise LimitExceededError(
+            "a worker process died: it was killed, ran out of memory, or could not start (a script that uses several "
+            'processes must guard its start by if __name__ == "__main__"); fewer processes take less memory'
+        ) from None
     except BaseException:
         # interrupted, or one item failed: nobody wants the rest, which may take long
         executor.shutdown(wait=False, cancel_futures=True)
@@ -43,13 +63,15 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
         raise
     finally:
         executor.shutdown()
+        os.unlink(path)
 
 
-def _start(task: Callable[[Any], Any]) -> None:
+def _start(path: str) -> None:
     global _task
     # Ctrl-C reaches the whole group: let the parent speak, and die quietly
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    _task = task
+    with open(path, "rb") as file:
+        _task = pickle.load(file)
 
 
 def _run(item: Any) -> Any:

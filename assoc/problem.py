@@ -14,6 +14,8 @@ FORMAT = "assoc.problem"
 VERSION = 1
 
 _MAX_DENSE_ELEMENTS = 200_000_000
+# a measurement needs a singleton of S indices, a cost and a name: half a gigabyte in all
+_MAX_SINGLETON_NUMBERS = 64_000_000
 # sums of costs beyond this could overflow on the way through a solver
 _MAX_TOTAL_COST = 1e300
 
@@ -43,6 +45,8 @@ class AssignmentProblem:
     ------
     InvalidInputError
         Wrong shape, an index out of range, the all-dummy tuple, or a cost that is NaN or -inf.
+    LimitExceededError
+        More measurements than there should be memory for (ten million of four sensors, say).
 
     Notes
     -----
@@ -63,8 +67,14 @@ class AssignmentProblem:
             raise InvalidInputError("sizes: expected at least one sensor, got none")
         if sizes_.min() < 0:
             raise InvalidInputError(f"sizes: expected numbers >= 0, got {sizes_.min()}")
-        if int(sizes_.sum(dtype=np.int64)) > np.iinfo(np.int32).max:
+        total = sum(int(size) for size in sizes_)
+        if total > np.iinfo(np.int32).max:
             raise InvalidInputError("sizes: more measurements in total than 32-bit indices can name")
+        if total * (sizes_.size + 2) > _MAX_SINGLETON_NUMBERS:
+            raise LimitExceededError(
+                f"sizes: {total} measurements of {sizes_.size} sensors need more memory for their singletons than a "
+                "problem may take; split the problem"
+            )
         tuples_ = _integers(tuples, "tuples", 2)
         costs_ = _numbers(costs, "costs")
         if tuples_.shape == (0, 0):
@@ -274,7 +284,8 @@ def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: b
 def _check_costs(
     costs: NDArray[np.float64], tuples: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    total = float(np.abs(costs).sum()) if costs.size else 0.0
+    with np.errstate(over="ignore"):
+        total = float(np.abs(costs).sum()) if costs.size else 0.0
     if total <= _MAX_TOTAL_COST:
         return costs, tuples
     bad = np.isnan(costs) | np.isneginf(costs)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.solvers.clock import now
 from assoc.solvers.local_search import Cover
 from assoc.solvers.metaheuristic import bound_of_choice
 from assoc.solvers.packing import Packing
@@ -57,7 +58,8 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
         if cycle > 0:
             starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
         probability = pheromone**parameters.alpha * visibility**parameters.beta  # numerator of eq. 8
-        owners = _cycle(nodes, visibility if cycle == 0 else probability, cycle == 0, starts, tours, lengths, run.rng)
+        value = visibility if cycle == 0 else probability
+        owners = _cycle(nodes, value, cycle == 0, starts, tours, lengths, run.rng, run.deadline())
         cycle += 1
         complete = (owners[:, ~packing.slack] >= 0).all(axis=1)
         for k in np.flatnonzero(complete):
@@ -113,13 +115,18 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
 
 
 @njit
-def _cycle(nodes: Any, value: Floats, greedy: bool, starts: Any, tours: Any, lengths: Any, rng: Any) -> Any:
-    """Walk all ants' tours; the owner (node) of each row for each ant."""
+def _cycle(
+    nodes: Any, value: Floats, greedy: bool, starts: Any, tours: Any, lengths: Any, rng: Any, deadline: float
+) -> Any:
+    """Walk all ants' tours; the owner (node) of each row for each ant. Ants that are late stay at home."""
     num, num_sensors = nodes.shape
     num_ants, num_rows = tours.shape
     owners = np.full((num_ants, num_rows), -1, np.int32)
     allowed = np.empty(num, np.int32)
     for ant in range(num_ants):
+        if deadline < np.inf and now() > deadline:
+            lengths[ant] = 0
+            continue
         count = num
         for j in range(num):
             allowed[j] = j

@@ -35,6 +35,8 @@ PASSES = 1000
 RELAXATION = 1.5
 # columns of a reduced cost of more temperatures than this weigh less than 1e-5
 NEAR = 12.0
+# columns visited between two looks at the clock: some fifty milliseconds
+_VISITS = 10_000_000
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
@@ -60,10 +62,14 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     temperature = START * spread(packing)
     reduced, primal, slack_primal = work_arrays(packing)
     hard_pass(packing, duals, reduced, 1)
+    size = packing.row_cols.size
     for _ in range(levels):
-        if run is not None and run.remaining() <= 0.0:
-            break
-        smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, passes)
+        left = passes
+        while left > 0 and (run is None or run.remaining() > 0.0):
+            # under a time limit large problems come back for a look at the clock
+            turn = left if run is None or run.time_limit is None else min(left, max(6, _VISITS // max(size, 1)))
+            visits = smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, turn)
+            left = left - turn if visits == turn * size else 0
         temperature *= COOLING
     hard_pass(packing, duals, reduced, 2)
     return duals

@@ -49,7 +49,7 @@ class Breeding:
                 weight += part.improve(owner, rng, self.parameters.clusters)
             part.offer(owner, weight)
             self._admit(part, owner, weight)
-            if part.closed:
+            if part.closed or part.late:
                 return
         # a population that has become one family starts anew, around its best and without it by turns
         if part.stalled and part.stalled % _RENEWAL == 0:
@@ -72,7 +72,7 @@ class Breeding:
             part.offer(owner, weight)
             members.append(owner)
             fitness.append(weight + (np.inf if incomplete(part, owner) else 0.0))
-            if part.closed:
+            if part.closed or part.late:
                 break
         self.members, self.fitness = np.array(members, dtype=np.int32), np.array(fitness)
 

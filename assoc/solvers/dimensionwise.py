@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.assignment2d import match_sparse
+from assoc.solvers.clock import now
 from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
@@ -29,7 +30,12 @@ _MOST_SPLITS_FOR = 6
 
 
 def improve(
-    packing: Packing, owner: NDArray[np.int32], weights: Floats | None = None, *, rounds: int | None = None
+    packing: Packing,
+    owner: NDArray[np.int32],
+    weights: Floats | None = None,
+    *,
+    rounds: int | None = None,
+    deadline: float = np.inf,
 ) -> float:
     """Re-match halves until no split improves.
 
@@ -44,6 +50,8 @@ def improve(
         the packing's own.
     rounds : int, optional
         Rounds over all splits at the most.
+    deadline : float
+        No split is begun after this (clock.py).
 
     Returns
     -------
@@ -61,6 +69,7 @@ def improve(
             owner,
             splits(packing.cols.shape[1]),
             np.iinfo(np.int64).max if rounds is None else rounds,
+            deadline,
         )
     )
 
@@ -75,7 +84,15 @@ def splits(num_sensors: int) -> NDArray[np.int64]:
 
 @njit
 def _improve(
-    cols: Any, weights: Floats, slack: Any, row_ptr: Any, row_cols: Any, owner: Any, masks: Any, rounds: int
+    cols: Any,
+    weights: Floats,
+    slack: Any,
+    row_ptr: Any,
+    row_cols: Any,
+    owner: Any,
+    masks: Any,
+    rounds: int,
+    deadline: float,
 ) -> float:
     num_sensors = cols.shape[1]
     sensor = np.zeros(owner.size, np.int64)
@@ -92,7 +109,8 @@ def _improve(
     everything = (1 << num_sensors) - 1
     total = 0.0
     quiet, at, done = 0, 0, 0
-    while quiet < masks.size and done < rounds * masks.size:
+    timed = deadline < np.inf
+    while quiet < masks.size and done < rounds * masks.size and not (timed and now() > deadline):
         mask = masks[at]
         if must & mask == 0:
             mask = everything & ~mask

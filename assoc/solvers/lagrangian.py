@@ -255,7 +255,7 @@ class _Search:
             if self._gap_closed() or self.run.should_stop():
                 return
         cover.improve()
-        improve(self.packing, cover.owner)
+        improve(self.packing, cover.owner, deadline=self.run.deadline())
         self._offer(cover)
 
     def _offer(self, cover: Cover) -> bool:

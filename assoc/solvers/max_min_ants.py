@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc.solvers.clock import now
 from assoc.solvers.local_search import _improve, penalised
 from assoc.solvers.metaheuristic import Part
 
@@ -59,6 +60,7 @@ class Colony:
             part.temperature,
             p.ants,
             rng,
+            part.deadline,
         )
         weight = part.polish(owner)
         if weight - part.bound > part.tolerance:
@@ -92,6 +94,7 @@ def random_cover(part: Part, weights: Floats, strictness: float, rng: np.random.
         part.temperature,
         1,
         rng,
+        part.deadline,
     )
     return owner
 
@@ -132,8 +135,9 @@ def _walk(
     temperature: float,
     ants: int,
     rng: Any,
+    deadline: float,
 ) -> Any:
-    """Let all ants build a cover and improve it by insertion; the best one and its weight."""
+    """Let all ants build a cover and improve it by insertion, until time is over; the best one and its weight."""
     num, num_sensors = cols.shape
     num_rows = slack.size
     value = np.empty(num)
@@ -145,7 +149,10 @@ def _walk(
     owner = np.empty(num_rows, np.int32)
     order = np.arange(num_rows).astype(np.int32)
     everything = np.arange(num_rows).astype(np.int32)
+    timed = deadline < np.inf
     for ant in range(ants):
+        if timed and now() > deadline:
+            break
         # ants differ in how strictly they follow the visibility: some explore, some refine
         strictness = beta * 2.0 ** (ant % 10) / temperature
         for j in range(num):

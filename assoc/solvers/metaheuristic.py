@@ -10,6 +10,7 @@ of small open parts; it never changes the solution, which is the metaheuristic's
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -55,6 +56,8 @@ class Part:
         Owner of each row in the best complete cover known.
     weight : float
         Its weight; ``inf`` when none is known.
+    deadline : float
+        When time is over, by the kernels' clock (clock.py).
     """
 
     packing: Packing
@@ -66,6 +69,7 @@ class Part:
     weight: float = np.inf
     iterations: int = 0
     stalled: int = 0
+    deadline: float = np.inf
     clusters: ClusterSteps | None = None
 
     @property
@@ -77,6 +81,11 @@ class Part:
     def closed(self) -> bool:
         """Whether the best cover is optimal."""
         return self.weight - self.bound <= self.tolerance
+
+    @property
+    def late(self) -> bool:
+        """Whether time is over."""
+        return self.deadline < np.inf and time.monotonic() > self.deadline
 
     @property
     def temperature(self) -> float:
@@ -110,7 +119,7 @@ class Part:
 
     def improve(self, owner: Owner, rng: np.random.Generator, steps: int) -> float:
         """Improve a complete cover in place by exact sub-steps; return the change of its weight."""
-        if steps == 0 or incomplete(self, owner):
+        if steps == 0 or self.late or incomplete(self, owner):
             return 0.0
         if self.clusters is None:
             self.clusters = ClusterSteps(self.packing, self.duals)
@@ -119,7 +128,7 @@ class Part:
     def polish(self, owner: Owner) -> float:
         """Improve a complete cover in place by dimensionwise search; return its weight."""
         if not incomplete(self, owner):
-            dimensionwise.improve(self.packing, owner)
+            dimensionwise.improve(self.packing, owner, deadline=self.deadline)
         return weight_of(self, owner)
 
     def refine(self, run: Run, steps: int) -> None:
@@ -192,7 +201,9 @@ def solve_by(
     share = Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
     duals = dual_bound(packing, run=share)
     parts = split_components(packing, duals, np.arange(packing.num_columns))
+    deadline = run.deadline()
     for part in parts:
+        part.deadline = deadline
         part.offer_greedy()
         if not part.closed and not share.should_stop():
             part.sharpen(share)
@@ -204,7 +215,8 @@ def solve_by(
     queue: list[tuple[Part, Searcher | None]] = [(part, None) for part in parts]
     while queue:
         part, searcher = queue.pop(0)
-        over = part.closed
+        # a part that has a cover takes no turn after time is over, or thousands of parts would take one each
+        over = part.closed or (part.best is not None and run.should_stop())
         if not over:
             if searcher is None:
                 searcher = make(part, run.rng)
@@ -296,7 +308,7 @@ def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
         own = owner[smaller.row_start[c] : smaller.row_start[c + 1]]
         piece.best = np.where(own >= 0, own - smaller.col_start[c], -1).astype(np.int32)
         piece.weight = float(piece.packing.weights[_columns(piece)].sum())
-        piece.iterations, piece.stalled = part.iterations, part.stalled
+        piece.iterations, piece.stalled, piece.deadline = part.iterations, part.stalled, part.deadline
     return pieces
 
 

@@ -11,13 +11,16 @@ row has no slack. The backends are
   rounding that occurred, times the columns a solution can have, is taken off its bound.
 
 When the time is over the better of the backend's solution and a greedy one, improved by insertion, is
-returned, with the better of the backend's bound and the dual bound.
+returned, with the better of the backend's bound and the dual bound. A backend that is not back by then is left
+behind in a thread of its own.
 """
 
 from __future__ import annotations
 
 import datetime
 import math
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,6 +39,8 @@ _LARGEST_COST = 7  # costs for the float backends are below 2^7
 _ROUNDING = 1e-7
 # CP-SAT's sums must stay below 2^63, and its presolve, which substitutes equations, needs room for some more
 _LARGEST_SUM = 57
+# seconds that a model takes for each entry of its matrix, at the least (measured: 1.3e-6 and 2.8e-6)
+_ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
 
 
 @dataclass(frozen=True)
@@ -86,18 +91,22 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
             raise infeasible(packing)
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
     bound, duals = -math.inf, None
-    if run.time_limit is not None:
+    columns: NDArray[np.integer] | None = None
+    if run.time_limit is None:
+        answer = _backend(packing, parameters, math.inf, _Stop())
+    else:
         # made first: when the time is over it would be too late
-        duals = dual_bound(packing, run=run)
+        columns = _quick(packing, run)
+        duals = dual_bound(packing, run=Run(run.rng, time_limit=0.3 * run.time_limit, started=run.started))
         bound = certified_bound(packing, duals)
-    backend = _cp_sat if parameters.backend == "cp_sat" else _math_opt
-    answer = backend(packing, parameters, run.remaining())
+        answer = _within(packing, parameters, run)
     if answer.infeasible:
         raise infeasible(packing)
-    columns: NDArray[np.integer] | None = answer.columns
     if not answer.proven:
+        if run.time_limit is None:
+            columns = _quick(packing, run)
         run.should_stop()
-        columns = _better(packing, columns, run)
+    columns = _better(packing, answer.columns, columns)
     if columns is None:
         raise infeasible(packing)
     if answer.bound > bound:
@@ -106,18 +115,79 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     return Outcome(columns, answer.nodes, bound, duals)
 
 
-def _better(packing: Packing, columns: NDArray[np.integer] | None, run: Run) -> NDArray[np.integer] | None:
-    """Return the better of these columns and a greedy solution improved by insertion."""
+class _Stop:
+    """What ends a backend that is at work in another thread."""
+
+    def __init__(self) -> None:
+        self._over = False
+        self._stop: Callable[[], object] | None = None
+
+    def by(self, stop: Callable[[], object]) -> None:
+        """Say how the backend is stopped, before it starts."""
+        self._stop = stop
+        if self._over:
+            stop()
+
+    def __call__(self) -> None:
+        self._over = True
+        if self._stop is not None:
+            self._stop()
+
+
+def _backend(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
+    return (_cp_sat if parameters.backend == "cp_sat" else _math_opt)(packing, parameters, seconds, stop)
+
+
+def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
+    """Solve in the time that is left, or give up.
+
+    Backends look at the clock between steps of their own, and before their first step not at all: a large one
+    may be late by many seconds. So the backend works in a thread, which is told to stop and left behind when
+    time is over; and where already the model would take longer than there is time it is not made.
+    """
+    entry = _ENTRY_CP_SAT if parameters.backend == "cp_sat" else _ENTRY_MATH_OPT
+    nothing = _Answer(None, -math.inf, False, False, 0)
+    if run.remaining() < entry * packing.row_cols.size:
+        run.stopped_by = run.stopped_by or "time_limit"
+        return nothing
+    answers: list[_Answer | BaseException] = []
+    stop = _Stop()
+
+    def work() -> None:
+        try:
+            answers.append(_backend(packing, parameters, 0.98 * run.remaining(), stop))
+        except BaseException as error:  # handed to the caller below
+            answers.append(error)
+
+    thread = threading.Thread(target=work, name="milp", daemon=True)
+    thread.start()
+    thread.join(max(run.remaining(), 0.0))
+    if not answers:
+        stop()
+        run.stopped_by = run.stopped_by or "time_limit"
+        return nothing
+    if isinstance(answers[0], BaseException):
+        raise answers[0]
+    return answers[0]
+
+
+def _quick(packing: Packing, run: Run) -> NDArray[np.integer] | None:
+    """Return a greedy solution improved by insertion; None if there is none."""
     from assoc.solvers.local_search import Cover
 
     cover = Cover.empty(packing)
     cover.add_greedily(np.argsort(packing.weights, kind="stable"))
     cover.improve()
-    if columns is None:
-        return cover.columns() if cover.complete(run) else None
-    if cover.complete_already and cover.weight < float(packing.weights[columns].sum()):
-        return cover.columns()
-    return columns
+    return cover.columns() if cover.complete(run) else None
+
+
+def _better(
+    packing: Packing, one: NDArray[np.integer] | None, other: NDArray[np.integer] | None
+) -> NDArray[np.integer] | None:
+    """Return the lighter of two solutions, of which there may be none."""
+    if one is None or other is None:
+        return other if one is None else one
+    return one if float(packing.weights[one].sum()) <= float(packing.weights[other].sum()) else other
 
 
 def _most_columns(packing: Packing) -> int:
@@ -126,7 +196,7 @@ def _most_columns(packing: Packing) -> int:
     return packing.num_rows // max(int(sizes.min()), 1)
 
 
-def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _Answer:
+def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
     """Solve by SCIP or HiGHS through MathOpt."""
     from ortools.math_opt.python import mathopt
 
@@ -143,7 +213,7 @@ def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _
     else:
         for name in ("mip_feasibility", "primal_feasibility", "dual_feasibility"):
             options.highs.double_options[f"{name}_tolerance"] = _TOLERANCE
-    result = mathopt.solve(model, kind, params=options)
+    result = mathopt.solve(model, kind, params=options, **_interruption(stop))
     reason = result.termination.reason
     columns = None
     if result.has_primal_feasible_solution():
@@ -159,6 +229,17 @@ def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _
         reason == mathopt.TerminationReason.INFEASIBLE,
         int(result.solve_stats.node_count),
     )
+
+
+def _interruption(stop: _Stop) -> dict[str, Any]:
+    """Return the argument of ``mathopt.solve`` by which ``stop`` ends it; older OR-Tools have none."""
+    try:
+        from ortools.util.python.solve_interrupter import SolveInterrupter
+    except ImportError:
+        return {}
+    interrupter = SolveInterrupter()
+    stop.by(interrupter.interrupt)
+    return {"interrupter": interrupter}
 
 
 def _model(packing: Packing, weights: NDArray[np.float64]) -> Any:
@@ -183,7 +264,7 @@ def _model(packing: Packing, weights: NDArray[np.float64]) -> Any:
     return proto
 
 
-def _cp_sat(packing: Packing, parameters: MilpParameters, seconds: float) -> _Answer:
+def _cp_sat(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
     """Solve by CP-SAT on integer weights."""
     from ortools.sat import cp_model_pb2
     from ortools.sat.python import cp_model
@@ -206,6 +287,7 @@ def _cp_sat(packing: Packing, parameters: MilpParameters, seconds: float) -> _An
     solver.parameters.absolute_gap_limit = 0.0
     if math.isfinite(seconds):
         solver.parameters.max_time_in_seconds = max(seconds, 0.001)
+    stop.by(solver.stop_search)
     status = solver.solve(model)
     states = cp_model_pb2.CpSolverStatus
     columns = None

@@ -54,6 +54,10 @@ class Run:
         """Seconds left; infinite without a time limit."""
         return np.inf if self.time_limit is None else self.time_limit - self.elapsed()
 
+    def deadline(self) -> float:
+        """When time is over, in seconds of `time.monotonic`: for kernels (clock.py); infinite without a time limit."""
+        return np.inf if self.time_limit is None else time.monotonic() + self.remaining()
+
     def should_stop(self) -> bool:
         """Whether the time is over or the callback asked to stop; ``stopped_by`` says which."""
         if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc.solvers.clock import now
 from assoc.solvers.local_search import Cover, insert, insertion_gain, penalised
 from assoc.solvers.max_min_ants import random_cover
 from assoc.solvers.metaheuristic import Part, incomplete
@@ -70,6 +71,7 @@ class TabuSearch:
             part.temperature,
             forced,
             rng,
+            part.deadline,
         )
         weight = part.polish(best)
         part.offer(best, weight)
@@ -130,6 +132,7 @@ def _moves(
     temperature: float,
     forced: int,
     rng: Any,
+    deadline: float,
 ) -> int:
     """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
 
@@ -143,7 +146,10 @@ def _moves(
     ejected = np.empty(num_sensors, np.int32)
     current = 0.0
     record = 0.0
+    timed = deadline < np.inf
     for move in range(moves):
+        if timed and now() > deadline:
+            break
         clock += 1
         held = forced if 3 * move < moves else -1
         chosen = forced if move == 0 else -1

@@ -284,8 +284,28 @@ def _read_line(line: bytes) -> dict[str, Any] | None:
     body = line[9:-1]
     if line[-1:] != b"\n" or line[:9] != b"%08x " % zlib.crc32(body):
         return None
-    entry = json.loads(body)
-    return entry if isinstance(entry, dict) else None
+    # the checksum keeps out accidents, not people
+    try:
+        entry = json.loads(body)
+    except (ValueError, RecursionError):
+        return None
+    return entry if isinstance(entry, dict) and _sound(entry) else None
+
+
+def _sound(entry: Mapping[str, Any]) -> bool:
+    """Whether an entry has the shape that is written: a setting, or a batch of runs."""
+    if "setting_key" in entry:
+        kinds = {"setting_key": str, "solver": str, "parameters": dict}
+        return all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
+    columns = [entry.get(name) for name in COLUMNS]
+    if not all(isinstance(column, list) for column in columns):
+        return False
+    keys = [entry[name] for name in ("setting", "source", "repeat", "scan")]
+    numbers = [entry[name] for name in ("seed", "cost", "lower_bound", "iterations", "time")]
+    plain = all(isinstance(value, (str, int)) for column in keys for value in column) and all(
+        value is None or isinstance(value, (int, float)) for column in numbers for value in column
+    )
+    return plain and len({len(column) for column in columns if column is not None}) == 1
 
 
 def _lock(folder: Path) -> IO[bytes]:
