@@ -98,9 +98,11 @@ def distinct_columns(problem: AssignmentProblem) -> tuple[NDArray[np.int32], Flo
     """Return rows, weights and origin of all columns (see ``Complete``)."""
     prepared = prepare(problem)
     sizes = problem.sizes.astype(np.int64)
-    return _distinct_columns(
-        problem.tuples, problem.costs, np.cumsum(sizes) - sizes, prepared.single_cost, problem.dummy
-    )
+    # uncompiled, numpy would warn of the hash's overflow, which is meant
+    with np.errstate(over="ignore"):
+        return _distinct_columns(
+            problem.tuples, problem.costs, np.cumsum(sizes) - sizes, prepared.single_cost, problem.dummy
+        )
 
 
 def priced(

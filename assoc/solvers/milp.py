@@ -135,15 +135,17 @@ class _Stop:
 
 
 def _backend(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
-    return (_cp_sat if parameters.backend == "cp_sat" else _math_opt)(packing, parameters, seconds, stop)
+    if parameters.backend == "cp_sat":
+        return _cp_sat(packing, parameters, seconds, stop)
+    # MathOpt's own interrupter makes SCIP 9 complain on stderr: its time limit must do
+    return _math_opt(packing, parameters, seconds)
 
 
 def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
     """Solve in the time that is left, or give up.
 
     Backends look at the clock between steps of their own, and before their first step not at all: a large one
-    may be late by many seconds. So the backend works in a thread, which is told to stop and left behind when
-    time is over; and where already the model would take longer than there is time it is not made.
+    may be late by many seconds. So the backend works in a thread, which is left behind when time is over (CP-SAT is told to stop); and where already the model would take longer than there is time it is not made.
     """
     entry = _ENTRY_CP_SAT if parameters.backend == "cp_sat" else _ENTRY_MATH_OPT
     nothing = _Answer(None, -math.inf, False, False, 0)
@@ -196,7 +198,7 @@ def _most_columns(packing: Packing) -> int:
     return packing.num_rows // max(int(sizes.min()), 1)
 
 
-def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
+def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> _Answer:
     """Solve by SCIP or HiGHS through MathOpt."""
     from ortools.math_opt.python import mathopt
 
@@ -213,7 +215,7 @@ def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float, stop
     else:
         for name in ("mip_feasibility", "primal_feasibility", "dual_feasibility"):
             options.highs.double_options[f"{name}_tolerance"] = _TOLERANCE
-    result = mathopt.solve(model, kind, params=options, **_interruption(stop))
+    result = mathopt.solve(model, kind, params=options)
     reason = result.termination.reason
     columns = None
     if result.has_primal_feasible_solution():
@@ -229,17 +231,6 @@ def _math_opt(packing: Packing, parameters: MilpParameters, seconds: float, stop
         reason == mathopt.TerminationReason.INFEASIBLE,
         int(result.solve_stats.node_count),
     )
-
-
-def _interruption(stop: _Stop) -> dict[str, Any]:
-    """Return the argument of ``mathopt.solve`` by which ``stop`` ends it; older OR-Tools have none."""
-    try:
-        from ortools.util.python.solve_interrupter import SolveInterrupter
-    except ImportError:
-        return {}
-    interrupter = SolveInterrupter()
-    stop.by(interrupter.interrupt)
-    return {"interrupter": interrupter}
 
 
 def _model(packing: Packing, weights: NDArray[np.float64]) -> Any:
