@@ -145,7 +145,8 @@ def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
     """Solve in the time that is left, or give up.
 
     Backends look at the clock between steps of their own, and before their first step not at all: a large one
-    may be late by many seconds. So the backend works in a thread, which is left behind when time is over (CP-SAT is told to stop); and where already the model would take longer than there is time it is not made.
+    may be late by many seconds. So the backend works in a thread, which is left behind when time is over (CP-
+    SAT is told to stop); and where already the model would take longer than there is time it is not made.
     """
     entry = _ENTRY_CP_SAT if parameters.backend == "cp_sat" else _ENTRY_MATH_OPT
     nothing = _Answer(None, -math.inf, False, False, 0)
