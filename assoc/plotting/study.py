@@ -84,6 +84,8 @@ def cells(study: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Arra
     middle, low, high = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
     for (x, y), runs in study.groupby([across, up]):
         place = [*ys].index(y), [*xs].index(x)
+        # settings that differ in other parameters are further repeats here
+        runs = runs.assign(repeat=runs.groupby(["setting", "repeat"]).ngroup())
         table = by_problem(runs, measured(runs, measure))
         weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
         middle[place] = factor * weighted_mean(table, weights)

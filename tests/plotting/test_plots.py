@@ -15,6 +15,7 @@ import assoc
 from assoc import plotting
 from assoc.plotting.ellipses import ellipses, place_covariances
 from assoc.plotting.places import distances_to_border, places
+from assoc.plotting.study import cells
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
 from assoc.solvers.pheromone import pheromone_history
@@ -205,6 +206,10 @@ def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):
     for text, mean in zip(texts, expected, strict=True):
         middle, low, high = (float(one) for one in re.split(r"\n| \.\. ", text))
         assert middle == pytest.approx(mean, rel=5e-3) and low <= middle <= high
+    # over a parameter that is not named all runs are averaged
+    _, _, middle, low, high = cells(frame.assign(half=frame["rho"] > 0.5), "iterations", "alpha", "half")
+    halves = frame.groupby([frame["rho"] > 0.5, "alpha"])["iterations"].mean().to_numpy().reshape(2, 2)
+    assert middle == pytest.approx(halves) and (low <= middle).all() and (middle <= high).all()
     with pytest.raises(assoc.InvalidInputError, match="needs two that vary"):
         plotting.plot_heat_map(frame[frame["rho"] == 0.3], ax=ax)
 

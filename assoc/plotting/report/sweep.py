@@ -29,8 +29,8 @@ _MOST_CURVES = 60
 _MAPS = """<div class="controls"><label>show <select id="measure"></select></label>
 <label>over <select id="parameters"></select></label></div>
 <div id="map-plot" class="plot large"></div>
-<p class="note">Means over all runs with these values; in brackets the 95 % interval by the bootstrap over scans
-and repeats.</p>"""
+<p class="note">Means over all runs with these values; the 95 % interval by the bootstrap over scans and repeats is in
+brackets, on a narrow screen where it is pointed at.</p>"""
 
 _CURVES = """<div class="controls"><label>over <select id="trace-axis"><option value="iteration">iterations</option>
 <option value="seconds">time</option></select></label><span id="chosen-setting"></span></div>

@@ -231,7 +231,7 @@ const sceneLayout = (number, space, zoom) => {
     const ranges = zoom || box;
     Object.assign(layout.xaxis, { range: scaled(ranges[0]) });
     Object.assign(layout.yaxis, { range: scaled(ranges[1]), scaleanchor: 'x' });
-    layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: -0.17, yanchor: 'top', font: { size: 12 } };
+    layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: window.innerWidth < 820 ? -0.3 : -0.17, yanchor: 'top', font: { size: 12 } };
     return layout;
   }
   const reach = box.map(([low, high]) => high - low);

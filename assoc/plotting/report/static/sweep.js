@@ -15,7 +15,7 @@ const drawMap = (map, measure) => {
   middle.forEach((row, y) => row.forEach((value, x) => {
     if (value === null || small) return;
     const light = most > least && value > (least + most) / 2;
-    annotations.push({ x, y, text: withInterval(value, low[y][x], high[y][x]), showarrow: false, font: { size: 11, color: light ? '#000' : '#fff' } });
+    annotations.push({ x, y, text: window.innerWidth < 820 ? short(value, 3) : withInterval(value, low[y][x], high[y][x]), showarrow: false, font: { size: 11, color: light ? '#000' : '#fff' } });
   }));
   const layout = layoutOf(plain(map.across), plain(map.up), { annotations });
   Object.assign(layout.xaxis, { tickvals: map.xs.map((_, i) => i), ticktext: map.xs.map(plain), showgrid: false });
@@ -61,7 +61,7 @@ const drawCurves = () => {
   });
   // the best and the chosen lie on top
   traces.sort((a, b) => a.line.width - b.line.width);
-  const layout = layoutOf(column === 'seconds' ? 'time (ms)' : 'iteration (number)', 'mean cost above the best known (nats)', { hovermode: 'closest' });
+  const layout = layoutOf(column === 'seconds' ? 'time (ms)' : 'iteration (number)', window.innerWidth < 820 ? 'excess cost (nats)' : 'mean cost above the best known (nats)', { hovermode: 'closest' });
   layout.xaxis.type = 'log';
   layout.yaxis.rangemode = 'tozero';
   const high = Math.max(...traces.map((one) => Math.max(...one.y)), 0);

@@ -91,7 +91,7 @@ const drawTracks = () => {
   const ranges = (now.zoom || near).map((range) => range.map((value) => value * unit.factor));
   layout.xaxis.range = ranges[0];
   Object.assign(layout.yaxis, { range: ranges[1], scaleanchor: 'x' });
-  layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: -0.17, yanchor: 'top', font: { size: 12 } };
+  layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: window.innerWidth < 820 ? -0.3 : -0.17, yanchor: 'top', font: { size: 12 } };
   const plot = byId('scene-plot');
   Plotly.react(plot, traces, layout, CONFIG);
   if (!plot.dataset.listens) {
