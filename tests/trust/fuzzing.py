@@ -265,7 +265,7 @@ def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY, resource.RLIM_INFINITY))
 
 
-def _warm_up(made: dict[str, list[Path]]) -> None:
+def warm_up(made: dict[str, list[Path]]) -> None:
     """Read all valid files, which must be accepted: imports and compilation are done after that."""
     for room in ROOMS:
         for path in made[room.name]:
@@ -278,7 +278,7 @@ def _warm_up(made: dict[str, list[Path]]) -> None:
 def _child(seed: int, numbers: range, made: dict[str, list[Path]], folder: str, results: Any) -> None:
     os.makedirs(folder, exist_ok=True)
     os.chdir(folder)
-    _warm_up(made)
+    warm_up(made)
     limit_memory()
     for number in numbers:
         results.send((number, "begins"))
