@@ -19,8 +19,9 @@ from assoc.solvers.run import Outcome, Run
 from assoc.solvers.tabu import TabuParameters
 from assoc.solvers.tabu_moves import TabuSearch
 
-# rows from which a heuristic pays beside the branching, and turns of branching between its iterations
+# rows from which tabu search and breeding pay beside the branching, and turns of branching between their iterations
 _LARGE = 30
+_MANY = 90
 _TURNS = 3
 # columns up to which a part is branched on before anything else, and for how many nodes
 _SMALL = 400
@@ -78,19 +79,29 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         if not part.closed and not run.should_stop() and nodes < node_limit:
             if task.search is None:
                 task.search = Search(part.packing, part.duals, part.weight, part.tolerance)
+                part.stalled = 0
             before = task.search.nodes
-            # about ten milliseconds of work between two looks at the clock
-            task.search.run(min(max(1, 200_000 // max(part.packing.num_columns, 1)), node_limit - nodes))
+            # some ten milliseconds of work between two looks at the clock
+            task.search.run(min(max(1, 20_000 // max(part.packing.num_columns, 1)), node_limit - nodes))
             nodes += task.search.nodes - before
-            if task.take_over():
-                _record(run, nodes, weight, bound, [task, *tasks])
+            better = task.take_over()
             if not task.search.done:
                 task.turns += 1
-                if task.turns % _TURNS == 0 and _search_better(task, run):
-                    task.search.weight = part.weight
-                    _record(run, nodes, weight, bound, [task, *tasks])
-                tasks.append(task)
+                # as long as they improve it, metaheuristics get half the time; then less and less
+                if task.turns >= _TURNS * min(1 + part.stalled // 5, 5):
+                    task.turns = 0
+                    if _search_better(task, run):
+                        task.search.weight = part.weight
+                        better = True
+                # a better incumbent rules columns out, and what falls apart is searched part by part: in one search
+                # the nodes of independent parts multiply
+                pieces = split_part(part) if better else None
+                tasks.extend([task] if pieces is None else [_Task(piece) for piece in pieces])
+                if better:
+                    _record(run, nodes, weight, bound, tasks)
                 continue
+            if better:
+                _record(run, nodes, weight, bound, [task, *tasks])
         if part.best is None:
             if task.search is not None and task.search.done:
                 raise infeasible(part.packing)
@@ -169,7 +180,9 @@ def _search_better(task: _Task, run: Run) -> bool:
     if task.heuristics is None:
         task.heuristics = TabuSearch(part, TabuParameters()), Breeding(part, GeneticParameters())
     before = part.weight
-    task.heuristics[task.improvements % 2].iterate(part, run.rng)
+    # small parts are branched sooner than a population is bred: most of them end there at once
+    turn = task.improvements % 2 if task.search is not None or part.packing.num_rows >= _MANY else 0
+    task.heuristics[turn].iterate(part, run.rng)
     task.improvements += 1
     part.refine(run, TabuParameters.clusters)
     part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
