@@ -246,7 +246,7 @@ def test_what_is_missing_is_named_with_its_command(scene_file, tmp_path, monkeyp
     for package, words, extra in (
         ("distributed", ["--scheduler", "tcp://127.0.0.1:9"], "assoc[dask]"),
         ("optuna", ["--tune", "2"], "assoc[tune]"),
-        ("matplotlib.figure", ["--plot", "--scans", "0"], "assoc[plot]"),
+        ("matplotlib", ["--plot", "--scans", "0"], "assoc[plot]"),
     ):
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, package, None)
