@@ -132,7 +132,7 @@ def _cycle(
             allowed[j] = j
         length = 0
         node = starts[ant]
-        while True:
+        while not (deadline < np.inf and now() > deadline):
             tours[ant, length] = node
             length += 1
             for s in range(num_sensors):

@@ -159,7 +159,7 @@ def _member(rng: np.random.Generator, raw: bytes) -> bytes:
         flat[where] = rng.choice([limits.min, limits.max, 0, 1, limits.max // 2 + 1, 7])
     elif changed.dtype.kind == "U":
         flat[where] = str(rng.choice(["", "x", "radar2d", "\x00", "é" * 50, "{}", "[1]", "null"]))
-    else:
+    elif changed.dtype.kind == "b":
         flat[where] = ~flat[where]
     return _saved(changed)
 
