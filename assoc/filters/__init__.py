@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assoc.filters.adaptive import FuzzyAdaptiveEKF, paper_rules, tuned_data
+from assoc.filters.adaptive import Alarm, FuzzyAdaptiveEKF, paper_rules, tuned_data
 from assoc.filters.base import Expected, Filter, History, Update
 from assoc.filters.consistency import bounds, nees
 from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
@@ -26,6 +26,7 @@ from assoc.filters.uav import UnmannedAircraft
 from assoc.filters.unscented import UnscentedKalmanFilter
 
 __all__ = [
+    "Alarm",
     "ConstantAcceleration",
     "ConstantVelocity",
     "CoordinatedTurn",

@@ -69,6 +69,29 @@ class Adaptive:
         return gaussian(self.mean, self.covariance)
 
 
+@dataclass(frozen=True)
+class Alarm:
+    """A window of innovations, and what is inferred from them.
+
+    Parameters
+    ----------
+    window : int
+        W, measurements.
+    process : sequence of FuzzyRules
+        Infer q, one for each group of components.
+    calm : FuzzyRules or None
+        Infer the variance with which the last component of the state is believed to be 0.
+    """
+
+    window: int
+    process: Sequence[FuzzyRules]
+    calm: FuzzyRules | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.window, bool) or not isinstance(self.window, int) or self.window < 1:
+            raise InvalidInputError(f"window must be a whole number of at least 1, got {self.window!r}")
+
+
 class FuzzyAdaptiveEKF(Filter[Adaptive]):
     """An EKF with Q scaled by q and R by r, which fuzzy rules infer from the last innovations.
 
@@ -97,6 +120,12 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     immediate : bool
         Whether q already scales the noise of the prediction that the measurement corrects; otherwise, as in
         the paper, that of the next.
+    calm : FuzzyRules or None
+        Infer the variance with which the last component of the state, a turn rate, is believed to be 0: it is
+        corrected with a measurement of 0 of that variance, so that in straight flight one model forgets its turns.
+    others : sequence of Alarm
+        More windows with rules of their own; of all that is inferred the largest counts. A short window sees
+        a hard manoeuvre at once, a long one a gentle one at all.
 
     References
     ----------
@@ -114,12 +143,16 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         components: Sequence[int] | None = None,
         groups: Sequence[int] | None = None,
         immediate: bool = False,
+        calm: FuzzyRules | None = None,
+        others: Sequence[Alarm] = (),
     ) -> None:
         super().__init__(motion)
-        if isinstance(window, bool) or not isinstance(window, int) or window < 1:
-            raise InvalidInputError(f"window must be a whole number of at least 1, got {window!r}")
         several = (process,) if isinstance(process, FuzzyRules) else tuple(process or ())
-        for name, rules in (*(("process", one) for one in several), ("measurement", measurement)):
+        self.alarms = (Alarm(window, several, calm), *others)
+        if any(len(one.process) != len(several) or (one.calm is None) != (calm is None) for one in others):
+            raise InvalidInputError(f"others: each must have {len(several)} rules, and calm where the first has")
+        named = [("process", rules) for one in self.alarms for rules in one.process]
+        for name, rules in (*named, *(("calm", one.calm) for one in self.alarms), ("measurement", measurement)):
             if rules is not None and not logarithmic and rules.output.corners[:, 0].min() < 0:
                 raise InvalidInputError(f"{name}: a scale must not be negative")
         self.groups = np.zeros(motion.dim, np.int64) if groups is None else np.array(groups, np.int64)
@@ -128,7 +161,8 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             raise InvalidInputError(f"groups must be {motion.dim} numbers from 0 to {known - 1}")
         self.process, self.measurement = several, measurement
         self.components = None if components is None else tuple(components)
-        self.window, self.logarithmic, self.immediate = window, logarithmic, immediate
+        self.logarithmic, self.immediate = logarithmic, immediate
+        self.window = max(one.window for one in self.alarms)
         self._ekf, self._bare = ExtendedKalmanFilter(motion), ExtendedKalmanFilter(_NoiseFree(motion))
 
     @classmethod
@@ -140,30 +174,37 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         motion : Motion
         data : mapping
             "inputs" (increasing centres), "outputs" (their log10 q, or a list of those for each group),
-            "groups" if there are several, "components" if not all count, "window", "immediate".
+            "groups" if there are several, "components" if not all count, "window", "immediate"; "calm", log10
+            variances; "others", a list of more "window" and "inputs".
         """
-        inputs, outputs = data["inputs"], data["outputs"]
-        if not isinstance(outputs[0], list):
-            outputs = [outputs]
-        levels = [f"level {i}" for i in range(1, len(inputs) + 1)]
-        sets = FuzzyVariable.from_centres(levels, inputs, 1.0)
-        rules = [
-            FuzzyRules(
-                sets,
-                FuzzyVariable.from_centres(levels, centres, float(data.get("reach", 0.05))),
-                [(level, level) for level in levels],
-                points=int(data.get("points", 101)),
-            )
-            for centres in outputs
-        ]
+        outputs = data["outputs"] if isinstance(data["outputs"][0], list) else [data["outputs"]]
+        every = [data, *data.get("others", ())]
+        alarms = []
+        for one in every:
+            inputs = one["inputs"]
+            levels = [f"level {i}" for i in range(1, len(inputs) + 1)]
+            sets = FuzzyVariable.from_centres(levels, inputs, 1.0)
+            rules = [
+                FuzzyRules(
+                    sets,
+                    FuzzyVariable.from_centres(levels, centres, float(data.get("reach", 0.05))),
+                    [(level, level) for level in levels],
+                    points=int(data.get("points", 101)),
+                )
+                for centres in (*outputs, *([data["calm"]] if "calm" in data else []))
+            ]
+            calm = rules.pop() if "calm" in data else None
+            alarms.append(Alarm(int(one["window"]), rules, calm))
         return cls(
             motion,
-            rules,
-            window=int(data["window"]),
+            alarms[0].process,
+            window=alarms[0].window,
             logarithmic=True,
             components=data.get("components"),
             groups=data.get("groups"),
             immediate=bool(data["immediate"]),
+            calm=alarms[0].calm,
+            others=alarms[1:],
         )
 
     def start(self, state: Gaussian) -> Adaptive:
@@ -200,14 +241,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             # the first measurement, or a sensor with other components: nothing to add it to
             past = np.zeros((len(fresh), self.window, o.dim))
         recent = np.concatenate([past[:, 1:], fresh[:, None]], axis=1)
-        known = np.maximum((recent != 0).any(axis=2).sum(axis=1), 1)
-        drift = recent.sum(axis=1)
-        if self.components is not None:
-            drift = drift[:, self.components]
-        level = (drift**2).mean(axis=1) / known
-        q = np.ones((len(level), self.motion.dim))
-        for group, rules in enumerate(self.process):
-            q[:, self.groups == group] = self._scale(rules, level)[:, None]
+        level, q, calm = self._infer(recent)
         r = self._scale(self.measurement, level)
         prior = state.covariance
         if self.immediate:
@@ -215,12 +249,36 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         done = first
         if self.immediate or self.measurement is not None:
             done = self._ekf.correct(gaussian(state.mean, prior), measured, o, r[:, None, None] * o.covariance)
-        corrected = Adaptive(done.state.mean, done.state.covariance, prior, state.process_noise, recent, q)
+        mean, covariance = done.state.mean, done.state.covariance
+        if calm is not None:
+            mean, covariance = _calmed(mean, covariance, calm)
+        corrected = Adaptive(mean, covariance, prior, state.process_noise, recent, q)
         return Update(corrected, done.innovation, done.covariance, done.nis, done.log_likelihood)
 
     def prior(self, predicted: Adaptive, corrected: Adaptive) -> tuple[Array, Array]:
         """Mean and covariance of the prediction as it was corrected, after the adaptation."""
         return predicted.mean, corrected.without_noise
+
+    def _infer(self, recent: Array) -> tuple[Array, Array, Array | None]:
+        """Input of the first rules (B,), q (B, n), and the variance of a turn rate of 0, (B,)."""
+        q = calm = first = None
+        for alarm in self.alarms:
+            late = recent[:, -alarm.window :]
+            known = np.maximum((late != 0).any(axis=2).sum(axis=1), 1)
+            drift = late.sum(axis=1)
+            if self.components is not None:
+                drift = drift[:, self.components]
+            level = (drift**2).mean(axis=1) / known
+            one = np.ones((len(level), self.motion.dim))
+            for group, rules in enumerate(alarm.process):
+                one[:, self.groups == group] = self._scale(rules, level)[:, None]
+            q = one if q is None else np.maximum(q, one)
+            first = level if first is None else first
+            if alarm.calm is not None:
+                variance = self._scale(alarm.calm, level)
+                calm = variance if calm is None else np.maximum(calm, variance)
+        assert q is not None and first is not None
+        return first, q, calm
 
     def _scale(self, rules: FuzzyRules | None, level: Array) -> Array:
         if rules is None:
@@ -238,6 +296,15 @@ def _scaled(q: Array, Q: Array) -> Array:
     root = np.sqrt(q)
     scaled: Array = root[:, :, None] * Q * root[:, None, :]
     return scaled
+
+
+def _calmed(mean: Array, P: Array, variance: Array) -> tuple[Array, Array]:
+    """Correct with a measurement of 0 of the last component, (B,) variances; Joseph's form."""
+    gain = P[:, :, -1] / (P[:, -1, -1] + variance)[:, None]
+    rest = np.broadcast_to(np.eye(mean.shape[1]), P.shape).copy()
+    rest[:, :, -1] -= gain
+    P = rest @ P @ rest.transpose(0, 2, 1) + variance[:, None, None] * gain[:, :, None] * gain[:, None, :]
+    return mean - gain * mean[:, -1:], 0.5 * (P + P.transpose(0, 2, 1))
 
 
 class _NoiseFree(Motion):

@@ -1,7 +1,8 @@
 """Tune the fuzzy rules and, with the same care, the IMM; writes assoc/filters/fuzzy_parameters.json.
 
-Both see the same random flights, the same measurements and as many evaluations. None of these flights
-is in the report (experiments/fuzzy_ekf.py).
+Both see the same random flights and the same measurements. None of these flights is in the report
+(experiments/fuzzy_ekf.py). The search for the rules begins where a longer one, by adaptation of a covariance matrix,
+ended after 1,200 evaluations on the same flights.
 
     python -m experiments.filters.tune_fuzzy [--evaluations N] [--seed N] [--output FILE]
 """
@@ -28,20 +29,34 @@ LEVELS = 4
 OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy_parameters.json"
 
 
-def fuzzy_data(x: Array, window: int) -> dict[str, Any]:
+WINDOWS = (2, 7)
+INPUTS = ((0.496, 1.70, 3.11, 4.82), (0.335, 1.02, 3.16, 17.0))
+"""Where the search begins: centres of the inputs, for each window."""
+OUTPUTS = ((-2.35, -0.261, 1.41, 3.86), (0.162, 0.773, 1.14, 1.39), (-3.91, -1.67, -1.06, -0.271))
+"""Centres of log10 q of the acceleration and of the turn rate, and of log10 of the variance of a turn rate of 0."""
+
+
+def fuzzy_vector() -> Array:
+    """Return the start of the search."""
+    inputs = [np.log(np.diff([0.0, *centres])) for centres in INPUTS]
+    outputs = [np.concatenate([centres[:1], np.log(np.diff(centres))]) for centres in OUTPUTS]
+    return np.concatenate([*inputs, *outputs])
+
+
+def fuzzy_data(x: Array) -> dict[str, Any]:
     """Parameters of the fuzzy filter from a free vector; inputs and outputs are kept increasing."""
-    inputs = np.cumsum(np.exp(x[:LEVELS]))
-    outputs = [
-        np.cumsum(np.concatenate([steps[:1], np.exp(steps[1:])])).tolist()
-        for steps in (x[LEVELS : 2 * LEVELS], x[2 * LEVELS :])
-    ]
+    parts = x.reshape(-1, LEVELS)
+    inputs = [np.cumsum(np.exp(steps)).tolist() for steps in parts[: len(WINDOWS)]]
+    outputs = [np.cumsum(np.concatenate([c[:1], np.exp(c[1:])])).tolist() for c in parts[len(WINDOWS) :]]
     return {
         "acceleration_noise": 1.0,
         "rate_noise": 0.01,
         "groups": [0, 0, 0, 0, 0, 0, 1],
-        "inputs": inputs.tolist(),
-        "outputs": outputs,
-        "window": window,
+        "window": WINDOWS[0],
+        "inputs": inputs[0],
+        "others": [{"window": w, "inputs": one} for w, one in zip(WINDOWS[1:], inputs[1:], strict=True)],
+        "outputs": outputs[:2],
+        "calm": outputs[2],
         "immediate": True,
     }
 
@@ -73,11 +88,13 @@ def score(make: Callable[[], Filter[Any]], batch: Batch) -> float:
     return float(0.5 * np.log(squared).mean())
 
 
-def search(objective: Callable[[Array], float], start: Array, evaluations: int) -> tuple[Array, float]:
+def search(
+    objective: Callable[[Array], float], start: Array, evaluations: int, spread: float = 0.35
+) -> tuple[Array, float]:
     """Nelder and Mead, begun again from the best once it has shrunk."""
     best, value = start, objective(start)
     for part in (0.6, 0.4):
-        simplex = np.vstack([best, best + 0.35 * np.eye(len(best))])
+        simplex = np.vstack([best, best + spread * np.eye(len(best))])
         found = minimize(
             objective,
             best,
@@ -98,7 +115,8 @@ def search(objective: Callable[[Array], float], start: Array, evaluations: int) 
 def main() -> None:
     """Tune and write."""
     parser = argparse.ArgumentParser(description="Tune the fuzzy rules and the IMM on random flights.")
-    parser.add_argument("--evaluations", type=int, default=1200, help="of each search (default 1200)")
+    parser.add_argument("--evaluations", type=int, default=1200, help="of the IMM's search (default 1200)")
+    parser.add_argument("--polish", type=int, default=120, help="evaluations of the rules' search (default 120)")
     parser.add_argument("--flights", type=int, default=120, help="random flights (default 120)")
     parser.add_argument("--seed", type=int, default=20_000, help="of flights and noise (default 20000)")
     parser.add_argument("--output", type=Path, default=OUTPUT, help="the parameter file to write")
@@ -106,28 +124,18 @@ def main() -> None:
     rng = np.random.default_rng(chosen.seed)
     batch = Batch.draw(random_flights(chosen.flights, rng), 1, rng)
 
-    best: tuple[float, dict[str, Any]] | None = None
-    for window in (2, 3):
-        start = np.concatenate(
-            [np.log([0.6, 0.7, 1.7, 2.5]), [-0.5], np.log([0.5, 0.5, 0.5]), [-2.0], np.log([1.5, 1.5, 1.5])]
-        )
-        x, value = search(
-            lambda x, w=window: score(lambda: fuzzy_filter(fuzzy_data(x, w)), batch),  # type: ignore[misc]
-            start,
-            chosen.evaluations // 2,
-        )
-        print(f"fuzzy, window {window}: {np.exp(value):.2f} m")
-        if best is None or value < best[0]:
-            best = value, fuzzy_data(x, window)
+    rules, value = search(
+        lambda x: score(lambda: fuzzy_filter(fuzzy_data(x)), batch), fuzzy_vector(), chosen.polish, 0.1
+    )
+    print(f"fuzzy: {np.exp(value):.2f} m")
     start = np.concatenate([np.log([1.0, 0.1, 3.0, 0.02]), [3.5, 3.0]])
     x, value = search(lambda x: score(lambda: imm(imm_data(x)), batch), start, chosen.evaluations)
     print(f"IMM: {np.exp(value):.2f} m")
-    assert best is not None
     about = (
         f"tuned by experiments/filters/tune_fuzzy.py --seed {chosen.seed} on {chosen.flights} random flights, "
-        f"{chosen.evaluations} evaluations each"
+        f"{chosen.polish} evaluations for the rules, {chosen.evaluations} for the IMM"
     )
-    text = json.dumps({"about": about, **best[1], "imm": imm_data(x)}, indent=2)
+    text = json.dumps({"about": about, **fuzzy_data(rules), "imm": imm_data(x)}, indent=2)
     chosen.output.write_text(text + "\n", encoding="utf-8")
     print(f"{chosen.output}: written")
 

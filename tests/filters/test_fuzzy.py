@@ -9,6 +9,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.filters import (
+    Alarm,
     ConstantVelocity,
     CoordinatedTurn,
     ExtendedKalmanFilter,
@@ -18,7 +19,7 @@ from assoc.filters import (
     paper_rules,
     tuned_data,
 )
-from tests.filters.common import MOTION, RADAR, random_state
+from tests.filters.common import MOTION, RADAR, kalman_update, random_state
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -130,3 +131,44 @@ def test_two_sensors_in_turn():
     for sensor in (RADAR, BEARING, RADAR):
         state = fuzzy.update(fuzzy.predict(state, 1.0), sensor.measure(state.mean[:, :3]), sensor).state
     assert np.isfinite(state.mean).all()
+
+
+def test_calm_is_a_measurement_of_no_turn():
+    """A rule that infers one variance whatever the input: a Kalman update with z = 0 on the turn rate."""
+    motion = CoordinatedTurn(1.0, 0.01)
+    always = FuzzyRules(
+        FuzzyVariable({"any": (0.0, 0.0, 9.0, 9.0)}),
+        FuzzyVariable({"small": (1e-4, 2e-4, 2e-4, 3e-4)}),
+        [("any", "small")],
+    )
+    state = random_state(5, np.random.default_rng(1), 7)
+    state.mean[:, 6] = np.linspace(-0.05, 0.05, 5)
+    z = RADAR.measure(state.mean[:, :3])
+    plain, calm = FuzzyAdaptiveEKF(motion, None), FuzzyAdaptiveEKF(motion, None, calm=always)
+    before = plain.update(plain.start(state), z, RADAR).state
+    after = calm.update(calm.start(state), z, RADAR).state
+    for b in range(5):
+        H = np.eye(7)[6:]
+        mean, P, _, _ = kalman_update(before.mean[b], before.covariance[b], np.zeros(1), H @ before.mean[b], H, 2e-4)
+        np.testing.assert_allclose(after.mean[b], mean, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(after.covariance[b], P, rtol=1e-6, atol=1e-9)
+
+
+def test_of_several_windows_the_larger_counts():
+    sets = FuzzyVariable.from_centres(["low", "high"], [1.0, 4.0], 1.0)
+    scale = FuzzyVariable.from_centres(["one", "ten"], [1.0, 10.0], 0.5)
+    rules = FuzzyRules(sets, scale, [("low", "one"), ("high", "ten")])
+    singles = [FuzzyAdaptiveEKF(MOTION, rules, window=w) for w in (1, 4)]
+    both = FuzzyAdaptiveEKF(MOTION, rules, others=[Alarm(4, [rules])])
+    start = random_state(6, np.random.default_rng(2))
+    measured = [RADAR.measure(start.mean[:, :3] + np.array([300.0 * k, 0, 0])) for k in range(5)]
+    states = [one.start(start) for one in (*singles, both)]
+    for z in measured:
+        # the noise plays no part between corrections: all see the same innovations
+        states = [one.update(s, z, RADAR).state for one, s in zip((*singles, both), states, strict=True)]
+        short, long, larger = (s.process_scale for s in states)
+        assert np.array_equal(larger, np.maximum(short, long))
+    with pytest.raises(InvalidInputError, match="others: each must have 1 rules"):
+        FuzzyAdaptiveEKF(MOTION, rules, others=[Alarm(4, [])])
+    with pytest.raises(InvalidInputError, match="window"):
+        Alarm(0, [rules])
