@@ -53,7 +53,7 @@ class TrackOrientedMHT(Tracker):
     name = "mht"
 
     def __init__(
-        self, *arguments: Any, depth: int = 3, max_branches: int = 20, branch_drop: float = 10.0, **options: Any
+        self, *arguments: Any, depth: int = 3, max_branches: int = 30, branch_drop: float = 15.0, **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
         for value, what in ((depth, "depth"), (max_branches, "max_branches")):
