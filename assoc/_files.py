@@ -230,6 +230,9 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
             raise InvalidInputError(
                 f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}"
             )
+        if any(type(side) is not int for side in shape):
+            # True and False pass numpy's own check, and no array has such a side
+            raise InvalidInputError(f"{file}: the field {name!r} has the shape {shape}, expected whole numbers")
         if any(side < 0 for side in shape):
             raise InvalidInputError(f"{file}: the field {name!r} has a negative shape {shape}")
         size = math.prod(shape) * dtype.itemsize
