@@ -3,15 +3,20 @@
 # make lint   ruff, mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
+# make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
+# make test-uncompiled  a part of the tests with numba switched off
+# make check-dist       sdist and wheel: what they hold, and that they work in an empty environment
+# make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
 VENV := .venv
+OLDEST := .venv-oldest
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint docs fuzz bench bench-quick clean
+.PHONY: demo test test-oldest test-uncompiled lint docs fuzz check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -33,6 +38,20 @@ fuzz: $(VENV)/.installed-test
 	$(PY) -m tests.trust.fuzzing --count 20000 --processes 2
 	$(PY) -m tests.trust.differential --count 3000
 
+# numba keeps the kernels of one version only: they must not take the place of the others
+test-oldest: $(OLDEST)/.installed-test
+	NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/kernels" $(OLDEST)/bin/python -m pytest -n 2 -q -p no:cacheprovider
+
+test-uncompiled: $(VENV)/.installed-test
+	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $$($(PY) -m tests.trust.uncompiled)
+
+check-dist: $(VENV)/.installed-release
+	$(PY) -m tests.release.distribution
+
+audit: $(VENV)/.installed-release
+	$(PY) -m pip freeze --exclude-editable > $(VENV)/frozen.txt
+	$(PY) -m pip_audit --strict --disable-pip --no-deps -r $(VENV)/frozen.txt
+
 bench: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks
 
@@ -40,7 +59,7 @@ bench-quick: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks --quick
 
 clean:
-	rm -rf $(VENV) demo docs/_build
+	rm -rf $(VENV) $(OLDEST) demo docs/_build
 
 # the stamps make a changed pyproject.toml (a new dependency, say) reach an environment that exists already
 $(VENV)/.created:
@@ -62,4 +81,14 @@ $(VENV)/.installed-lint: $(VENV)/.installed
 
 $(VENV)/.installed-docs: $(VENV)/.installed
 	$(PIP) -e ".[docs]"
+	@touch $@
+
+$(VENV)/.installed-release: $(VENV)/.installed
+	$(PIP) -e ".[release]"
+	@touch $@
+
+$(OLDEST)/.installed-test: $(VENV)/.installed-test tests/release/oldest.py
+	"$(PYTHON)" -m venv --clear $(OLDEST)
+	$(PY) -m tests.release.oldest > $(OLDEST)/constraints.txt
+	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check -e ".[test]" -c $(OLDEST)/constraints.txt
 	@touch $@
