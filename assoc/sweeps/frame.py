@@ -62,7 +62,7 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frame = pd.DataFrame({"solver": [settings[key]["solver"] for key in columns["setting"]]}, dtype="str")
     parameters = list(dict.fromkeys(name for one in settings.values() for name in one["parameters"]))
     for name in parameters:
-        values = {key: one["parameters"].get(name) for key, one in settings.items()}
+        values = {key: _plain(one["parameters"].get(name)) for key, one in settings.items()}
         column = pd.Series([values[key] for key in columns["setting"]])
         frame[column_of(name)] = column
     for name in ("repeat", "seed"):
@@ -82,6 +82,11 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frame["setting"] = pd.Series(columns["setting"], dtype="str")
     order = ["solver", *map(column_of, parameters), "scene", "scan", "repeat"]
     return frame.sort_values(order, kind="stable", ignore_index=True)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as it can be sorted by: lists and tables (of a file that someone changed) as text."""
+    return value if value is None or isinstance(value, (str, bool, int, float)) else str(value)
 
 
 def column_of(parameter: str) -> str:

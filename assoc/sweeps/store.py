@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -300,12 +300,37 @@ def _sound(entry: Mapping[str, Any]) -> bool:
     columns = [entry.get(name) for name in COLUMNS]
     if not all(isinstance(column, list) for column in columns):
         return False
-    keys = [entry[name] for name in ("setting", "source", "repeat", "scan")]
-    numbers = [entry[name] for name in ("seed", "cost", "lower_bound", "iterations", "time")]
-    plain = all(isinstance(value, (str, int)) for column in keys for value in column) and all(
-        value is None or isinstance(value, (int, float)) for column in numbers for value in column
-    )
+    plain = all(_KINDS[name](value) for name in COLUMNS for value in entry[name])
     return plain and len({len(column) for column in columns if column is not None}) == 1
+
+
+def _text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _whole(value: object) -> bool:
+    # what a column of 64 bits holds
+    return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
+
+
+def _real(value: object) -> bool:
+    return value is None or isinstance(value, float) or _whole(value)
+
+
+def _trace(value: object) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(point, list) and len(point) == 3 and all(map(_real, point)) for point in value
+    )
+
+
+_KINDS: Mapping[str, Callable[[object], bool]] = {
+    **dict.fromkeys(("setting", "source"), _text),
+    **dict.fromkeys(("repeat", "scan", "seed"), _whole),
+    **dict.fromkeys(("cost", "lower_bound", "time"), _real),
+    **dict.fromkeys(("iterations", "true_tuples", "correct_tuples"), lambda value: value is None or _whole(value)),
+    "stopped_by": lambda value: value is None or _text(value),
+    "trace": _trace,
+}
 
 
 def _lock(folder: Path) -> IO[bytes]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
 from assoc.sweeps.sources import Source, named
-from assoc.sweeps.store import LOG, MANIFEST, Store, damaged_lines, run_keys
+from assoc.sweeps.store import LOG, MANIFEST, Store, _line, damaged_lines, run_keys
 
 
 def same(one, other):
@@ -88,6 +89,39 @@ def test_a_changed_byte_costs_its_line_alone(study, whole):
     assert len(load(whole)) < study.size and damaged_lines(whole) == 1
     study.run(whole)
     assert same(load(whole), expected)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("repeat", "1"), ("scan", True), ("seed", 2**70), ("seed", None), ("setting", 3), ("cost", "-1"),
+        ("time", {}), ("iterations", 1.5), ("true_tuples", 10**30), ("stopped_by", ["x"]), ("trace", [[1, 2]]),
+        ("trace", [["a", 0, 0]]),
+    ],
+)  # fmt: skip
+def test_a_line_with_a_right_checksum_and_wrong_content_is_passed_over(whole, column, value):
+    lines = (whole / LOG).read_bytes().splitlines(keepends=True)
+    at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
+    entry = json.loads(lines[at][9:])
+    entry[column][-1] = value
+    lines[at] = _line(entry)
+    (whole / LOG).write_bytes(b"".join(lines))
+    assert damaged_lines(whole) == 1
+    assert len(load(whole)) == 40 - len(entry["scan"]) and len(load_traces(whole)) > 0
+
+
+@pytest.mark.parametrize("value", [{"a": 1}, [1, 2], "high", None, True, 10**400, float("inf")])
+def test_parameters_of_any_kind_are_shown(whole, value):
+    """One setting has a value that no other has the like of: columns of mixed kinds are sorted all the same."""
+    lines = (whole / LOG).read_bytes().splitlines(keepends=True)
+    entry = json.loads(lines[0][9:])
+    entry["parameters"]["alpha"] = value
+    with open(whole / LOG, "wb") as file:
+        body = json.dumps(entry).encode()
+        file.write(b"%08x %s\n" % (zlib.crc32(body), body) + b"".join(lines[1:]))
+    frame = load(whole)
+    assert len(frame) == 40
+    assert str(value) in set(map(str, frame["alpha"])) or value in (None, True) and frame["alpha"].nunique() >= 1
 
 
 def test_a_changed_design_adds(study, whole):
