@@ -145,16 +145,15 @@ def _parser(further: Sequence[Option]) -> Parser:
     add(
         "--filter",
         metavar="NAME",
-        default="ekf",
-        help="ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default ekf)",
+        help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: scenes imm-cv, plots ekf)",
     )
-    add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm, fuzzy: m/s^2 (default 20)")
+    add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm: m/s^2 (default 30, imm-cv 50)")
     add("--seed", metavar="N", help="seed of the solver (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each scan's assignment problem (default 2)")
+    add("--time-limit", metavar="S", help="seconds for each scan's assignment problem (default: none)")
     add("--gate-probability", metavar="P", help="share of true measurements that a gate lets through (default 0.999)")
     add("--all", action="store_true", help="write tentative tracks, too")
     add("--depth", metavar="N", help="mht: scans until a decision is final (default 3)")
-    add("--max-branches", metavar="N", help="mht: branches of a track tree (default 20)")
+    add("--max-branches", metavar="N", help="mht: branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: hypotheses that are kept (default 20)")
     plots = parser.add_argument_group("plots")
     plots.add_argument(
@@ -214,7 +213,6 @@ def _make(
     from assoc.filters.motion import positive
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.choices import make_filter
-    from assoc.tracking.tracker import PROCESS_NOISE
 
     if name not in KINDS:
         raise InvalidInputError(f"--tracker: unknown name {name!r}; known: {', '.join(KINDS)}")
@@ -226,7 +224,7 @@ def _make(
         if name not in takers:
             raise InvalidInputError(f"{flag}: is for --tracker {' or '.join(takers)}, not for {name}")
         extra[option] = whole_number(parsed[option], flag, 1)
-    noise = PROCESS_NOISE
+    noise = None
     if parsed["process_noise"] is not None:
         noise = positive(_number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
     made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
@@ -239,6 +237,7 @@ def _of_scene(
     from assoc.scene import Scene
     from assoc.tracking import track_scene
 
+    parsed["filter"] = parsed["filter"] or "imm-cv"
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"--{flag.replace('_', '-')}: describes the radar of plots, a scene knows its own")
@@ -257,6 +256,7 @@ def _of_plots(
     from assoc.tracking.windows import step_windows
 
     name = parsed["tracker"] or "mht"
+    parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):
         raise InvalidInputError(
             f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis or nearest-neighbour"

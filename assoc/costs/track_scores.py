@@ -82,6 +82,29 @@ def log_birth(covariances: Array, volume: float, birth_rate: float) -> Array:
     return limited
 
 
+def doubted_gain(score: Array, gain: Array) -> Array:
+    """What a scan adds to the logarithm of a hypothesis' probability if a track may be none: ln(1 - p + p exp(gain)).
+
+    The score is the logarithm of the odds that the track is a target; p is the probability of that. If it is
+    none, its measurements are false alarms and its misses no surprise, and the scan adds nothing. So a track in
+    the making takes what nobody else wants, but does not outbid one that is certain.
+
+    Parameters
+    ----------
+    score : array (T,)
+        Before the scan.
+    gain : array (T,)
+        What the scan adds to the score.
+
+    References
+    ----------
+    D. Musicki, R. Evans, Joint integrated probabilistic data association: JIPDA, IEEE Trans. Aerospace and
+    Electronic Systems 40, 2004.
+    """
+    odds = -score
+    return np.asarray(np.logaddexp(odds, gain) - np.logaddexp(odds, 0.0))
+
+
 def sequential_threshold(false_probability: float, missed_probability: float = 0.0) -> float:
     """Score at which a track is confirmed: ln((1 - beta) / alpha), the upper limit of Wald's sequential test.
 

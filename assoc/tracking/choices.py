@@ -11,7 +11,7 @@ from assoc import filters
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Radar3D, Sensor
-from assoc.tracking.tracker import PROCESS_NOISE
+from assoc.tracking.defaults import MANOEUVRE_NOISE, PROCESS_NOISE, two_speeds
 
 _TURN_NOISE = 0.03
 """Standard deviation of a turn rate's increment in a step, rad/s."""
@@ -40,6 +40,7 @@ def _imm(noise: float, flat: bool, seed: int) -> Filter[Any]:
 
 
 _MAKERS: dict[str, Callable[[float, bool, int], Filter[Any]]] = {
+    "imm-cv": lambda noise, flat, seed: two_speeds(noise, 2 if flat else 3),
     "ekf": lambda noise, flat, seed: filters.ExtendedKalmanFilter(_velocity(noise, flat)),
     "kalman": lambda noise, flat, seed: filters.KalmanFilter(_velocity(noise, flat)),
     "modified-ekf": lambda noise, flat, seed: filters.ModifiedEKF(_velocity(noise, flat)),
@@ -56,7 +57,7 @@ FILTERS = tuple(_MAKERS)
 
 
 def make_filter(
-    name: str, sensors: Sequence[Sensor], process_noise: float = PROCESS_NOISE, seed: int = 0
+    name: str, sensors: Sequence[Sensor], process_noise: float | None = None, seed: int = 0
 ) -> Filter[Any]:
     """Make a filter with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
 
@@ -66,8 +67,9 @@ def make_filter(
         One of `FILTERS`.
     sensors : sequence of Sensor
         Where none tells a height, states are planar.
-    process_noise : float
-        Root of the acceleration's spectral density, m/s^1.5; of imm and fuzzy the acceleration, m/s^2.
+    process_noise : float, optional
+        Root of the acceleration's spectral density, m/s^1.5, of imm-cv that of its manoeuvring model; of imm and
+        fuzzy the acceleration, m/s^2. Left out, 50 for imm-cv and 30 for all others.
     seed : int
         Of the ensemble's noise.
 
@@ -78,6 +80,8 @@ def make_filter(
     """
     if name not in _MAKERS:
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
+    if process_noise is None:
+        process_noise = MANOEUVRE_NOISE if name == "imm-cv" else PROCESS_NOISE
     made = _MAKERS[name](process_noise, planar(sensors), seed)
     for sensor in sensors:
         made.observe(sensor)

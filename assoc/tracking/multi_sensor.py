@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from assoc.costs.build import build_problem
-from assoc.costs.track_scores import log_birth
+from assoc.costs.track_scores import doubted_gain, log_birth
 from assoc.costs.track_tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan
@@ -20,7 +20,8 @@ class MultiSensorTracker(SingleScanTracker):
     """Tracks and S sensors in one (S+1)-D assignment problem for each scan.
 
     Tracks are the first list. A tuple (track, z_1, ..., z_S) costs the negative log likelihood ratio of its
-    measurements under the track's predicted density, misses included; a tuple without a track is a new target
+    measurements under the track's predicted density, misses included, averaged over whether the track is a target
+    at all, which its score tells; a tuple without a track is a new target
     and costs what `assoc.build_problem` says, with the birth density in it. Measurements in no tuple are false
     alarms, and begin tentative tracks.
 
@@ -36,21 +37,23 @@ class MultiSensorTracker(SingleScanTracker):
 
     name = "multi-sensor"
 
-    def _associate(self, scan: Scan, states: Any) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
         measurements = list(scan.measurements)
         tuples = grow_track_tuples(
             self.filter, states, measurements, self.sensors, self.terms,
             gate_probability=self.gate_probability, max_tuples=self.max_tuples,
         )  # fmt: skip
+        gain = -tuples.costs
+        value = doubted_gain(scores[tuples.track], gain)
         rows, costs = self._new_targets(scan)
         known = np.column_stack([tuples.track + 1, tuples.rows])
         fresh = np.column_stack([np.zeros(len(rows), dtype=np.int64), rows])
         sizes = np.concatenate([[len(states)], scan.sizes])
-        problem = AssignmentProblem(np.concatenate([known, fresh]), np.concatenate([tuples.costs, costs]), sizes)
+        problem = AssignmentProblem(np.concatenate([known, fresh]), np.concatenate([-value, costs]), sizes)
         solution = self._assign(problem)
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return Outcome(tuples.states[kept], -tuples.costs[kept], tuples.rows[kept], born)
+        return Outcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""

@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from assoc.costs.track_scores import doubted_gain
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
@@ -23,7 +24,8 @@ class NearestNeighbourTracker(Tracker):
     """The plain tracker that others are measured against.
 
     The sensors of a scan are taken in one after the other. Pairs of tracks and measurements within the gate
-    are taken by falling likelihood; what is left over starts a track at once, which the next sensor may confirm.
+    are taken by falling likelihood, averaged over whether the track is a target at all; what is left over starts
+    a track at once, which the next sensor may confirm.
 
     Parameters
     ----------
@@ -54,7 +56,7 @@ class NearestNeighbourTracker(Tracker):
             stamps = None if times is None else times[s]
             frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
             before = time
-            chosen = self._choose(frame, s, len(bank), len(z))
+            chosen = self._choose(frame, s, bank.score, len(z))
             bank, hit, ids = self._take_in(bank, frame, chosen, s, len(z))
             free = np.flatnonzero(ids == 0)
             states, fit, positions = self._singles(s, scan, free)
@@ -75,17 +77,19 @@ class NearestNeighbourTracker(Tracker):
         ended = np.sort(bank.track_id[gone & bank.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
-    def _choose(self, frame: Frame, s: int, tracks: int, count: int) -> Array:
+    def _choose(self, frame: Frame, s: int, scores: Array, count: int) -> Array:
         """Rows of the pairs that are taken."""
-        pairs = frame.pairs
+        pairs, tracks = frame.pairs, len(scores)
+        own = scores[pairs.track]
+        seen = doubted_gain(own, self.terms.detection[s] + pairs.log_likelihood)
         if self.rule == "assignment":
-            costs = self.terms.miss[s] - self.terms.detection[s] - pairs.log_likelihood
+            costs = doubted_gain(own, self.terms.miss[s]) - seen
             both = np.stack([pairs.track, pairs.measurement], axis=1) + 1
             solution = self._assign(AssignmentProblem(both, costs, [tracks, count]))
             return np.asarray(solution.indices[solution.indices < len(both)])
         free_track, free = np.ones(tracks, dtype=np.bool_), np.ones(count, dtype=np.bool_)
         taken = []
-        for row in np.argsort(-pairs.log_likelihood, kind="stable").tolist():
+        for row in np.argsort(-seen, kind="stable").tolist():
             t, m = pairs.track[row], pairs.measurement[row]
             if free_track[t] and free[m]:
                 free_track[t] = free[m] = False

@@ -37,7 +37,7 @@ class SingleScanTracker(Tracker):
         self._instant(times)
         scan = self._scan_of(time, measurements)
         bank = self._predicted(self._bank, self._elapsed(time))
-        outcome = self._associate(scan, bank.states)
+        outcome = self._associate(scan, bank.states, bank.score)
         seen = outcome.rows.any(axis=1)
         bank = bank.scored(outcome.states, outcome.gain, np.where(seen, time, np.nan))
         new, rows = self._begin(scan, outcome.born)
@@ -51,8 +51,8 @@ class SingleScanTracker(Tracker):
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
     @abstractmethod
-    def _associate(self, scan: Scan, states: Any) -> Outcome:
-        """Associate a scan with predicted tracks."""
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+        """Associate a scan with predicted tracks of these scores."""
 
     @property
     def _volume(self) -> float:

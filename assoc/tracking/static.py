@@ -9,6 +9,7 @@ import numpy as np
 from assoc.costs.build import build_problem
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.track_gating import near_pairs
+from assoc.costs.track_scores import doubted_gain
 from assoc.costs.track_tuples import gate_of
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
@@ -23,7 +24,7 @@ class StaticFusionTracker(SingleScanTracker):
 
     The S-D problem knows nothing of the tracks: what it puts together stays together. Single measurements go
     to the tracks as tuples of one. A tuple's cost for a track is that of all its measurements under the
-    track's predicted density, misses included.
+    track's predicted density, misses included, averaged over whether the track is a target at all.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ class StaticFusionTracker(SingleScanTracker):
 
     name = "static"
 
-    def _associate(self, scan: Scan, states: Any) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
         fused = self._assign(
             build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
         ).tuples
@@ -42,8 +43,9 @@ class StaticFusionTracker(SingleScanTracker):
         # every track may be missed: (track, 0), with the state as predicted
         pairs = np.stack([np.append(track, np.arange(count)), np.append(which + 1, np.zeros(count, np.int64))], axis=1)
         pairs[:, 0] += 1
-        costs = np.append(costs, np.full(count, alone))
-        solution = self._assign(AssignmentProblem(pairs, costs, [count, len(fused)]))
+        gain = -np.append(costs, np.full(count, alone))
+        value = doubted_gain(scores[pairs[:, 0] - 1], gain)
+        solution = self._assign(AssignmentProblem(pairs, -value, [count, len(fused)]))
         kept = solution.indices[solution.indices < len(pairs)]
         kept = kept[np.argsort(pairs[kept, 0])]
         chosen = pairs[kept, 1]
@@ -52,7 +54,7 @@ class StaticFusionTracker(SingleScanTracker):
         free = np.ones(len(fused) + 1, dtype=np.bool_)
         free[chosen] = False
         after = concatenate([corrected, states])[kept]
-        return Outcome(after, -costs[kept], rows, fused[free[1:]])
+        return Outcome(after, gain[kept], rows, fused[free[1:]])
 
     def _pairs(self, scan: Scan, states: Any, fused: Array) -> tuple[Array, Array, Array, Any]:
         """Tracks and tuples within the gates: rows of both, costs, and the corrected states."""

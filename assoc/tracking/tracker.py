@@ -16,7 +16,6 @@ from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.track_scores import score_terms
 from assoc.errors import InvalidInputError
-from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
 from assoc.filters.state import Gaussian
@@ -28,6 +27,7 @@ from assoc.solution import Solution
 from assoc.solvers.front import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.bank import Bank, empty_bank
+from assoc.tracking.defaults import two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track
@@ -37,13 +37,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 FORMAT = "assoc.tracker"
 VERSION = 1
 
-PROCESS_NOISE = 20.0
-"""Default process noise: root of the acceleration's spectral density, m/s^1.5."""
-
-
-TIME_LIMIT = 2.0
-"""Default time limit for the assignment problem of a scan, seconds; only dense scenes come near it."""
-
+# what the exact solver may do on one scan where the user says nothing of it: visits of tuples in branch and bound,
+# and nodes at the least; counted, so that the answer does not depend on the machine
+_VISITS, _LEAST_NODES = 500_000, 10
 _FORGETTING = 0.05
 
 
@@ -54,7 +50,8 @@ class Tracker(ABC):
     ----------
     sensors : sequence of Sensor
     filter : Filter, optional
-        Any filter of `assoc.filters`; by default an extended Kalman filter with nearly constant velocity.
+        Any filter of `assoc.filters`; by default interacting multiple models, quiet flight and manoeuvres
+        (`assoc.tracking.defaults.two_speeds`).
     region : array_like (3, 2), optional
         Bounds of x, y, z in metres, where targets are; see `assoc.Scene`.
     solver : str
@@ -63,8 +60,9 @@ class Tracker(ABC):
     seed : int
         Of the solver's randomness; the same seed gives the same tracks.
     time_limit : float or None
-        Seconds for each assignment problem; when they are over the best solution found is taken (which then
-        depends on the machine). None: as long as it takes.
+        Seconds for each assignment problem; when they are over the best solution found is taken, which then
+        depends on the machine. By default there is no clock; where `solver_parameters` say nothing of `nodes` the
+        exact solver stops after so many that dense scenes do not take minutes, the same on every machine.
     life_cycle : LifeCycle, optional
     initiation : Initiation, optional
     gate_probability : float
@@ -89,7 +87,7 @@ class Tracker(ABC):
         solver: str = "exact",
         solver_parameters: Mapping[str, Any] | None = None,
         seed: int = 0,
-        time_limit: float | None = TIME_LIMIT,
+        time_limit: float | None = None,
         life_cycle: LifeCycle | None = None,
         initiation: Initiation | None = None,
         gate_probability: float = GATE_PROBABILITY,
@@ -98,7 +96,7 @@ class Tracker(ABC):
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         self._place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
         self.sensors = tuple(self._place.sensors)
-        self.filter = filter or ExtendedKalmanFilter(ConstantVelocity(PROCESS_NOISE, kind="continuous"))
+        self.filter = filter or two_speeds()
         if not isinstance(self.filter, Filter):
             raise InvalidInputError(f"filter must be a filter of assoc.filters, got {type(filter).__name__}")
         for sensor in self.sensors:
@@ -276,7 +274,11 @@ class Tracker(ABC):
         return np.random.SeedSequence((self.seed, self._scan))
 
     def _assign(self, problem: AssignmentProblem) -> Solution:
-        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, **self.solver_parameters)
+        parameters = self.solver_parameters
+        if self.solver == "exact" and self.time_limit is None:
+            nodes = max(_LEAST_NODES, _VISITS // max(problem.num_tuples, 1))
+            parameters = {"nodes": nodes, "patience": 0} | parameters
+        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, **parameters)
 
     def _elapsed(self, time: float) -> float:
         return 0.0 if self._time is None else time - self._time

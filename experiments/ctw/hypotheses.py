@@ -46,11 +46,11 @@ class HypothesisTracker:
             "life_cycle": LifeCycle(deletion_time=60.0, false_probability=1e-3),
             "initiation": Initiation(speed=200.0, birth_rate=0.1),
             "depth": 4,
-            # a plot that two aircraft contest scores above 10: the one that must do without it shall keep that branch
-            "max_branches": 30,
-            "branch_drop": 25.0,
-            **options,
         }
+        if issubclass(kind, TrackOrientedMHT):
+            # a plot that two aircraft contest scores above 10: who must do without it shall keep that branch
+            settings |= {"max_branches": 30, "branch_drop": 25.0}
+        settings |= options
         motion = ConstantVelocity(process_noise, kind="continuous", dimensions=2)
         self.tracker = kind([radar], ExtendedKalmanFilter(motion), **settings)
         self.clock = clock

@@ -109,7 +109,7 @@ BAD = {
     "no file": (["absent.npz"], "absent.npz: no such file"),
     "no csv": (["absent.csv"], "absent.csv"),
     "tracker": (["SCENE", "--tracker", "mth"], "--tracker: unknown name 'mth'; known: multi-sensor"),
-    "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: ekf"),
+    "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: imm-cv"),
     "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),

@@ -140,14 +140,24 @@ def new_target_score(zs, present, volume, birth):
     return total
 
 
+def doubted_score(score, zs, present, mean, cov):
+    """`set_score` of a track that is a target with the probability its score says: averaged over both cases."""
+    p = 1.0 / (1.0 + math.exp(-score))
+    gain = set_score(zs, present, mean, cov)
+    return math.log(1.0 - p + p * math.exp(gain))
+
+
 def best_partition(tracks, scan, present, volume, birth):
-    """The largest sum of scores of one scan, by trying all: each measurement to a track, a group or nobody."""
+    """The largest sum of scores of one scan, by trying all: each measurement to a track, a group or nobody.
+
+    A track is its mean, covariance and score.
+    """
     everything = [(s, j) for s, z in enumerate(scan) for j in range(len(z))]
 
     def score(groups):
         total = 0.0
-        for t, (mean, cov) in enumerate(tracks):
-            total += set_score({s: scan[s][j] for s, j in groups.get(t, [])}, present, mean, cov)
+        for t, (mean, cov, before) in enumerate(tracks):
+            total += doubted_score(before, {s: scan[s][j] for s, j in groups.get(t, [])}, present, mean, cov)
         for key, members in groups.items():
             if key >= len(tracks):
                 total += new_target_score({s: scan[s][j] for s, j in members}, present, volume, birth)

@@ -45,10 +45,10 @@ def test_tuple_costs_are_stacked_densities_against_clutter():
     found = grow_track_tuples(
         filter_, Gaussian(mean, cov), z, SENSORS, score_terms(SENSORS, 1.0), gate_probability=1 - 1e-12
     )
-    alone = -plain.set_score({}, SENSORS, mean[0], cov[0])
     listed = {
         (t, *row): cost for t, row, cost in zip(found.track.tolist(), found.rows.tolist(), found.costs, strict=True)
     }
+    alone = -plain.set_score({}, SENSORS, mean[0], cov[0])
     for t in range(2):
         for i in range(3):
             for j in range(4):
@@ -70,21 +70,47 @@ def test_each_scan_is_the_best_of_all_partitions(seed):
     assert sum(t.score for t in own.tracks if t.track_id in ids_of(step, several)) == pytest.approx(score, abs=1e-5)
 
     before = own.tracks
-    moved = [plain.predict(t.mean, t.covariance, 1.0) for t in before]
+    moved = [(*plain.predict(t.mean, t.covariance, 1.0), t.score) for t in before]
     score, groups = plain.best_partition(moved, second, SENSORS, VOLUME, plain.BIRTH)
     step = own.step(1.0, second)
     after = {t.track_id: t for t in own.tracks}
     for i, track in enumerate(before):
         members = groups.get(i, ())
         assert ids_of(step, {members}) == ({track.track_id} if members else set())
-        mean, cov = moved[i]
+        mean, cov, _ = moved[i]
         for s, j in members:
             mean, cov, _ = plain.correct(mean, cov, second[s][j], SENSORS[s].covariance)
         np.testing.assert_allclose(after[track.track_id].mean, mean, rtol=1e-7, atol=1e-6)
-    gain = sum(after[t.track_id].score - t.score for t in before)
+    total = 0.0
+    for i, track in enumerate(before):
+        mean, cov, old = moved[i]
+        zs = {s: second[s][j] for s, j in groups.get(i, ())}
+        gain = after[track.track_id].score - old
+        assert gain == pytest.approx(plain.set_score(zs, SENSORS, mean, cov), abs=1e-6)
+        total += plain.doubted_score(old, zs, SENSORS, mean, cov)
     fresh = {m for key, m in groups.items() if key >= len(before)}
-    gain += sum(after[i].score for i in ids_of(step, fresh))
-    assert gain == pytest.approx(score, abs=1e-5)
+    total += sum(after[i].score for i in ids_of(step, fresh))
+    assert total == pytest.approx(score, abs=1e-5)
+
+
+def test_a_track_in_the_making_does_not_take_a_certain_tracks_measurement():
+    """A target turns away from its track; what it then leaves, a new track must not claim for its wide velocity."""
+    sensors = [plain.sensor(P=0.9, rate=1.0)]
+    own = MultiSensorTracker(
+        sensors, KalmanFilter(ConstantVelocity(2.0, kind="continuous")), region=plain.REGION,
+        initiation=Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH),
+    )  # fmt: skip
+    own.begin(0.0, Gaussian(np.array([[500.0, 500.0, 250.0, 0.0, 0.0, 0.0]]), np.diag([25.0] * 3 + [4.0] * 3)))
+    # nothing near the track, a lone measurement farther off, then one that is nearer to what the newcomer expects
+    own.step(1.0, [np.array([[560.0, 500.0, 250.0]])])
+    known, new = own.tracks
+    step = own.step(2.0, [np.array([[534.0, 500.0, 250.0]])])
+    density = [
+        plain.set_score({0: np.array([534.0, 500.0, 250.0])}, sensors, *plain.predict(t.mean, t.covariance, 1.0))
+        for t in (known, new)
+    ]
+    assert density[1] > density[0]
+    assert step.assigned[0].tolist() == [known.track_id]
 
 
 def groups_of(step):

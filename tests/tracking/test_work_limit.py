@@ -1,0 +1,95 @@
+"""Tracks do not depend on the clock: what ends a solver's work on a scan is counted."""
+
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+from assoc import simulation
+from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
+from assoc.tracking import tracker as module
+from assoc.tracking.defaults import two_speeds
+
+
+@pytest.fixture
+def scene():
+    # bearings cross where no target is: the assignment problems need branching
+    return simulation.simulate("bearing-only", 3, scans=3)
+
+
+def rows(tracker, scene):
+    table, decisions = track_scene(tracker, scene, confirmed=False)
+    assert isinstance(table, TrackTable) and len(table)
+    return table.to_frame().to_csv(), [one.assigned[0].tolist() for one in decisions]
+
+
+@pytest.mark.parametrize("name", sorted(TRACKERS))
+def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
+    crowd = simulation.simulate("crowd", 1, targets=12, scans=3, width=400.0, height=300.0)
+    quick = rows(TRACKERS[name].for_scene(crowd), crowd)
+    # every look at the clock finds a minute gone
+    minutes = itertools.count(start=1e6, step=60.0)
+    for clock in ("perf_counter", "monotonic", "process_time"):
+        monkeypatch.setattr(time, clock, lambda: next(minutes))
+    assert rows(TRACKERS[name].for_scene(crowd), crowd) == quick
+
+
+def test_a_clock_that_is_asked_for_counts(scene, monkeypatch):
+    seen = []
+    inner = module.assign
+
+    def spy(problem, solver, **options):
+        seen.append(options)
+        return inner(problem, solver, **options)
+
+    monkeypatch.setattr(module, "assign", spy)
+    options = [
+        {}, {"time_limit": 7.0}, {"solver_parameters": {"nodes": 3}}, {"solver": "greedy"}
+    ]  # fmt: skip
+    for one in options:
+        tracker = MultiSensorTracker.for_scene(scene, **one)
+        tracker.step(0.0, scene.scan(0).measurements)
+    limits = [(one["time_limit"], one.get("nodes"), one.get("patience")) for one in seen]
+    assert limits[0][0] is None and limits[0][1] >= 10 and limits[0][2] == 0
+    assert limits[1:] == [(7.0, None, None), (None, 3, 0), (None, None, None)]
+
+
+def test_the_work_is_less_for_large_problems(monkeypatch):
+    nodes = []
+    monkeypatch.setattr(module, "assign", lambda problem, solver, **o: nodes.append(o["nodes"]))
+    tracker = MultiSensorTracker.for_scene(simulation.simulate("crowd", 1, targets=2))
+
+    class Problem:
+        def __init__(self, count):
+            self.num_tuples = count
+
+    for count in (0, 10, 10_000, 10_000_000):
+        tracker._assign(Problem(count))
+    assert nodes == [500_000, 50_000, 50, 10]
+
+
+@pytest.mark.parametrize("seed", (200, 201))
+def test_the_default_holds_a_target_through_five_g(seed):
+    """The second target of the three-radar scene turns at 12 s and at 23 s."""
+    scene = simulation.simulate("three-radar", seed, scans=35)
+    table, _ = track_scene(MultiSensorTracker.for_scene(scene), scene)
+    frame = table.to_frame()
+    assert frame.track_id.nunique() == 3
+    assert (frame.groupby("track_id").size() >= 34).all()
+
+
+def test_two_speeds_believes_in_manoeuvres_when_there_is_one():
+    from assoc.filters import Gaussian
+    from assoc.sensors import PositionSensor
+
+    filter_ = two_speeds()
+    sensor = PositionSensor(position=np.zeros(3), noise=np.full(3, 30.0), field_of_view=[[-1e5, 1e5]] * 3)
+    state = filter_.start(Gaussian(np.array([[0.0, 0, 0, 300, 0, 0]]), np.diag([900.0] * 3 + [100.0] * 3)))
+    weights = []
+    for k in range(1, 31):
+        turn = max(k - 15, 0)
+        place = np.array([[300.0 * k, 25.0 * turn**2, 0.0]])
+        state = filter_.update(filter_.predict(state, 1.0), place, sensor).state
+        weights.append(state.weights[0, 1])
+    assert weights[14] < 0.1 and min(weights[17:]) > 0.6
