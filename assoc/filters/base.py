@@ -8,24 +8,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.kernels import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, PLAIN, STATUSES, expect, follow, pairs
-from assoc.filters.kernels import predict as predict_kernel
-from assoc.filters.kernels import update as update_kernel
+from assoc.filters.gate_kernels import pairs
+from assoc.filters.kernels import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
 from assoc.filters.measurement import Measurement, Observation, observation
-from assoc.filters.motion import LinearMotion, Motion
-from assoc.filters.state import Gaussian, finite, gaussian
+from assoc.filters.motion import Motion
+from assoc.filters.state import Gaussian, finite
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
-_NOTHING2 = np.zeros((0, 0))
-_NOTHING3 = np.zeros((0, 0, 0))
-_FLOAT = np.dtype(np.float64)
-_PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
 
 
 class State(Protocol):
@@ -45,9 +40,11 @@ class State(Protocol):
 
 
 S = TypeVar("S", bound=State)
+_new = object.__new__
 
 
-class Update(NamedTuple, Generic[S]):
+@dataclass(frozen=True, eq=False, repr=False)
+class Update(Generic[S]):
     """What a correction gives."""
 
     state: S
@@ -59,6 +56,32 @@ class Update(NamedTuple, Generic[S]):
     """Normalised innovation squared, (B,)."""
     log_likelihood: Array
     """Of the measurement under the prediction, (B,)."""
+
+    def __getattr__(self, name: str) -> Array:
+        """What `update_of` was given in one piece, taken apart when first asked for."""
+        parts = self.__dict__
+        if "rest" not in parts or name not in ("innovation", "covariance", "nis", "log_likelihood"):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        rest, d, B = parts["rest"], parts["measured"], len(parts["state"])
+        v, S = B * d, B * d + B * d * d
+        parts["innovation"], parts["covariance"] = rest[:v].reshape(B, d), rest[v:S].reshape(B, d, d)
+        parts["nis"], parts["log_likelihood"] = rest[S : S + B], rest[S + B :]
+        array: Array = parts[name]
+        return array
+
+    def __repr__(self) -> str:
+        return f"Update({self.state!r})"
+
+
+def update_of(state: S, rest: Array, measured: int) -> Update[S]:
+    """Make an update of what the kernels write: for `measured` quantities innovations and all that follows.
+
+    For a single target four arrays would take as long to make as the correction itself; few are asked for.
+    """
+    made: Update[S] = _new(Update)
+    parts = made.__dict__
+    parts["state"], parts["rest"], parts["measured"] = state, rest, measured
+    return made
 
 
 class Expected(NamedTuple):
@@ -123,6 +146,10 @@ class Filter(ABC, Generic[S]):
             NaN, a wrong shape, or a covariance that is no longer positive definite.
         """
 
+    def step(self, state: S, dt: float, measured: Array, sensor: Measurement) -> Update[S]:
+        """`predict` and `update` in one call, the quickest way where nothing is asked of the prediction."""
+        return self.update(self.predict(state, dt), measured, sensor)
+
     @abstractmethod
     def expected(self, state: S, sensor: Measurement) -> Expected:
         """Return the expected measurements and their covariances, for gates."""
@@ -150,7 +177,7 @@ class Filter(ABC, Generic[S]):
         z, times = self._steps(state, measured, sensor, dt)
         done: list[Update[S]] = []
         for one, step in zip(z, times, strict=True):
-            done.append(self.update(self.predict(state, step), one, sensor))
+            done.append(self.step(state, step, one, sensor))
             state = done[-1].state
         return History(
             np.stack([one.state.mean for one in done]),
@@ -247,107 +274,6 @@ def complain(status: int, where: str = "") -> NoReturn:
     if status == BAD_COVARIANCE:
         raise InvalidInputError(f"state: covariance of target {row} is not positive definite{where}")
     raise InvalidInputError(f"state: mean of target {row} gives no finite measurement{where}")
-
-
-class GaussianFilter(Filter[Gaussian]):
-    """What Kalman's filter and those that linearise have in common."""
-
-    kind = PLAIN
-
-    def __init__(self, motion: Motion) -> None:
-        super().__init__(motion)
-        # both matrices with one look-up, unless a child class has its own idea of them
-        kind = type(motion)
-        self._linear: LinearMotion | None = None
-        if isinstance(motion, LinearMotion) and (kind.jacobian, kind.noise) == _PLAIN_MODELS:
-            self._linear = motion
-
-    def start(self, state: Gaussian) -> Gaussian:
-        """Return the Gaussian itself."""
-        return check_dimension(state, self.motion.dim)
-
-    def predict(self, state: Gaussian, dt: float) -> Gaussian:
-        """Return the state dt seconds later; see `Filter.predict`."""
-        before, motion, linear = state.mean, self.motion, self._linear
-        if before.shape[1] != motion.dim:
-            check_dimension(state, motion.dim)
-        moved = _NOTHING2
-        if linear is not None:
-            F, Q = linear.matrices(dt)
-        else:
-            if not motion.linear:
-                moved = motion.propagate(before, dt)
-            F, Q = motion.jacobian(before, dt), motion.noise(before, dt)
-        mean, P = np.empty(before.shape), np.empty(state.covariance.shape)
-        predict_kernel(before, state.covariance, F, Q, moved, mean, P)
-        return gaussian(mean, P)
-
-    def run(
-        self, state: Gaussian, measured: Array, sensor: Measurement, dt: float | Sequence[float]
-    ) -> History[Gaussian]:
-        """Predict and correct through K steps; see `Filter.run`."""
-        o, linear = self.observe(sensor), self._linear
-        if linear is None or o.code < 0:
-            return super().run(state, measured, sensor, dt)
-        check_dimension(state, self.motion.dim)
-        z, times = self._steps(state, measured, sensor, dt)
-        models = [linear.matrices(step) for step in (times if len({*times}) > 1 else times[:1])]
-        F, Q = np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
-        K, (B, n) = len(z), state.mean.shape
-        means, Ps, nis, ll = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((K, B)), np.empty((K, B))
-        status = follow(
-            state.mean, state.covariance, F, Q, z, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind,
-            means, Ps, nis, ll,
-        )  # fmt: skip
-        if status != GOOD:
-            step, target = divmod(status // STATUSES, B)
-            complain(status % STATUSES + STATUSES * target, f" at step {step}")
-        return History(means, Ps, nis, ll, gaussian(means[-1], Ps[-1]))
-
-    def move(self, state: Gaussian, dt: float) -> tuple[Gaussian, Array]:
-        """`predict`, and the covariance P F' of the states before and after it."""
-        F = self.motion.jacobian(state.mean, dt)
-        return self.predict(state, dt), state.covariance @ F.transpose(0, 2, 1)
-
-    def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
-        """Correct each target with a measurement of its own; see `Filter.update`."""
-        seen = self._seen
-        o = seen[1] if seen[0] is sensor else self.observe(sensor)
-        return self.correct(state, measured, o, o.covariance)
-
-    def correct(self, state: Gaussian, measured: Array, o: Observation, R: Array) -> Update[Gaussian]:
-        """Correct with a measurement covariance R (B or 1, d, d) of the caller's."""
-        mean = state.mean
-        if mean.shape[1] != self.motion.dim:
-            check_dimension(state, self.motion.dim)
-        z = measured
-        if type(z) is not np.ndarray or z.dtype != _FLOAT or not z.flags.c_contiguous or z.shape != (len(mean), o.dim):
-            z = measured_array(measured, len(mean), o.dim)
-        given, slopes = _NOTHING2, _NOTHING3
-        if o.code < 0:
-            given = np.ascontiguousarray(o.model.residual(z, o.model.measure(mean)))
-            slopes = np.ascontiguousarray(o.model.jacobian(mean))
-        B, d = z.shape
-        new_mean, new_P = np.empty(mean.shape), np.empty(state.covariance.shape)
-        v, S, nis, ll = np.empty((B, d)), np.empty((B, d, d)), np.empty(B), np.empty(B)
-        status = update_kernel(
-            mean, state.covariance, z, o.code, o.place, o.columns, o.matrix, R, given, slopes, self.kind,
-            new_mean, new_P, v, S, nis, ll,
-        )  # fmt: skip
-        if status != GOOD:
-            complain(status)
-        return Update(gaussian(new_mean, new_P), v, S, nis, ll)
-
-    def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
-        """Return the expected measurements and their covariances; see `Filter.expected`."""
-        check_dimension(state, self.motion.dim)
-        o = self.observe(sensor)
-        if o.code < 0:
-            H = o.model.jacobian(state.mean)
-            return Expected(o.model.measure(state.mean), H @ state.covariance @ H.transpose(0, 2, 1) + o.covariance)
-        return Expected(
-            *expect(state.mean, state.covariance, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind)
-        )
 
 
 def check_dimension(state: Gaussian, dim: int) -> Gaussian:

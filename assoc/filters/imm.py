@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, GaussianFilter, Update, check_dimension
+from assoc.filters.base import Expected, Filter, Update, check_dimension
+from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement
 from assoc.filters.state import Gaussian, finite, gaussian
 from assoc.filters.unscented import UnscentedKalmanFilter

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from assoc.errors import InvalidInputError
-from assoc.filters.base import GaussianFilter
 from assoc.filters.kernels import LINEAR
+from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion import Motion
 

@@ -48,6 +48,34 @@ def multiply(F: Array, P: Array, out: Array) -> None:
 
 
 @njit
+def predict_one(m: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: Array, out: Array, W: Array) -> None:
+    """`predict` for one target; W (n, n) is working space."""
+    n = len(m)
+    if len(moved) > 0:
+        for i in range(n):
+            new_mean[i] = moved[i]
+    else:
+        for i in range(n):
+            total = 0.0
+            for k in range(n):
+                total += F[i, k] * m[k]
+            new_mean[i] = total
+    multiply(F, P, W)
+    for i in range(n):
+        for j in range(i + 1):
+            out[i, j] = Q[i, j]
+    for j in range(n):
+        for k in range(n):
+            f = F[j, k]
+            if f != 0.0:
+                for i in range(j, n):
+                    out[i, j] += f * W[i, k]
+    for i in range(n):
+        for j in range(i):
+            out[j, i] = out[i, j]
+
+
+@njit
 def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: Array, new_P: Array) -> None:
     """Predict a batch into new_mean and new_P.
 
@@ -61,45 +89,26 @@ def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: A
     moved : (B, n) or (0, n)
         Predicted means of a nonlinear model; empty: F times the mean.
     """
-    B, n = mean.shape
-    W = np.empty((n, n))
-    for b in range(B):
-        Fb, Qb = F[b if len(F) > 1 else 0], Q[b if len(Q) > 1 else 0]
-        if len(moved) > 0:
-            for i in range(n):
-                new_mean[b, i] = moved[b, i]
-        else:
-            for i in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += Fb[i, k] * mean[b, k]
-                new_mean[b, i] = total
-        multiply(Fb, P[b], W)
-        out = new_P[b]
-        for i in range(n):
-            for j in range(i + 1):
-                out[i, j] = Qb[i, j]
-        for j in range(n):
-            for k in range(n):
-                f = Fb[j, k]
-                if f != 0.0:
-                    for i in range(j, n):
-                        out[i, j] += f * W[i, k]
-        for i in range(n):
-            for j in range(i):
-                out[j, i] = out[i, j]
+    n = mean.shape[1]
+    none, W = np.empty(0), np.empty((n, n))
+    for b in range(len(mean)):
+        predict_one(
+            mean[b], P[b], F[b if len(F) > 1 else 0], Q[b if len(Q) > 1 else 0], moved[b] if len(moved) > 0 else none,
+            new_mean[b], new_P[b], W,
+        )  # fmt: skip
 
 
 @njit
 def correct(
-    mean: Array, P: Array, columns: Array, H: Array, R: Array, v: Array, S: Array,
+    d: int, c: int, mean: Array, P: Array, columns: Array, H: Array, R: Array, v: Array, S: Array,
     new_mean: Array, new_P: Array, X: Array, K: Array, L: Array, W: Array, G: Array, M: Array,
 ) -> tuple[bool, float, float]:  # fmt: skip
     """Joseph's correction of one Gaussian; returns whether S is positive definite, NIS and ln det S.
 
-    X, K and G (n, d), L and W (d, d), M (n, n) are working space.
+    d and c are the numbers of measured quantities and of columns: the compiler unrolls the loops of a caller
+    that gives them literally. X, K and G (n, d), L and W (d, d), M (n, n) are working space.
     """
-    n, d, c = len(mean), len(v), len(columns)
+    n = len(mean)
     for i in range(n):
         for a in range(d):
             total = 0.0
@@ -203,12 +212,64 @@ def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: flo
 
 
 @njit
+def update_one(
+    m: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
+    given: Array, given_H: Array, kind: int, new_mean: Array, new_P: Array, v: Array, S: Array,
+) -> tuple[int, float, float]:  # fmt: skip
+    """`update` for one target: what was found, NIS and log-likelihood."""
+    n, d, c = len(m), len(z), len(columns)
+    X, K, L, W = np.empty((n, d)), np.empty((n, d)), np.empty((d, d)), np.empty((d, d))
+    G, M, h, H = np.empty((n, d)), np.empty((n, n)), np.empty(d), np.empty((d, max(3, c)))
+    for a in range(d):
+        if not math.isfinite(z[a]):
+            return BAD_MEASUREMENT, 0.0, 0.0
+    if code == GIVEN:
+        for a in range(d):
+            v[a] = given[a]
+            for p in range(c):
+                H[a, p] = given_H[a, p]
+    elif code == LINEAR:
+        for a in range(d):
+            total = 0.0
+            for p in range(c):
+                total += matrix[a, p] * m[columns[p]]
+                H[a, p] = matrix[a, p]
+            v[a] = z[a] - total
+    else:
+        height = m[columns[2]] if c > 2 else 0.0
+        linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
+        for a in range(d):
+            v[a] = z[a] - h[a]
+        wrap(code, v)
+        if kind != PLAIN:
+            bt, bp = 0.0, 0.0
+            for p in range(c):
+                for q in range(c):
+                    cov = P[columns[p], columns[q]]
+                    bt += H[1, p] * H[1, q] * cov
+                    bp += H[2, p] * H[2, q] * cov
+            widened = np.empty((d, d))
+            modify(kind, h[0], h[2], v, R, bt, bp, widened)
+            R = widened
+    for a in range(d):
+        if not math.isfinite(v[a]):
+            return BAD_MEAN, 0.0, 0.0
+    if d == 3 and c == 3:
+        good, nis, log_det = correct(3, 3, m, P, columns, H, R, v, S, new_mean, new_P, X, K, L, W, G, M)
+    else:
+        good, nis, log_det = correct(d, c, m, P, columns, H, R, v, S, new_mean, new_P, X, K, L, W, G, M)
+    if not good:
+        return BAD_COVARIANCE, 0.0, 0.0
+    return GOOD, nis, -0.5 * (nis + log_det + d * LOG_TURN)
+
+
+@njit
 def update(
     mean: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
     given: Array, given_H: Array, kind: int,
-    new_mean: Array, new_P: Array, v: Array, S: Array, nis: Array, ll: Array,
+    new_mean: Array, new_P: Array, rest: Array,
 ) -> int:  # fmt: skip
-    """Correct a batch with one measurement for each, into the last six arrays.
+    """Correct a batch with one measurement for each, into the last three arrays.
 
     Parameters
     ----------
@@ -228,60 +289,50 @@ def update(
     kind : int
         PLAIN, MODIFIED or SIMPLIFIED.
 
-    new_mean, new_P, v, S, nis, ll
-        Corrected Gaussians; innovations (B, d), their covariances (B, d, d), NIS (B,), log-likelihoods (B,).
+    new_mean, new_P, rest
+        Corrected Gaussians; innovations (B, d), their covariances (B, d, d), NIS (B,) and log-likelihoods (B,), one
+        after the other.
 
     Returns
     -------
     GOOD, or what was found plus STATUSES times the number of the target.
     """
-    B, n = mean.shape
-    d, c = z.shape[1], len(columns)
-    X, K, L, W = np.empty((n, d)), np.empty((n, d)), np.empty((d, d)), np.empty((d, d))
-    G, M, h, H = np.empty((n, d)), np.empty((n, n)), np.empty(d), np.empty((d, max(3, c)))
-    R1 = np.empty((d, d))
+    B, d = z.shape
+    begin, end = B * d, B * d + B * d * d
+    v, S = rest[:begin].reshape((B, d)), rest[begin:end].reshape((B, d, d))
+    nis, ll = rest[end : end + B], rest[end + B :]
     for b in range(B):
-        m = mean[b]
-        Rb = R[b if len(R) > 1 else 0]
-        for a in range(d):
-            if not math.isfinite(z[b, a]):
-                return BAD_MEASUREMENT + STATUSES * b
-        if code == GIVEN:
-            for a in range(d):
-                v[b, a] = given[b, a]
-                for p in range(c):
-                    H[a, p] = given_H[b, a, p]
-        elif code == LINEAR:
-            for a in range(d):
-                total = 0.0
-                for p in range(c):
-                    total += matrix[a, p] * m[columns[p]]
-                    H[a, p] = matrix[a, p]
-                v[b, a] = z[b, a] - total
-        else:
-            height = m[columns[2]] if c > 2 else 0.0
-            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
-            for a in range(d):
-                v[b, a] = z[b, a] - h[a]
-            wrap(code, v[b])
-            if kind != PLAIN:
-                bt, bp = 0.0, 0.0
-                for p in range(c):
-                    for q in range(c):
-                        cov = P[b, columns[p], columns[q]]
-                        bt += H[1, p] * H[1, q] * cov
-                        bp += H[2, p] * H[2, q] * cov
-                modify(kind, h[0], h[2], v[b], Rb, bt, bp, R1)
-                Rb = R1
-        for a in range(d):
-            if not math.isfinite(v[b, a]):
-                return BAD_MEAN + STATUSES * b
-        good, one, log_det = correct(m, P[b], columns, H, Rb, v[b], S[b], new_mean[b], new_P[b], X, K, L, W, G, M)
-        if not good:
-            return BAD_COVARIANCE + STATUSES * b
-        nis[b] = one
-        ll[b] = -0.5 * (one + log_det + d * LOG_TURN)
+        own = b if code == GIVEN else 0
+        status, nis[b], ll[b] = update_one(
+            mean[b], P[b], z[b], code, place, columns, matrix, R[b if len(R) > 1 else 0], given[own], given_H[own],
+            kind, new_mean[b], new_P[b], v[b], S[b],
+        )  # fmt: skip
+        if status != GOOD:
+            return status + STATUSES * b
     return GOOD
+
+
+@njit
+def step(
+    mean: Array, P: Array, models: Array, z: Array, seen: Array, code: int, c: int, kind: int,
+    new_mean: Array, new_P: Array, rest: Array,
+) -> int:  # fmt: skip
+    """Predict one target with a linear model and correct it, into the last three arrays, as `update` does.
+
+    models (2, 1, n, n) are F and Q. `seen` is a measurement model that reads c components in one piece, as
+    `assoc.filters.measurement.Observation` has it: an array less is a tenth of a microsecond less.
+    """
+    n, d = mean.shape[1], z.shape[1]
+    predicted, predicted_P, none = np.empty(n), np.empty((n, n)), np.empty(0)
+    predict_one(mean[0], P[0], models[0, 0], models[1, 0], none, predicted, predicted_P, np.empty((n, n)))
+    matrix, v = seen[3 + c : len(seen) - d * d], rest[:d]
+    end = d + d * d
+    status, rest[end], rest[end + 1] = update_one(
+        predicted, predicted_P, z[0], code, seen[:3], seen[3 : 3 + c].view(np.int64),
+        matrix.reshape((len(matrix) // c, c)), seen[len(seen) - d * d :].reshape((d, d)), none, np.empty((0, n)), kind,
+        new_mean[0], new_P[0], v, rest[d:end].reshape((d, d)),
+    )  # fmt: skip
+    return status
 
 
 @njit
@@ -296,9 +347,9 @@ def follow(
     """
     K, B, d = z.shape
     n = mean.shape[1]
-    given, given_H = np.empty((0, 0)), np.empty((0, 0, 0))
+    given, given_H = np.empty((1, 0)), np.empty((1, 0, 0))
     predicted, predicted_P = np.empty((B, n)), np.empty((B, n, n))
-    v, S, nothing = np.empty((B, d)), np.empty((B, d, d)), np.empty((0, 0))
+    rest, nothing = np.empty(B * (d + d * d + 2)), np.empty((0, 0))
     for k in range(K):
         j = k if len(F) > 1 else 0
         if k == 0:
@@ -307,77 +358,9 @@ def follow(
             predict(means[k - 1], Ps[k - 1], F[j : j + 1], Q[j : j + 1], nothing, predicted, predicted_P)
         status = update(
             predicted, predicted_P, z[k], code, place, columns, matrix, R, given, given_H, kind,
-            means[k], Ps[k], v, S, nis[k], ll[k],
+            means[k], Ps[k], rest,
         )  # fmt: skip
         if status != GOOD:
             return status + STATUSES * B * k
+        nis[k], ll[k] = rest[len(rest) - 2 * B : len(rest) - B], rest[len(rest) - B :]
     return GOOD
-
-
-@njit
-def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
-    """Log-likelihood and squared Mahalanobis distance, each (B, M), of each measurement under each target.
-
-    h (B, d) and S (B, d, d) are the expected measurements and their covariances, z (M, d).
-    """
-    B, d = h.shape
-    ll, square = np.empty((B, len(z))), np.empty((B, len(z)))
-    L, v = np.zeros((d, d)), np.empty(d)
-    for b in range(B):
-        if not factor(S[b], d, L):
-            return BAD_COVARIANCE + STATUSES * b, ll, square
-        base = d * LOG_TURN
-        for a in range(d):
-            base += 2.0 * math.log(L[a, a])
-        for m in range(len(z)):
-            for a in range(d):
-                v[a] = z[m, a] - h[b, a]
-            wrap(code, v)
-            total = 0.0
-            for a in range(d):
-                for e in range(a):
-                    v[a] -= L[a, e] * v[e]
-                v[a] /= L[a, a]
-                total += v[a] * v[a]
-            square[b, m] = total
-            ll[b, m] = -0.5 * (total + base)
-    return GOOD, ll, square
-
-
-@njit
-def expect(
-    mean: Array, P: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array, kind: int
-) -> tuple[Array, Array]:
-    """Expected measurements (B, d) of linearised models and their covariances (B, d, d)."""
-    B, d, c = len(mean), R.shape[1], len(columns)
-    hs, S = np.empty((B, d)), np.empty((B, d, d))
-    h, H, v, R1 = np.empty(d), np.empty((d, max(3, c))), np.zeros(d), np.empty((d, d))
-    for b in range(B):
-        m = mean[b]
-        if code == LINEAR:
-            for a in range(d):
-                total = 0.0
-                for p in range(c):
-                    total += matrix[a, p] * m[columns[p]]
-                    H[a, p] = matrix[a, p]
-                h[a] = total
-        else:
-            height = m[columns[2]] if c > 2 else 0.0
-            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
-        for a in range(d):
-            hs[b, a] = h[a]
-            for e in range(d):
-                total = 0.0
-                for p in range(c):
-                    for q in range(c):
-                        total += H[a, p] * P[b, columns[p], columns[q]] * H[e, q]
-                S[b, a, e] = total
-        Rb = R[b if len(R) > 1 else 0]
-        if kind != PLAIN:
-            v[:] = 0.0
-            modify(kind, h[0], h[2], v, Rb, S[b, 1, 1], S[b, 2, 2], R1)
-            Rb = R1
-        for a in range(d):
-            for e in range(d):
-                S[b, a, e] += Rb[a, e]
-    return hs, S

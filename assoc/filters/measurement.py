@@ -103,6 +103,8 @@ class Observation(NamedTuple):
     """(1, d, d)."""
     model: FunctionMeasurement
     """The user's model; used only where `code` is GIVEN."""
+    packed: Array
+    """Place, columns (the bits of integers), matrix and covariance in one piece."""
 
 
 class _SensorAsFunction(FunctionMeasurement):
@@ -133,6 +135,13 @@ class _SensorAsFunction(FunctionMeasurement):
 _NO_MODEL: Any = None
 
 
+def _observation(
+    code: int, dim: int, place: Array, columns: Array, matrix: Array, R: Array, model: FunctionMeasurement
+) -> Observation:
+    packed = np.concatenate((place, columns.astype(np.int64).view(np.float64), matrix, R), axis=None)
+    return Observation(code, dim, place, columns, matrix, R, model, packed)
+
+
 def observation(measurement: Measurement, motion: Motion) -> Observation:
     """Put a measurement model in the form that the kernels take, for states of a motion model."""
     every = np.arange(motion.dim)
@@ -146,7 +155,7 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
         if code is not None:
             R = np.ascontiguousarray(measurement.covariance)[None].copy()
             place = np.array(measurement.position)
-            return Observation(code, measurement.dim, place, columns, _NO_MATRIX, R, _NO_MODEL)
+            return _observation(code, measurement.dim, place, columns, _NO_MATRIX, R, _NO_MODEL)
         measurement = _SensorAsFunction(measurement, columns, motion.dim)
     if isinstance(measurement, LinearMeasurement):
         if measurement.matrix.shape[1] != motion.dim:
@@ -155,8 +164,8 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
         # most entries are zeros: only the components that are read take part
         read = np.flatnonzero(measurement.matrix.any(axis=0))
         matrix = np.ascontiguousarray(measurement.matrix[:, read])
-        return Observation(LINEAR, measurement.dim, _NO_PLACE, read, matrix, R, _NO_MODEL)
+        return _observation(LINEAR, measurement.dim, _NO_PLACE, read, matrix, R, _NO_MODEL)
     if isinstance(measurement, FunctionMeasurement):
         R = measurement.covariance[None]
-        return Observation(GIVEN, measurement.dim, _NO_PLACE, every, _NO_MATRIX, R, measurement)
+        return _observation(GIVEN, measurement.dim, _NO_PLACE, every, _NO_MATRIX, R, measurement)
     raise InvalidInputError(f"sensor must be a sensor or a measurement model, got {type(measurement).__name__}")

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, GaussianFilter
+from assoc.filters.base import Expected
 from assoc.filters.kernels import LOG_TURN, MODIFIED, SIMPLIFIED
+from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion import Motion
 from assoc.filters.state import Gaussian, finite

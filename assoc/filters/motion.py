@@ -79,7 +79,7 @@ class LinearMotion(Motion):
     ) -> None:
         self.dim, self.position = dim, position
         self._transition, self._noise = transition, noise
-        self._known: dict[float, tuple[Array, Array]] = {}
+        self._known: dict[float, tuple[Array, Array, Array]] = {}
 
     @property
     def linear(self) -> bool:
@@ -87,7 +87,12 @@ class LinearMotion(Motion):
         return True
 
     def matrices(self, dt: float) -> tuple[Array, Array]:
-        """Return F and Q, each (1, n, n); remembered, since most trackers use few time steps."""
+        """Return F and Q, each (1, n, n)."""
+        F, Q, _ = self.models(dt)
+        return F, Q
+
+    def models(self, dt: float) -> tuple[Array, Array, Array]:
+        """Return F, Q and both in one array (2, 1, n, n); remembered, since most trackers use few time steps."""
         known = self._known.get(dt)
         if known is None:
             if not math.isfinite(dt) or dt < 0:
@@ -99,7 +104,8 @@ class LinearMotion(Motion):
                     raise InvalidInputError(f"{name} must have shape {(self.dim, self.dim)}, got {one.shape}")
             if len(self._known) > 64:
                 self._known.clear()
-            known = self._known[dt] = (F[None], Q[None])
+            both = np.stack((F[None], Q[None]))
+            known = self._known[dt] = (both[0], both[1], both)
         return known
 
     def propagate(self, states: Array, dt: float) -> Array:

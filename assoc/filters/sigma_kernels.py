@@ -183,7 +183,7 @@ def unscented(
             if not math.isfinite(v[b, a]):
                 return BAD_MEAN + STATUSES * b
         good, one, log_det = correct_one(
-            mean[b], P[b], every, H, extra, v[b], S[b], new_mean[b], new_P[b], X, K, LS, W, G, M
+            d, n, mean[b], P[b], every, H, extra, v[b], S[b], new_mean[b], new_P[b], X, K, LS, W, G, M
         )
         if not good:
             return BAD_COVARIANCE + STATUSES * b

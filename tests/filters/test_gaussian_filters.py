@@ -201,6 +201,6 @@ def test_refusals():
     with pytest.raises(InvalidInputError, match="window must be"):
         FuzzyAdaptiveEKF(MOTION, paper_rules(), window=0)
     # a covariance that a user's own computing has ruined
-    object.__setattr__(state, "covariance", -state.covariance)
+    state.covariance[:] *= -1
     with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
         ekf.update(state, z, RADAR)

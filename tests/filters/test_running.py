@@ -16,6 +16,7 @@ from assoc.filters import (
     CoordinatedTurn,
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
+    FunctionMeasurement,
     FuzzyAdaptiveEKF,
     InteractingMultipleModel,
     KalmanFilter,
@@ -27,7 +28,7 @@ from assoc.filters import (
 )
 from experiments.filter_endurance import endure
 from experiments.filter_endurance import filters as of_each_kind
-from tests.filters.common import MOTION, PLACE, RADAR, random_state
+from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
 
 MIXED = [
     ExtendedKalmanFilter(Padded(ConstantVelocity(0.5), 0.1)),
@@ -65,6 +66,7 @@ def results():
         done = one.run(one.start(start), z, sensor, 1.0)
         found[name] = [part.tolist() for part in done[:4]]
         found[name] += [one.log_likelihood(done.state, z[-1], sensor).tolist()]
+        found[name] += [one.step(done.state[:1], 1.0, z[-1, :1], sensor).state.mean.tolist()]
     return found
 
 
@@ -87,6 +89,65 @@ def test_a_run_is_its_steps(name, dt):
         ):
             assert np.array_equal(ours, theirs)
     assert np.array_equal(whole.state.mean, state.mean) and type(whole.state) is type(state)
+
+
+@pytest.mark.parametrize("name", every_filter())
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_step_is_a_prediction_and_an_update(name, count):
+    (one, sensor), (again, _) = every_filter()[name], every_filter()[name]
+    start, places = problem(one, 3, count)
+    z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
+    a, b = one.start(start), again.start(start)
+    for k, dt in enumerate((1.0, 0.5, 1.0)):
+        quick, slow = one.step(a, dt, z[k], sensor), again.update(again.predict(b, dt), z[k], sensor)
+        a, b = quick.state, slow.state
+        assert type(a) is type(b) and len(a) == count
+        for part in ("innovation", "covariance", "nis", "log_likelihood"):
+            assert np.array_equal(getattr(quick, part), getattr(slow, part)), part
+        assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
+    assert quick.innovation.shape == (count, 3) and quick.covariance.shape == (count, 3, 3)
+    assert quick.nis.shape == quick.log_likelihood.shape == (count,)
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [BEARING, LinearMeasurement(np.eye(2, 6, 3), np.eye(2)), FunctionMeasurement(lambda x: x[:, :1], np.eye(1))],
+    ids=["bearing", "velocities", "function"],
+)
+def test_a_step_with_other_sensors(sensor):
+    ekf, state = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(4))
+    z = np.full((1, sensor.dim), 0.3)
+    for dt in (1.0, 2.0):
+        quick, slow = ekf.step(state, dt, z, sensor), ekf.update(ekf.predict(state, dt), z, sensor)
+        assert np.array_equal(quick.state.mean, slow.state.mean) and np.array_equal(quick.nis, slow.nis)
+        assert np.array_equal(quick.state.covariance, slow.state.covariance)
+        # one filter, two sensors in turn
+        assert ekf.step(state, dt, RADAR.measure(state.mean[:, :3]), RADAR).innovation.shape == (1, 3)
+
+
+def test_refusals_of_a_step():
+    ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
+    z = RADAR.measure(start.mean[:, :3])
+    assert np.array_equal(ekf.step(start, 1.0, z[0], RADAR).state.mean, ekf.step(start, 1.0, z, RADAR).state.mean)
+    for measured, dt, message in (
+        (z * np.nan, 1.0, "measured must be finite, row 0"),
+        (z[:, :2], 1.0, r"measured must have shape \(1, 3\)"),
+        ("abc", 1.0, "measured must be numbers"),
+        (z, -1.0, "dt must be a number >= 0"),
+        (z, np.nan, "dt must be a number >= 0"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            ekf.step(start, dt, measured, RADAR)
+    with pytest.raises(InvalidInputError, match="state must have 6 components, got 7"):
+        ekf.step(random_state(1, np.random.default_rng(0), 7), 1.0, z, RADAR)
+    start.covariance[:] *= -1
+    with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
+        ekf.step(start, 1.0, z, RADAR)
+    start.mean[:] = np.inf
+    with pytest.raises(InvalidInputError, match="mean of target 0 gives no finite measurement"):
+        ekf.step(start, 1.0, z, RADAR)
+    with pytest.raises(AttributeError, match="has no attribute 'gain'"):
+        _ = ekf.step(random_state(1, np.random.default_rng(0)), 1.0, z, RADAR).gain
 
 
 def test_refusals_of_a_run():

@@ -1,0 +1,163 @@
+"""What Kalman's filter and those that linearise have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc.filters.base import (
+    Expected,
+    Filter,
+    History,
+    Update,
+    check_dimension,
+    complain,
+    measured_array,
+    update_of,
+)
+from assoc.filters.gate_kernels import expect
+from assoc.filters.kernels import GOOD, PLAIN, STATUSES, follow
+from assoc.filters.kernels import predict as predict_kernel
+from assoc.filters.kernels import step as step_kernel
+from assoc.filters.kernels import update as update_kernel
+from assoc.filters.measurement import Measurement, Observation
+from assoc.filters.motion import LinearMotion, Motion
+from assoc.filters.state import Gaussian, gaussian
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_NOTHING2 = np.zeros((0, 0))
+_NO_ROW2, _NO_ROW3 = np.zeros((1, 0)), np.zeros((1, 0, 0))
+_FLOAT = np.dtype(np.float64)
+_empty = np.empty
+_PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
+
+
+class GaussianFilter(Filter[Gaussian]):
+    """What Kalman's filter and those that linearise have in common."""
+
+    kind = PLAIN
+
+    def __init__(self, motion: Motion) -> None:
+        super().__init__(motion)
+        # both matrices with one look-up, unless a child class has its own idea of them
+        kind = type(motion)
+        self._linear: LinearMotion | None = None
+        self._plan: tuple[Any, ...] = (None, None)
+        if isinstance(motion, LinearMotion) and (kind.jacobian, kind.noise) == _PLAIN_MODELS:
+            self._linear = motion
+
+    def start(self, state: Gaussian) -> Gaussian:
+        """Return the Gaussian itself."""
+        return check_dimension(state, self.motion.dim)
+
+    def predict(self, state: Gaussian, dt: float) -> Gaussian:
+        """Return the state dt seconds later; see `Filter.predict`."""
+        before, motion, linear = state.mean, self.motion, self._linear
+        if before.shape[1] != motion.dim:
+            check_dimension(state, motion.dim)
+        moved = _NOTHING2
+        if linear is not None:
+            F, Q = linear.matrices(dt)
+        else:
+            if not motion.linear:
+                moved = motion.propagate(before, dt)
+            F, Q = motion.jacobian(before, dt), motion.noise(before, dt)
+        mean, P = _empty(before.shape), _empty(state.covariance.shape)
+        predict_kernel(before, state.covariance, F, Q, moved, mean, P)
+        return gaussian(mean, P)
+
+    def step(self, state: Gaussian, dt: float, measured: Array, sensor: Measurement) -> Update[Gaussian]:
+        """Predict and correct in one call; see `Filter.step`."""
+        known = self._plan
+        if known[0] is not sensor or known[1] != dt:
+            known = self._make_plan(sensor, dt)
+        _, _, seen, code, c, models, d, n = known
+        before, z = state.mean, measured
+        if models is None or before.shape[0] != 1:
+            return super().step(state, dt, measured, sensor)
+        if before.shape[1] != n:
+            check_dimension(state, n)
+        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (1, d) or not z.flags.c_contiguous:
+            z = measured_array(measured, 1, d)
+        mean, P, rest = _empty((1, n)), _empty((1, n, n)), _empty(d + d * d + 2)
+        status = step_kernel(before, state.covariance, models, z, seen, code, c, self.kind, mean, P, rest)
+        if status != GOOD:
+            complain(status)
+        return update_of(gaussian(mean, P), rest, d)
+
+    def _make_plan(self, sensor: Measurement, dt: float) -> tuple[Any, ...]:
+        """What `step` needs to know of a sensor and a time step; the last plan is remembered."""
+        o, n, d = self.observe(sensor), self.motion.dim, self.observe(sensor).dim
+        models = None if self._linear is None or o.code < 0 else self._linear.models(dt)[2]
+        self._plan = (sensor, dt, o.packed, o.code, len(o.columns), models, d, n)
+        return self._plan
+
+    def run(
+        self, state: Gaussian, measured: Array, sensor: Measurement, dt: float | Sequence[float]
+    ) -> History[Gaussian]:
+        """Predict and correct through K steps; see `Filter.run`."""
+        o, linear = self.observe(sensor), self._linear
+        if linear is None or o.code < 0:
+            return super().run(state, measured, sensor, dt)
+        check_dimension(state, self.motion.dim)
+        z, times = self._steps(state, measured, sensor, dt)
+        models = [linear.matrices(step) for step in (times if len({*times}) > 1 else times[:1])]
+        F, Q = np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
+        K, (B, n) = len(z), state.mean.shape
+        means, Ps, nis, ll = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((K, B)), np.empty((K, B))
+        status = follow(
+            state.mean, state.covariance, F, Q, z, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind,
+            means, Ps, nis, ll,
+        )  # fmt: skip
+        if status != GOOD:
+            step, target = divmod(status // STATUSES, B)
+            complain(status % STATUSES + STATUSES * target, f" at step {step}")
+        return History(means, Ps, nis, ll, gaussian(means[-1], Ps[-1]))
+
+    def move(self, state: Gaussian, dt: float) -> tuple[Gaussian, Array]:
+        """`predict`, and the covariance P F' of the states before and after it."""
+        F = self.motion.jacobian(state.mean, dt)
+        return self.predict(state, dt), state.covariance @ F.transpose(0, 2, 1)
+
+    def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
+        """Correct each target with a measurement of its own; see `Filter.update`."""
+        seen = self._seen
+        o = seen[1] if seen[0] is sensor else self.observe(sensor)
+        return self.correct(state, measured, o, o.covariance)
+
+    def correct(self, state: Gaussian, measured: Array, o: Observation, R: Array) -> Update[Gaussian]:
+        """Correct with a measurement covariance R (B or 1, d, d) of the caller's."""
+        mean = state.mean
+        B, n = mean.shape
+        d = o.dim
+        if n != self.motion.dim:
+            check_dimension(state, self.motion.dim)
+        z = measured
+        if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (B, d) or not z.flags.c_contiguous:
+            z = measured_array(measured, B, d)
+        given, slopes = _NO_ROW2, _NO_ROW3
+        if o.code < 0:
+            given = np.ascontiguousarray(o.model.residual(z, o.model.measure(mean)))
+            slopes = np.ascontiguousarray(o.model.jacobian(mean))
+        new_mean, new_P, rest = _empty((B, n)), _empty((B, n, n)), _empty(B * (d + d * d + 2))
+        status = update_kernel(
+            mean, state.covariance, z, o.code, o.place, o.columns, o.matrix, R, given, slopes, self.kind,
+            new_mean, new_P, rest,
+        )  # fmt: skip
+        if status != GOOD:
+            complain(status)
+        return update_of(gaussian(new_mean, new_P), rest, d)
+
+    def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
+        """Return the expected measurements and their covariances; see `Filter.expected`."""
+        check_dimension(state, self.motion.dim)
+        o = self.observe(sensor)
+        if o.code < 0:
+            H = o.model.jacobian(state.mean)
+            return Expected(o.model.measure(state.mean), H @ state.covariance @ H.transpose(0, 2, 1) + o.covariance)
+        return Expected(
+            *expect(state.mean, state.covariance, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind)
+        )
