@@ -17,7 +17,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 # the codes are known to the kernels in conversion.py and kernels.py
 _CODES = {PositionSensor: 0, Radar3D: 1, Radar2D: 2, BearingSensor: 3}
-BEARING = 3
+POSITION, BEARING = 0, 3
 
 
 class SensorArrays(NamedTuple):

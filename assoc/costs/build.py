@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
@@ -138,6 +138,49 @@ def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> 
         As `tuple_costs`.
     """
     _, _, positions, covariances = _fit_tuples(scene, scan, tuples)
+    return positions, covariances
+
+
+def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array, Array]:
+    """`positions_and_covariances` of measurements of one sensor, each by itself.
+
+    Parameters
+    ----------
+    scene : Scene
+        Sensors and region.
+    sensor : int
+        Number of the sensor, from 0.
+    measured : array (n, d)
+        Its measurements; finite, of its dimension.
+
+    Returns
+    -------
+    positions (n, 3), covariances (n, 3, 3)
+    """
+    sensors = sensor_arrays(scene)
+    if sensors.code[sensor] == POSITION:
+        # what a position sensor says of a place is the same wherever the place is
+        known = _known_positions.setdefault(scene, {})
+        if len(measured):
+            if sensor not in known:
+                known[sensor] = _positions(scene, sensors, sensor, measured[:1])[1]
+            places = np.empty((len(measured), 3))
+            places[:] = sensors.middle
+            places[:, : measured.shape[1]] = measured
+            return places, np.broadcast_to(known[sensor], (len(measured), 3, 3))
+    return _positions(scene, sensors, sensor, measured)
+
+
+_known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.WeakKeyDictionary()
+
+
+def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array) -> tuple[Array, Array]:
+    count = len(scene.sensors)
+    parts = tuple(measured if s == sensor else measured[:0] for s in range(count))
+    flat, index = scan_arrays(sensors, Scan(0, 0.0, parts), 1.0, 1.0)
+    rows = np.full((len(measured), count), -1, dtype=np.int32)
+    rows[index - 1, sensor] = np.arange(len(measured))
+    _, positions, covariances = fit(sensors, flat, rows, False)
     return positions, covariances
 
 

@@ -1,20 +1,20 @@
-"""Which measurements may belong to which tracks: k-d tree, then boxes."""
+"""Which measurements may belong to which tracks: sorted by one component, then boxes."""
 
 from __future__ import annotations
 
-import itertools
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from assoc._compiled import njit
 from assoc.filters.base import Expected
 from assoc.filters.measurement import Measurement
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-# up to so many combinations looking at each is quicker than a tree
-_BRUTE = 40_000
+_TURN = 2.0 * math.pi
 
 
 def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
@@ -38,14 +38,59 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    reach, turning = _reach(expected, gate), np.array(angular)
-    if len(h) * len(z) <= _BRUTE:
-        off = _apart(z[None, :, :], h[:, None, :], turning)
-        tracks, found = np.nonzero((off <= reach[:, None, :]).all(axis=2))
-        return tracks, found
-    tracks, found = _by_tree(h, z, reach, turning)
-    inside = (_apart(z[found], h[tracks], turning) <= reach[tracks]).all(axis=1)
-    return tracks[inside], found[inside]
+    tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate)
+    return tracks, found
+
+
+@lru_cache(maxsize=64)
+def _turning(angular: tuple[bool, ...]) -> Array:
+    return np.array(angular, dtype=np.bool_)
+
+
+@njit
+def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float) -> Any:
+    """Pairs whose components are all within reach; the measurements are sorted by one component."""
+    num, dim = h.shape
+    reach = np.empty((num, dim))
+    for t in range(num):
+        for i in range(dim):
+            reach[t, i] = math.sqrt(gate * covariance[t, i, i]) * (1.0 + 1e-9)
+    # the component in which a gate is the smallest share of all measurements; angles have no order
+    axis, widest = -1, 0.0
+    for i in range(dim):
+        if not turning[i]:
+            share = (z[:, i].max() - z[:, i].min()) / max(reach[:, i].mean(), 1e-300)
+            if share > widest:
+                axis, widest = i, share
+    low, high = np.zeros(num, np.int64), np.full(num, z.shape[0], np.int64)
+    order = np.arange(z.shape[0])
+    if axis >= 0:
+        order = np.argsort(z[:, axis], kind="mergesort")
+        along = z[order, axis]
+        for t in range(num):
+            low[t] = np.searchsorted(along, h[t, axis] - reach[t, axis], side="left")
+            high[t] = np.searchsorted(along, h[t, axis] + reach[t, axis], side="right")
+    tracks = np.empty((high - low).sum(), np.int64)
+    found = np.empty(tracks.size, np.int64)
+    count = 0
+    for t in range(num):
+        first = count
+        for k in range(low[t], high[t]):
+            inside = True
+            for i in range(dim):
+                off = abs(z[order[k], i] - h[t, i])
+                if turning[i]:
+                    off %= _TURN
+                    off = min(off, _TURN - off)
+                if not off <= reach[t, i]:
+                    inside = False
+                    break
+            if inside:
+                tracks[count] = t
+                found[count] = order[k]
+                count += 1
+        found[first:count] = np.sort(found[first:count])
+    return tracks[:count].copy(), found[:count].copy()
 
 
 def _reach(expected: Expected, gate: float) -> Array:
@@ -68,25 +113,6 @@ def _apart(a: Array, b: Array, turning: Array) -> Array:
         part = off[..., turning] % (2 * math.pi)
         off[..., turning] = np.minimum(part, 2 * math.pi - part)
     return off
-
-
-def _by_tree(h: Array, z: Array, reach: Array, turning: Array) -> tuple[Array, Array]:
-    from scipy.spatial import cKDTree
-
-    # in units of a usual reach every track's box becomes a ball of the largest norm
-    unit = np.median(reach, axis=0)
-    unit = np.where(unit > 0, unit, 1.0)
-    width = np.where(turning, 2 * math.pi / unit, 0.0)
-    points, centres = z / unit, h / unit
-    for axis in np.flatnonzero(turning):
-        points[:, axis] = np.minimum(np.mod(points[:, axis], width[axis]), np.nextafter(width[axis], 0.0))
-        centres[:, axis] = np.minimum(np.mod(centres[:, axis], width[axis]), np.nextafter(width[axis], 0.0))
-    tree = cKDTree(points, boxsize=width if turning.any() else None)
-    radius = (reach / unit).max(axis=1)
-    lists = tree.query_ball_point(centres, radius, p=np.inf, return_sorted=True)
-    lengths = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
-    found = np.fromiter(itertools.chain.from_iterable(lists), dtype=np.int64, count=int(lengths.sum()))
-    return np.repeat(np.arange(len(h)), lengths), found
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:

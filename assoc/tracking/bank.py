@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -20,66 +19,110 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _ALL_BITS = np.int64((1 << 62) - 1)
 
 
-@dataclass(frozen=True, eq=False)
+# columns of the two tables
+_SCORE, _BEST, _STARTED, _LAST = range(4)
+_ID, _SURE, _BITS, _MISSED, _HITS = range(5)
+_NUMBERS = {"score": _SCORE, "best": _BEST, "started": _STARTED, "last_detection": _LAST}
+_COUNTS = {"track_id": _ID, "confirmed": _SURE, "detections": _BITS, "missed": _MISSED, "hits": _HITS}
+
+
+_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection")
+
+
 class Bank:
     """T tracks (or branches of tracks).
+
+    Two tables hold all but the states: a tracker with few tracks spends its time on calls, not on numbers.
 
     Attributes
     ----------
     states
         The filter's states, all of one time.
-    track_id : int64 array (T,)
-    score, best : arrays (T,)
-        Log likelihood ratio, and its largest value so far.
-    confirmed : bool array (T,)
-    detections : int64 array (T,)
-        One bit a scan, the last one lowest: whether the track was detected.
-    missed, hits : int64 arrays (T,)
-        Scans in a row without a detection; scans with one.
-    started, last_detection : arrays (T,)
-        Seconds.
+    numbers : array (T, 4)
+        Score, best score, start, last detection.
+    counts : int64 array (T, 5)
+        Track id, confirmed, detections, missed, hits.
     """
 
-    states: Any
-    track_id: Array
-    score: Array
-    best: Array
-    confirmed: Array
-    detections: Array
-    missed: Array
-    hits: Array
-    started: Array
-    last_detection: Array
+    __slots__ = ("counts", "numbers", "states")
+
+    def __init__(self, states: Any, numbers: Array, counts: Array) -> None:
+        self.states, self.numbers, self.counts = states, numbers, counts
+
+    @property
+    def score(self) -> Array:
+        """Log likelihood ratio, (T,)."""
+        return self.numbers[:, _SCORE]
+
+    @property
+    def best(self) -> Array:
+        """Largest value of the score so far, (T,)."""
+        return self.numbers[:, _BEST]
+
+    @property
+    def started(self) -> Array:
+        """Seconds, (T,)."""
+        return self.numbers[:, _STARTED]
+
+    @property
+    def last_detection(self) -> Array:
+        """Seconds, (T,)."""
+        return self.numbers[:, _LAST]
+
+    @property
+    def track_id(self) -> Array:
+        """Ids, int64 (T,)."""
+        return self.counts[:, _ID]
+
+    @property
+    def confirmed(self) -> Array:
+        """Whether each is confirmed, bool (T,)."""
+        return self.counts[:, _SURE] != 0
+
+    @property
+    def detections(self) -> Array:
+        """One bit a scan, the last one lowest: whether the track was detected; int64 (T,)."""
+        return self.counts[:, _BITS]
+
+    @property
+    def missed(self) -> Array:
+        """Scans in a row without a detection, int64 (T,)."""
+        return self.counts[:, _MISSED]
+
+    @property
+    def hits(self) -> Array:
+        """Scans with a detection, int64 (T,)."""
+        return self.counts[:, _HITS]
 
     def __len__(self) -> int:
-        return len(self.track_id)
+        return len(self.counts)
 
     def __getitem__(self, rows: Any) -> Bank:
         """Return the tracks that an index array, mask or slice selects."""
-        return Bank(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+        return Bank(self.states[rows], self.numbers[rows], self.counts[rows])
 
     @staticmethod
-    def new(states: Any, track_id: Array, score: Array, when: Array | float) -> Bank:
-        """Tracks that begin now, each with one detection that the scan's `passed` will count."""
+    def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> Bank:
+        """Tracks that begin now, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
-        times = np.broadcast_to(np.asarray(when, dtype=np.float64), (count,)).copy()
-        none = np.zeros(count, dtype=np.int64)
-        score = np.asarray(score, dtype=np.float64)
-        return Bank(
-            states, np.asarray(track_id, dtype=np.int64), score, score.copy(), np.zeros(count, dtype=np.bool_),
-            none, none.copy(), none.copy(), times, times.copy(),
-        )  # fmt: skip
+        numbers, counts = np.empty((count, 4)), np.zeros((count, 5), dtype=np.int64)
+        numbers[:, _SCORE] = numbers[:, _BEST] = score
+        numbers[:, _STARTED] = numbers[:, _LAST] = when
+        counts[:, _ID] = track_id
+        return Bank(states, numbers, counts)
 
     @staticmethod
     def concatenate(parts: Sequence[Bank]) -> Bank:
         """Return one bank with the tracks of several."""
-        names = [field.name for field in fields(Bank) if field.name != "states"]
-        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-        return Bank(states=concatenate([part.states for part in parts]), **joined)
+        return Bank(
+            concatenate([part.states for part in parts]),
+            np.concatenate([part.numbers for part in parts]),
+            np.concatenate([part.counts for part in parts]),
+        )
 
     def moved(self, states: Any) -> Bank:
         """The same tracks with other states."""
-        return replace(self, states=states)
+        return Bank(states, self.numbers, self.counts)
 
     def scored(self, states: Any, gain: Array | float, detected_at: Array | None = None) -> Bank:
         """Tracks after a scan of one sensor, or of all: states, what the score gains, and detections.
@@ -91,29 +134,31 @@ class Bank:
         detected_at : array (T,), optional
             Time of the detection, NaN where the track was missed; left out, all were missed.
         """
-        score = self.score + gain
-        last = self.last_detection
+        numbers = self.numbers.copy()
+        numbers[:, _SCORE] += gain
+        np.maximum(numbers[:, _BEST], numbers[:, _SCORE], out=numbers[:, _BEST])
         if detected_at is not None:
-            last = np.where(np.isnan(detected_at), last, np.fmax(last, detected_at))
-        return replace(self, states=states, score=score, best=np.maximum(self.best, score), last_detection=last)
+            np.fmax(numbers[:, _LAST], detected_at, out=numbers[:, _LAST])
+        return Bank(states, numbers, self.counts)
 
     def counted(self, detected: Array) -> Bank:
         """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor."""
-        hit = detected.astype(np.int64)
-        return replace(
-            self,
-            detections=((self.detections << np.int64(1)) & _ALL_BITS) | hit,
-            missed=np.where(detected, 0, self.missed + 1),
-            hits=self.hits + hit,
-        )
+        counts = self.counts.copy()
+        counts[:, _BITS] = ((counts[:, _BITS] << np.int64(1)) & _ALL_BITS) | detected
+        counts[:, _MISSED] += 1
+        counts[detected, _MISSED] = 0
+        counts[:, _HITS] += detected
+        return Bank(self.states, self.numbers, counts)
 
-    def sworn(self) -> Bank:
-        """The same tracks, all confirmed."""
-        return replace(self, confirmed=np.ones(len(self), dtype=np.bool_))
+    def sure(self, confirmed: Array | bool) -> Bank:
+        """The same tracks, those in the mask confirmed, and no others."""
+        counts = self.counts.copy()
+        counts[:, _SURE] = confirmed
+        return Bank(self.states, self.numbers, counts)
 
     def confirm(self, life_cycle: LifeCycle) -> Bank:
         """Confirm the tracks whose time has come."""
-        return replace(self, confirmed=self.confirmed | life_cycle.confirms(self.score, self.detections))
+        return self.sure(self.confirmed | life_cycle.confirms(self.score, self.detections))
 
     def doomed(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
         """Which tracks are to be deleted; see `LifeCycle.deletes`."""
@@ -127,12 +172,13 @@ class Bank:
 
     def restored(self, arrays: dict[str, Array], prefix: str = "") -> Bank:
         """A bank of the kind of this one, made of the arrays of another."""
-        columns = {name: arrays[f"{prefix}{name}"] for name in self._columns()}
+        numbers = np.stack([arrays[f"{prefix}{name}"] for name in _NUMBERS], axis=1)
+        counts = np.stack([arrays[f"{prefix}{name}"].astype(np.int64) for name in _COUNTS], axis=1)
         state = {name: arrays[f"{prefix}state.{name}"] for name in arrays_of(self.states)}
-        return Bank(states=state_from(type(self.states), state), **columns)
+        return Bank(state_from(type(self.states), state), numbers, counts)
 
     def _columns(self) -> dict[str, Array]:
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "states"}
+        return {name: getattr(self, name) for name in (*_NUMBERS, *_COUNTS)}
 
     def tracks(self, filter: Filter[Any], time: float) -> list[Track]:
         """Hand out the tracks."""
@@ -142,21 +188,10 @@ class Bank:
         position[:, : len(motion.position)] = mean[:, list(motion.position)]
         places = velocity_components(motion)
         velocity[:, : len(places)] = mean[:, places]
+        columns = [getattr(self, name).tolist() for name in _HANDED_OUT]
         return [
-            Track(
-                track_id=int(self.track_id[i]),
-                time=time,
-                mean=mean[i].copy(),
-                covariance=covariance[i].copy(),
-                position=position[i],
-                velocity=velocity[i],
-                confirmed=bool(self.confirmed[i]),
-                score=float(self.score[i]),
-                hits=int(self.hits[i]),
-                started=float(self.started[i]),
-                last_detection=float(self.last_detection[i]),
-            )
-            for i in range(len(self))
+            Track(i, time, mean[row].copy(), covariance[row].copy(), position[row], velocity[row], *rest)
+            for row, (i, *rest) in enumerate(zip(*columns, strict=True))
         ]
 
 

@@ -19,7 +19,6 @@ IEEE Trans. Pattern Analysis and Machine Intelligence 18, 1996.
 from __future__ import annotations
 
 import heapq
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -187,9 +186,7 @@ class HypothesisOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array, Array]:
         numbers = np.arange(len(z))
-        empty = [np.zeros((0, sensor.dim)) for sensor in self.sensors]
-        empty[s] = z
-        states, fit, positions = self._singles(s, self._scan_of(time, empty), numbers)
+        states, fit, positions = self._singles(s, z)
         numbers = numbers[fit]
         when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
         ids = np.empty(len(numbers), dtype=np.int64)
@@ -229,7 +226,7 @@ class HypothesisOrientedMHT(Tracker):
     def _confirm(self) -> None:
         bank, rows = self._bank, self._members[0]
         good = bank.track_id[rows[bank.confirm(self.life_cycle).confirmed[rows]]]
-        self._bank = replace(bank, confirmed=bank.confirmed | np.isin(bank.track_id, good))
+        self._bank = bank.sure(bank.confirmed | np.isin(bank.track_id, good))
 
     def _opinion(self, age: int) -> Decision:
         count = len(self.sensors)

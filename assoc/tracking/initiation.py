@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -60,22 +61,34 @@ class Initiation:
         """
         motion = filter.motion
         axes = len(motion.position)
-        place = np.array(motion.position)
+        speed = self.speed if isinstance(self.speed, (int, float)) else tuple(self.speed)
+        place, prior = _prior(motion.dim, tuple(motion.position), speed, self.rest)
         mean = np.zeros((len(positions), motion.dim))
         mean[:, place] = positions[:, :axes]
-        covariance = np.zeros((len(positions), motion.dim, motion.dim))
-        covariance[:, np.arange(motion.dim), np.arange(motion.dim)] = self.rest**2
-        velocity = velocity_components(motion)
-        speed = np.broadcast_to(np.asarray(self.speed, dtype=np.float64), (axes,))
-        covariance[:, velocity, velocity] = (speed**2)[: len(velocity)]
-        covariance[:, place[:, None], place[None, :]] = covariances[:, :axes, :axes]
+        covariance = np.empty((len(positions), *prior.shape))
+        covariance[:] = prior
+        covariance[:, place[:, None], place] = covariances[:, :axes, :axes]
         return filter.start(gaussian(mean, covariance))
+
+
+@lru_cache(maxsize=64)
+def _prior(dim: int, position: tuple[int, ...], speed: float | tuple[float, ...], rest: float) -> tuple[Array, Array]:
+    """Where positions stand in a state, and the covariance of a new track before its position is put in."""
+    place = np.array(position)
+    deviation = np.full(dim, rest)
+    velocity = _velocities(dim, place)
+    deviation[velocity] = np.broadcast_to(np.asarray(speed, dtype=np.float64), (len(place),))[: len(velocity)]
+    return place, np.diag(deviation**2)
 
 
 def velocity_components(motion: Motion) -> Array:
     """Where the velocities stand in a state: after the positions."""
-    places = np.array(motion.position) + len(motion.position)
-    return places[places < motion.dim]
+    return _velocities(motion.dim, np.array(motion.position))
+
+
+def _velocities(dim: int, position: Array) -> Array:
+    places = position + len(position)
+    return np.asarray(places[places < dim])
 
 
 def _positive(value: object, name: str) -> None:

@@ -49,7 +49,6 @@ class NearestNeighbourTracker(Tracker):
         if times is not None and len(self.sensors) > 1:
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
         bank, before = self._bank, time if self._time is None else self._time
-        scan = self._scan_of(time, measurements)
         seen = np.zeros(len(bank), dtype=np.bool_)
         assigned = []
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
@@ -59,7 +58,7 @@ class NearestNeighbourTracker(Tracker):
             chosen = self._choose(frame, s, bank.score, len(z))
             bank, hit, ids = self._take_in(bank, frame, chosen, s, len(z))
             free = np.flatnonzero(ids == 0)
-            states, fit, positions = self._singles(s, scan, free)
+            states, fit, positions = self._singles(s, z[free])
             free = free[fit]
             when = np.full(len(free), time) if stamps is None else stamps[free]
             order = np.lexsort((*positions.T, when))

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from assoc._compiled import njit
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -20,17 +22,26 @@ def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
     drop : float
         Branches further than this below their tree's best are cut.
     """
-    if not len(tree):
-        return np.zeros(0, dtype=np.int64)
-    order = np.lexsort((-score, tree))
-    sorted_tree = tree[order]
-    first = np.ones(len(order), dtype=np.bool_)
-    first[1:] = sorted_tree[1:] != sorted_tree[:-1]
-    start = np.flatnonzero(first)
-    group = np.cumsum(first) - 1
-    rank = np.arange(len(order)) - start[group]
-    kept: Array = order[(rank < most) & (score[order] >= score[order[start]][group] - drop)]
-    return kept
+    return np.asarray(_keep_best(tree, score, most, drop))
+
+
+@njit
+def _keep_best(tree: Any, score: Any, most: int, drop: float) -> Any:
+    order = np.argsort(tree, kind="mergesort")
+    kept = np.empty(order.size, np.int64)
+    count, begin = 0, 0
+    while begin < order.size:
+        end = begin + 1
+        while end < order.size and tree[order[end]] == tree[order[begin]]:
+            end += 1
+        group = order[begin:end]
+        group = group[np.argsort(-score[group], kind="mergesort")]
+        for rank in range(min(most, group.size)):
+            if score[group[rank]] >= score[group[0]] - drop:
+                kept[count] = group[rank]
+                count += 1
+        begin = end
+    return kept[:count].copy()
 
 
 def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, sizes: Array) -> tuple[Array, Array]:
@@ -43,7 +54,7 @@ def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, 
     Parameters
     ----------
     tree, score : arrays (B,)
-        Of each branch.
+        Of each branch; those of one tree stand together.
     chosen : bool array (B,)
         Whether it is in the best global hypothesis.
     old : bool array (B,)
@@ -59,27 +70,58 @@ def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, 
     speakers : int array
         One branch of each tree that has decided.
     """
-    owner = [np.zeros(int(size) + 1, dtype=np.int64) for size in sizes]
-    anchors = np.flatnonzero(chosen & old)
-    for s, one in enumerate(owner):
-        one[oldest[anchors, s]] = tree[anchors]
-        one[0] = 0
-    speakers = list(anchors)
-    waiting = np.flatnonzero(old & ~np.isin(tree, tree[anchors]))
-    taken: set[int] = set()
-    for row in waiting[np.lexsort((tree[waiting], -score[waiting]))].tolist():
-        own = int(tree[row])
-        if own in taken or any(owner[s][oldest[row, s]] for s in range(len(owner)) if oldest[row, s]):
-            continue
-        taken.add(own)
-        speakers.append(row)
-        for s, one in enumerate(owner):
-            if oldest[row, s]:
-                one[oldest[row, s]] = own
-    rows = np.array(speakers, dtype=np.int64)
-    rows = rows[np.argsort(tree[rows], kind="stable")]
-    kept = ~old
-    if len(rows):
-        place = np.minimum(np.searchsorted(tree[rows], tree), len(rows) - 1)
-        kept |= (tree[rows][place] == tree) & (oldest == oldest[rows[place]]).all(axis=1)
-    return kept, rows
+    kept, speakers = _decide(tree, score, chosen, old, oldest, int(sizes.max(initial=0)))
+    return np.asarray(kept), np.asarray(speakers)
+
+
+@njit
+def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int) -> Any:
+    count, sensors = oldest.shape
+    number = np.zeros(count, np.int64)
+    for row in range(1, count):
+        number[row] = number[row - 1] + (tree[row] != tree[row - 1])
+    speaker = np.full(number[-1] + 1 if count else 0, -1, np.int64)
+    taken = np.zeros((sensors, most + 1), np.bool_)
+    for row in range(count):
+        if chosen[row] and old[row]:
+            speaker[number[row]] = row
+            for s in range(sensors):
+                taken[s, oldest[row, s]] = oldest[row, s] > 0
+    waiting = np.empty(count, np.int64)
+    size = 0
+    for row in range(count):
+        if old[row] and speaker[number[row]] < 0:
+            waiting[size] = row
+            size += 1
+    waiting = waiting[:size]
+    for row in waiting[np.argsort(-score[waiting], kind="mergesort")]:
+        free = speaker[number[row]] < 0
+        for s in range(sensors):
+            free = free and not taken[s, oldest[row, s]]
+        if free:
+            speaker[number[row]] = row
+            for s in range(sensors):
+                taken[s, oldest[row, s]] = oldest[row, s] > 0
+    kept = np.empty(count, np.bool_)
+    for row in range(count):
+        own = speaker[number[row]]
+        kept[row] = not old[row]
+        if own >= 0:
+            same = True
+            for s in range(sensors):
+                same = same and oldest[row, s] == oldest[own, s]
+            kept[row] = kept[row] or same
+    return kept, speaker[speaker >= 0]
+
+
+@njit
+def same_tree(tree: Any, mask: Any) -> Any:
+    """Branches of the trees of which a branch is in the mask; those of one tree stand together."""
+    result = mask.copy()
+    for row in range(1, tree.size):
+        if result[row - 1] and tree[row] == tree[row - 1]:
+            result[row] = True
+    for row in range(tree.size - 2, -1, -1):
+        if result[row + 1] and tree[row] == tree[row + 1]:
+            result[row] = True
+    return result

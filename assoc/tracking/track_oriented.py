@@ -15,7 +15,6 @@ multisensor tracking, Computational Optimization and Applications 3, 1994.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,9 +23,10 @@ from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.filters.batches import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.tracking.bank import Bank
+from assoc.tracking.few_trees import choose
 from assoc.tracking.frames import look
-from assoc.tracking.pruning import decide, keep_best
-from assoc.tracking.track import Decision, Step, decision
+from assoc.tracking.pruning import decide, keep_best, same_tree
+from assoc.tracking.track import Decision, Step
 from assoc.tracking.tracker import Tracker
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -99,7 +99,6 @@ class TrackOrientedMHT(Tracker):
         history = np.zeros_like(self._history)
         history[:, count:] = self._history[:, : history.shape[1] - count]
         born = self._born
-        scan = self._scan_of(time, measurements)
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
             stamps = None if times is None else times[s]
             frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
@@ -107,12 +106,12 @@ class TrackOrientedMHT(Tracker):
             hit = bank[pairs.track].scored(pairs.states, pairs.log_likelihood + self.terms.detection[s], frame.when)
             hit_history = history[pairs.track]
             hit_history[:, s] = pairs.measurement + 1
-            roots, root_history = self._roots(s, scan, z, time, stamps)
-            bank = Bank.concatenate([bank.scored(frame.predicted, self.terms.miss[s]), hit, roots])
+            roots, root_history = self._roots(s, z, time, stamps)
+            bank = Bank.concatenate([bank.scored(frame.predicted, float(self.terms.miss[s])), hit, roots])
             history = np.concatenate([history, hit_history, root_history])
             born = np.concatenate([born, born[pairs.track], np.full(len(roots), self._scan, dtype=np.int64)])
             before = time
-            kept = keep_best(bank.track_id, bank.score, self.max_branches, self.branch_drop)
+            kept = keep_best(bank.track_id.copy(), bank.score.copy(), self.max_branches, self.branch_drop)
             bank, history, born = bank[kept], history[kept], born[kept]
             if len(bank) > self.max_tuples:
                 raise LimitExceededError(
@@ -122,31 +121,40 @@ class TrackOrientedMHT(Tracker):
         self._bank = bank.counted(np.asarray((history[:, :count] > 0).any(axis=1)))
         self._history, self._born = history, born
 
-    def _roots(self, s: int, scan: Any, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array]:
+    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array]:
         """New trees, one for each measurement that tells a position."""
-        numbers = np.arange(len(z))
-        states, fit, positions = self._singles(s, scan, numbers)
-        numbers = numbers[fit]
-        when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
+        states, fit, positions = self._singles(s, z)
+        numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
+        if stamps is None:
+            when: Array | float = time
+            order = np.lexsort(positions.T)
+        else:
+            when = stamps[numbers]
+            order = np.lexsort((*positions.T, when))
+            states = predict_each(self.filter, states, time - when)
         ids = np.empty(len(numbers), dtype=np.int64)
-        ids[np.lexsort((*positions.T, when))] = self._new_ids(len(numbers))
-        score = np.full(len(numbers), self._birth[s])
-        bank = Bank.new(predict_each(self.filter, states, time - when), ids, score, when)
+        ids[order] = self._new_ids(len(numbers))
+        bank = Bank.new(states, ids, self._birth[s], when)
         history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
         history[:, s] = numbers + 1
         return bank, history
 
     def _best_hypothesis(self) -> Array:
         """Branches of the best global hypothesis, as a mask."""
+        score, track_id = self._bank.score.copy(), self._bank.track_id.copy()
+        if self.solver == "exact" and not self.solver_parameters:
+            easy = choose(track_id, score, self._history)
+            if easy is not None:
+                return easy
         chosen = np.zeros(len(self._bank), dtype=np.bool_)
         # a branch of no positive score is better left to false alarms
-        rows = np.flatnonzero(self._bank.score > 0)
+        rows = np.flatnonzero(score > 0)
         if not len(rows):
             return chosen
         tuples = np.empty((len(rows), 1 + self._history.shape[1]), dtype=np.int64)
         sizes = np.zeros(tuples.shape[1], dtype=np.int64)
-        trees, tuples[:, 0] = np.unique(self._bank.track_id[rows], return_inverse=True)
+        trees, tuples[:, 0] = np.unique(track_id[rows], return_inverse=True)
         tuples[:, 0] += 1
         sizes[0] = len(trees)
         for c in range(self._history.shape[1]):
@@ -158,36 +166,43 @@ class TrackOrientedMHT(Tracker):
             sizes[c + 1] = used.sum()
             number = np.cumsum(used) * used
             tuples[:, c + 1] = number[column]
-        solution = self._assign(AssignmentProblem(tuples, -self._bank.score[rows], sizes))
+        solution = self._assign(AssignmentProblem(tuples, -score[rows], sizes))
         picked = solution.indices[solution.indices < len(rows)]
         chosen[rows[picked]] = True
         return chosen
 
     def _confirm(self) -> None:
         bank = self._bank
-        good = bank.confirm(self.life_cycle).confirmed & self._chosen
-        trees = np.unique(bank.track_id[good])
-        self._bank = replace(bank, confirmed=bank.confirmed | np.isin(bank.track_id, trees))
+        before = bank.confirmed
+        new = self._chosen & ~before
+        new &= self.life_cycle.confirms(bank.score, bank.detections)
+        if new.any():
+            self._bank = bank.sure(before | same_tree(bank.track_id.copy(), new))
 
     def _opinion(self, age: int, rows: Array) -> Decision:
         """Which tracks the measurements of the scan `age` scans ago went to, by these branches."""
         count = len(self.sensors)
         time, sizes = self._window[age]
-        bank, history = self._bank[rows], self._history[rows]
-        assigned = []
+        if rows.dtype == np.bool_:
+            rows = np.flatnonzero(rows)
+        ids, sure = self._bank.track_id[rows], self._bank.confirmed[rows]
+        history = self._history[rows]
+        assigned, confirmed = [], []
         for s in range(count):
-            ids = np.zeros(int(sizes[s]) + 1, dtype=np.int64)
-            ids[history[:, age * count + s]] = bank.track_id
-            assigned.append(ids[1:])
-        return decision(self._scan - age, time, assigned, bank.track_id[bank.confirmed])
+            owner, known = np.zeros(int(sizes[s]) + 1, dtype=np.int64), np.zeros(int(sizes[s]) + 1, dtype=np.bool_)
+            column = history[:, age * count + s]
+            owner[column], known[column] = ids, sure
+            assigned.append(owner[1:])
+            confirmed.append(known[1:])
+        return Decision(self._scan - age, time, tuple(assigned), tuple(confirmed))
 
     def _prune(self) -> tuple[Decision, ...]:
         """Decide the oldest scan of the window and cut what contradicts."""
         count = len(self.sensors)
-        oldest = self._history[:, -count:]
+        oldest = np.ascontiguousarray(self._history[:, -count:])
         kept, speakers = decide(
-            self._bank.track_id,
-            self._bank.score,
+            self._bank.track_id.copy(),
+            self._bank.score.copy(),
             self._chosen,
             self._born <= self._scan - self.depth + 1,
             oldest,
@@ -199,9 +214,12 @@ class TrackOrientedMHT(Tracker):
         return (final,)
 
     def _end(self, time: float) -> Array:
-        before = np.unique(self._bank.track_id[self._bank.confirmed])
-        self._select(~self._doomed(self._bank, time))
-        return np.setdiff1d(before, self._bank.track_id)
+        gone = self._doomed(self._bank, time)
+        if not gone.any():
+            return np.zeros(0, dtype=np.int64)
+        lost = self._bank.track_id[gone & self._bank.confirmed]
+        self._select(~gone)
+        return np.setdiff1d(lost, self._bank.track_id) if len(lost) else lost
 
     def _select(self, mask: Array) -> None:
         if not mask.all():

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from assoc._files import Field, load_npz, save_npz
-from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances
+from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances, single_positions
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.track_scores import score_terms
 from assoc.errors import InvalidInputError
@@ -118,6 +118,8 @@ class Tracker(ABC):
         self.terms = score_terms(self.sensors, self.initiation.birth_rate)
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
+        bounds = self._place.region
+        self._widest = self.initiation.widest * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0]))
         self._time: float | None = None
         self._pace = 0.0
         self._scan = 0
@@ -176,7 +178,7 @@ class Tracker(ABC):
         when, states = self._checked_time(time), self.filter.start(tracks)
         bank = Bank.new(states, self._new_ids(len(tracks)), np.full(len(tracks), float(score)), when)
         self._time = when
-        self._adopt(bank.sworn())
+        self._adopt(bank.sure(True))
         return bank.track_id
 
     def _adopt(self, bank: Bank) -> None:
@@ -302,19 +304,22 @@ class Tracker(ABC):
     def _fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
         """Positions, covariances, and which of them are narrow enough to start a track."""
         positions, covariances = positions_and_covariances(self._place, scan, tuples)
-        region = self._place.region
-        limit = self.initiation.widest * float(np.linalg.norm(region[:, 1] - region[:, 0]))
-        axes = len(self.filter.motion.position)
-        wide = np.sqrt(np.einsum("kii->ki", covariances)[:, :axes])
-        # heights are the scene's own where radars do not tell them: they do not forbid a track
-        return positions, covariances, (wide[:, :2] <= limit).all(axis=1)
+        return positions, covariances, self._narrow(covariances)
 
-    def _singles(self, s: int, scan: Scan, numbers: Array) -> tuple[Any, Array, Array]:
-        """States of new tracks from single measurements (0-based numbers) of sensor s: also which are fit."""
-        tuples = np.zeros((len(numbers), len(self.sensors)), dtype=np.int32)
-        tuples[:, s] = numbers + 1
-        positions, covariances, fit = self._fused(scan, tuples)
-        return self.initiation.start(self.filter, positions[fit], covariances[fit]), fit, positions[fit]
+    def _narrow(self, covariances: Array) -> Array:
+        # heights are the scene's own where radars do not tell them: they do not forbid a track
+        limit = self._widest**2
+        if len(self.filter.motion.position) == 1:
+            return np.asarray(covariances[:, 0, 0] <= limit)
+        return np.asarray((covariances[:, 0, 0] <= limit) & (covariances[:, 1, 1] <= limit))
+
+    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array]:
+        """States of new tracks from single measurements (n, d) of sensor s, which can start one, and where."""
+        positions, covariances = single_positions(self._place, s, measured)
+        fit = self._narrow(covariances)
+        if not fit.all():
+            positions, covariances = positions[fit], covariances[fit]
+        return self.initiation.start(self.filter, positions, covariances), fit, positions
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the whole state as an npz file of format "assoc.tracker"; whole or not at all."""
