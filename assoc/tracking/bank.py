@@ -11,21 +11,22 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.filters.state import gaussian
 from assoc.tracking.initiation import velocity_components
-from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.life_cycle import HISTORY, LifeCycle
 from assoc.tracking.track import Track
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_ALL_BITS = np.int64((1 << 62) - 1)
+MASK = (1 << HISTORY) - 1
+"""The scans whose detections are remembered, one a bit."""
 
 
-# columns of the two tables
-_SCORE, _BEST, _STARTED, _LAST = range(4)
-_ID, _SURE, _BITS, _MISSED, _HITS = range(5)
-_NUMBERS = {"score": _SCORE, "best": _BEST, "started": _STARTED, "last_detection": _LAST}
-_COUNTS = {"track_id": _ID, "confirmed": _SURE, "detections": _BITS, "missed": _MISSED, "hits": _HITS}
+SCORE, BEST, STARTED, LAST = 0, 1, 2, 3
+"""Columns of the numbers of a bank."""
+ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
+"""Columns of the counts of a bank."""
 
-
+_NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST}
+_COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
 _HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection")
 
 
@@ -52,47 +53,47 @@ class Bank:
     @property
     def score(self) -> Array:
         """Log likelihood ratio, (T,)."""
-        return self.numbers[:, _SCORE]
+        return self.numbers[:, SCORE]
 
     @property
     def best(self) -> Array:
         """Largest value of the score so far, (T,)."""
-        return self.numbers[:, _BEST]
+        return self.numbers[:, BEST]
 
     @property
     def started(self) -> Array:
         """Seconds, (T,)."""
-        return self.numbers[:, _STARTED]
+        return self.numbers[:, STARTED]
 
     @property
     def last_detection(self) -> Array:
         """Seconds, (T,)."""
-        return self.numbers[:, _LAST]
+        return self.numbers[:, LAST]
 
     @property
     def track_id(self) -> Array:
         """Ids, int64 (T,)."""
-        return self.counts[:, _ID]
+        return self.counts[:, ID]
 
     @property
     def confirmed(self) -> Array:
         """Whether each is confirmed, bool (T,)."""
-        return self.counts[:, _SURE] != 0
+        return self.counts[:, SURE] != 0
 
     @property
     def detections(self) -> Array:
         """One bit a scan, the last one lowest: whether the track was detected; int64 (T,)."""
-        return self.counts[:, _BITS]
+        return self.counts[:, BITS]
 
     @property
     def missed(self) -> Array:
         """Scans in a row without a detection, int64 (T,)."""
-        return self.counts[:, _MISSED]
+        return self.counts[:, MISSED]
 
     @property
     def hits(self) -> Array:
         """Scans with a detection, int64 (T,)."""
-        return self.counts[:, _HITS]
+        return self.counts[:, HITS]
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -106,9 +107,9 @@ class Bank:
         """Tracks that begin now, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
         numbers, counts = np.empty((count, 4)), np.zeros((count, 5), dtype=np.int64)
-        numbers[:, _SCORE] = numbers[:, _BEST] = score
-        numbers[:, _STARTED] = numbers[:, _LAST] = when
-        counts[:, _ID] = track_id
+        numbers[:, SCORE] = numbers[:, BEST] = score
+        numbers[:, STARTED] = numbers[:, LAST] = when
+        counts[:, ID] = track_id
         return Bank(states, numbers, counts)
 
     @staticmethod
@@ -135,25 +136,25 @@ class Bank:
             Time of the detection, NaN where the track was missed; left out, all were missed.
         """
         numbers = self.numbers.copy()
-        numbers[:, _SCORE] += gain
-        np.maximum(numbers[:, _BEST], numbers[:, _SCORE], out=numbers[:, _BEST])
+        numbers[:, SCORE] += gain
+        np.maximum(numbers[:, BEST], numbers[:, SCORE], out=numbers[:, BEST])
         if detected_at is not None:
-            np.fmax(numbers[:, _LAST], detected_at, out=numbers[:, _LAST])
+            np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
         return Bank(states, numbers, self.counts)
 
     def counted(self, detected: Array) -> Bank:
         """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor."""
         counts = self.counts.copy()
-        counts[:, _BITS] = ((counts[:, _BITS] << np.int64(1)) & _ALL_BITS) | detected
-        counts[:, _MISSED] += 1
-        counts[detected, _MISSED] = 0
-        counts[:, _HITS] += detected
+        counts[:, BITS] = ((counts[:, BITS] << np.int64(1)) & MASK) | detected
+        counts[:, MISSED] += 1
+        counts[detected, MISSED] = 0
+        counts[:, HITS] += detected
         return Bank(self.states, self.numbers, counts)
 
     def sure(self, confirmed: Array | bool) -> Bank:
         """The same tracks, those in the mask confirmed, and no others."""
         counts = self.counts.copy()
-        counts[:, _SURE] = confirmed
+        counts[:, SURE] = confirmed
         return Bank(self.states, self.numbers, counts)
 
     def confirm(self, life_cycle: LifeCycle) -> Bank:

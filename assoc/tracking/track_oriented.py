@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.filters.batches import predict_each
+from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
 from assoc.tracking.bank import Bank
 from assoc.tracking.few_trees import choose
 from assoc.tracking.frames import look
-from assoc.tracking.pruning import decide, keep_best, same_tree
+from assoc.tracking.growing import Hits, Roots, Tables, count_scan, extend
+from assoc.tracking.pruning import decide, same_tree
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.tracker import Tracker
 
@@ -98,36 +99,35 @@ class TrackOrientedMHT(Tracker):
         bank, before = self._bank, time if self._time is None else self._time
         history = np.zeros_like(self._history)
         history[:, count:] = self._history[:, : history.shape[1] - count]
-        born = self._born
+        states, tables = bank.states, Tables(bank.numbers, bank.counts, history, self._born)
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
             stamps = None if times is None else times[s]
-            frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
+            frame = look(self.filter, states, before, time, z, stamps, sensor, self.gate_probability)
             pairs = frame.pairs
-            hit = bank[pairs.track].scored(pairs.states, pairs.log_likelihood + self.terms.detection[s], frame.when)
-            hit_history = history[pairs.track]
-            hit_history[:, s] = pairs.measurement + 1
-            roots, root_history = self._roots(s, z, time, stamps)
-            bank = Bank.concatenate([bank.scored(frame.predicted, float(self.terms.miss[s])), hit, roots])
-            history = np.concatenate([history, hit_history, root_history])
-            born = np.concatenate([born, born[pairs.track], np.full(len(roots), self._scan, dtype=np.int64)])
+            gain = pairs.log_likelihood + self.terms.detection[s]
+            begun, roots = self._roots(s, z, time, stamps)
+            kept, tables = extend(
+                tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, frame.when), roots,
+                s, self._scan, self.max_branches, self.branch_drop,
+            )  # fmt: skip
+            states = concatenate([frame.predicted, pairs.states, begun])[kept]
             before = time
-            kept = keep_best(bank.track_id.copy(), bank.score.copy(), self.max_branches, self.branch_drop)
-            bank, history, born = bank[kept], history[kept], born[kept]
-            if len(bank) > self.max_tuples:
+            if len(kept) > self.max_tuples:
                 raise LimitExceededError(
-                    f"scan {self._scan}: {len(bank)} branches, more than max_tuples = {self.max_tuples}; "
+                    f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
                     "lower gate_probability, depth or max_branches, or raise max_tuples"
                 )
-        self._bank = bank.counted(np.asarray((history[:, :count] > 0).any(axis=1)))
-        self._history, self._born = history, born
+        count_scan(tables.counts, tables.history, count)
+        self._bank = Bank(states, tables.numbers, tables.counts)
+        self._history, self._born = tables.history, tables.born
 
-    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array]:
-        """New trees, one for each measurement that tells a position."""
+    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Any, Roots]:
+        """New trees, one for each measurement that tells a position, and their states."""
         states, fit, positions = self._singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
         if stamps is None:
-            when: Array | float = time
+            when = np.full(len(numbers), time)
             order = np.lexsort(positions.T)
         else:
             when = stamps[numbers]
@@ -135,10 +135,7 @@ class TrackOrientedMHT(Tracker):
             states = predict_each(self.filter, states, time - when)
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[order] = self._new_ids(len(numbers))
-        bank = Bank.new(states, ids, self._birth[s], when)
-        history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
-        history[:, s] = numbers + 1
-        return bank, history
+        return states, Roots(ids, numbers, when, float(self._birth[s]))
 
     def _best_hypothesis(self) -> Array:
         """Branches of the best global hypothesis, as a mask."""
