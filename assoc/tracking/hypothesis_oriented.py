@@ -30,6 +30,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers.kbest import kbest
 from assoc.tracking.bank import Bank
 from assoc.tracking.frames import look
+from assoc.tracking.saving import check_window, demand
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.tracker import Tracker
 
@@ -269,6 +270,19 @@ class HypothesisOrientedMHT(Tracker):
         own["lengths"] = np.array([len(rows) for rows in self._members], dtype=np.int64)
         own |= {"window_times": times, "window_sizes": sizes}
         return super()._arrays() | own
+
+    def _check(self, arrays: dict[str, Array]) -> None:
+        super()._check(arrays)
+        count = len(arrays["bank.track_id"])
+        check_window(arrays, count, len(self.sensors), self.depth)
+        members, lengths, weight, line = (arrays[name] for name in ("members", "lengths", "weight", "line"))
+        demand(1 <= len(lengths) <= self.max_hypotheses, "lengths", f"1 to {self.max_hypotheses} hypotheses")
+        demand((lengths >= 0).all() and (lengths <= count).all(), "lengths", "numbers of branches")
+        demand(int(lengths.sum()) == len(members), "members", "as many branches as the lengths say")
+        demand(((members >= 0) & (members < count)).all(), "members", "numbers of branches")
+        demand(weight.shape == lengths.shape and np.isfinite(weight).all(), "weight", "a number for each hypothesis")
+        demand(line.shape == (len(lengths), self.depth), "line", f"the shape {(len(lengths), self.depth)}")
+        demand((line >= 0).all(), "line", "numbers of hypotheses")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)

@@ -27,6 +27,7 @@ from assoc.tracking.few_trees import choose
 from assoc.tracking.frames import look
 from assoc.tracking.growing import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.pruning import decide, same_tree
+from assoc.tracking.saving import check_window, demand
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.tracker import Tracker
 
@@ -241,6 +242,15 @@ class TrackOrientedMHT(Tracker):
         own: dict[str, Array] = {"history": self._history, "born": self._born, "chosen": self._chosen}
         own |= {"window_times": times, "window_sizes": sizes}
         return super()._arrays() | own
+
+    def _check(self, arrays: dict[str, Array]) -> None:
+        super()._check(arrays)
+        ids = arrays["bank.track_id"]
+        check_window(arrays, len(ids), len(self.sensors), self.depth)
+        demand((np.diff(ids) >= 0).all(), "bank.track_id", "the branches of one tree side by side")
+        born = arrays["born"]
+        demand(born.shape == ids.shape and (born <= int(arrays["scan"])).all(), "born", "a scan for each branch")
+        demand(arrays["chosen"].shape == ids.shape, "chosen", "a mark for each branch")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)

@@ -30,6 +30,7 @@ from assoc.tracking.bank import Bank, empty_bank
 from assoc.tracking.defaults import two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.saving import check_bank, check_progress, difference, rng_state
 from assoc.tracking.track import Decision, Step, Track
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -118,8 +119,7 @@ class Tracker(ABC):
         self.terms = score_terms(self.sensors, self.initiation.birth_rate)
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
-        bounds = self._place.region
-        self._widest = self.initiation.widest * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0]))
+        self._widest = self.initiation.widest * float(np.linalg.norm(np.diff(self._place.region, axis=1)))
         self._time: float | None = None
         self._pace = 0.0
         self._scan = 0
@@ -331,7 +331,8 @@ class Tracker(ABC):
         Raises
         ------
         InvalidInputError
-            The file is not a saved tracker, or that of a tracker with other settings.
+            The file is not a saved tracker, or damaged, or that of a tracker with other settings. The tracker
+            is then as it was.
         """
         own = self._arrays()
         kinds = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
@@ -339,9 +340,15 @@ class Tracker(ABC):
         found = load_npz(path, FORMAT, VERSION, {"settings": spec["settings"]})
         if str(found["settings"]) != str(own["settings"]):
             raise InvalidInputError(
-                f"{path}: was saved by a tracker with other settings: {_difference(found['settings'], own['settings'])}"
+                f"{path}: was saved by a tracker with other settings: "
+                f"{difference(str(found['settings']), str(own['settings']))}"
             )
-        self._take(load_npz(path, FORMAT, VERSION, spec))
+        arrays = load_npz(path, FORMAT, VERSION, spec)
+        try:
+            self._check(arrays)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{path}: {error}") from None
+        self._take(arrays)
 
     def _settings(self) -> dict[str, str]:
         """What a saved state depends on, as texts."""
@@ -369,6 +376,14 @@ class Tracker(ABC):
             **self._bank.arrays("bank."),
         }
 
+    def _check(self, arrays: dict[str, Array]) -> None:
+        """Refuse arrays that no tracker of these settings has saved."""
+        check_progress(arrays, len(arrays["bank.track_id"]))
+        check_bank(arrays, self.filter, max(sensor.dim for sensor in self.sensors))
+        rng = getattr(self.filter, "rng", None)
+        if rng is not None and str(arrays["filter_rng"]):
+            rng_state(rng, str(arrays["filter_rng"]))
+
     def _take(self, arrays: dict[str, Array]) -> None:
         when = float(arrays["time"])
         self._time = None if math.isnan(when) else when
@@ -376,17 +391,10 @@ class Tracker(ABC):
         self._pace = float(arrays["pace"])
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
-            rng.bit_generator.state = json.loads(str(arrays["filter_rng"]))
+            rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))
         self._bank = self._bank.restored(arrays, "bank.")
 
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
 
-
-def _difference(saved: Array, own: Array) -> str:
-    before, now = json.loads(str(saved)), json.loads(str(own))
-    for key in now:
-        if before.get(key) != now[key]:
-            return f"{key} was {str(before.get(key))[:80]!r}, is {now[key][:80]!r}"
-    return "an unknown setting"
