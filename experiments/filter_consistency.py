@@ -14,27 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from assoc.filters import (
-    ConstantVelocity,
-    CoordinatedTurn,
-    EnsembleKalmanFilter,
-    ExtendedKalmanFilter,
-    FuzzyAdaptiveEKF,
-    Gaussian,
-    InteractingMultipleModel,
-    KalmanFilter,
-    ModifiedEKF,
-    Padded,
-    UnscentedKalmanFilter,
-    bounds,
-    nees,
-    tuned_data,
-)
+from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, ModifiedEKF, bounds, nees
 from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Sensor
 from experiments.claims import Claim
 from experiments.filters.b1 import Runs, Setting
 from experiments.filters.command import main, mean_interval
+from experiments.filters.kinds import of_each_kind
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -100,29 +86,10 @@ def run(filter_: Filter[Any], case: Case) -> tuple[Array, Array]:
 
 def filters(noise: float, radar: bool, large: bool, rng: np.random.Generator) -> dict[str, Filter[Any]]:
     """Return every filter that can take the case."""
-    motion = ConstantVelocity(noise)
-    data = tuned_data()
-    adaptive = tuned_filter(data)
-    kinds: dict[str, Filter[Any]] = {} if radar else {"Kalman": KalmanFilter(motion)}
-    kinds["EKF"] = ExtendedKalmanFilter(motion)
-    if radar:
-        kinds["modified EKF, simplified"] = ModifiedEKF(motion, simplified=True)
-        kinds["modified EKF"] = ModifiedEKF(motion)
-    kinds["UKF"] = UnscentedKalmanFilter(motion)
-    kinds["EnKF, N 100"] = EnsembleKalmanFilter(motion, 100, rng)
-    if large:
-        kinds["EnKF, N 1000"] = EnsembleKalmanFilter(motion, 1000, rng)
-    kinds["fuzzy-adaptive EKF"] = adaptive
     inner = ModifiedEKF if radar else ExtendedKalmanFilter
-    kinds["IMM"] = InteractingMultipleModel(
-        [inner(Padded(motion, 0.01)), inner(CoordinatedTurn(noise, 0.001))], np.array([[0.98, 0.02], [0.1, 0.9]])
-    )
-    return kinds
-
-
-def tuned_filter(data: dict[str, Any]) -> FuzzyAdaptiveEKF:
-    """Return the tuned fuzzy filter on its own model."""
-    return FuzzyAdaptiveEKF.from_data(CoordinatedTurn(data["acceleration_noise"], data["rate_noise"]), data)
+    kinds = of_each_kind(noise, (100, 1000) if large else (100,), rng, inner)
+    others = ("Kalman",) if radar else ("modified EKF, simplified", "modified EKF")
+    return {name: one for name, one in kinds.items() if name not in others}
 
 
 EXACT = ("Kalman", "EKF", "UKF")

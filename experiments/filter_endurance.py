@@ -14,24 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from assoc.filters import (
-    ConstantVelocity,
-    CoordinatedTurn,
-    EnsembleKalmanFilter,
-    ExtendedKalmanFilter,
-    FuzzyAdaptiveEKF,
-    Gaussian,
-    InteractingMultipleModel,
-    KalmanFilter,
-    ModifiedEKF,
-    Padded,
-    UnscentedKalmanFilter,
-    tuned_data,
-)
+from assoc.filters import ExtendedKalmanFilter, Gaussian, KalmanFilter
 from assoc.filters.base import Filter
 from experiments.claims import Claim
 from experiments.filter_benchmark import PLACE, RADAR
 from experiments.filters.command import main
+from experiments.filters.kinds import of_each_kind
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -42,20 +30,8 @@ PLACE_OF_TARGET = (30e3, 20e3, 5e3)
 
 def filters(rng: np.random.Generator) -> dict[str, Filter[Any]]:
     """Return one filter of each kind."""
-    motion = ConstantVelocity(2.0)
-    data = tuned_data()
-    models = [ExtendedKalmanFilter(Padded(motion, 0.01)), ExtendedKalmanFilter(CoordinatedTurn(2.0, 0.001))]
-    return {
-        "Kalman": KalmanFilter(motion),
-        "EKF": ExtendedKalmanFilter(motion),
-        "modified EKF": ModifiedEKF(motion),
-        "UKF": UnscentedKalmanFilter(motion),
-        "EnKF, N 20": EnsembleKalmanFilter(motion, 20, rng),
-        "fuzzy-adaptive EKF": FuzzyAdaptiveEKF.from_data(
-            CoordinatedTurn(data["acceleration_noise"], data["rate_noise"]), data
-        ),
-        "IMM": InteractingMultipleModel(models, np.array([[0.98, 0.02], [0.1, 0.9]])),
-    }
+    kinds = of_each_kind(2.0, (20,), rng, ExtendedKalmanFilter)
+    return {name: one for name, one in kinds.items() if "simplified" not in name}
 
 
 def endure(filter_: Filter[Any], steps: int, rng: np.random.Generator) -> Array:

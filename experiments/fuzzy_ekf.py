@@ -4,7 +4,7 @@
 
 The paper shows one trajectory without units or membership functions and reports 42 % (EKF) and 60 % (EKF with
 inference) below the raw measurements. Here: scenarios C, D and E; the rules and the IMM were both tuned on random
-flights that are not among them (experiments/filters/tune_fuzzy.py). The fixed EKFs are chosen in hindsight, for
+flights that are not among them (experiments.filters.tune.py). The fixed EKFs are chosen in hindsight, for
 each scenario the best of a grid, which is more than any fixed filter could know.
 """
 
@@ -28,8 +28,8 @@ from assoc.filters import (
 from experiments.claims import Claim
 from experiments.filters.b1 import ratio_interval
 from experiments.filters.command import main, rmse, rmse_interval
-from experiments.filters.manoeuvres import SCENARIOS, Batch, Flight, errors, imm, smoothed_errors
-from experiments.filters.tune_fuzzy import fuzzy_filter
+from experiments.filters.kinds import fuzzy_filter, imm
+from experiments.filters.manoeuvres import SCENARIOS, Batch, Flight, errors, smoothed_errors
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

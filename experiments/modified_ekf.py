@@ -21,8 +21,8 @@ from experiments.filters.b1 import Runs, Setting, ratio_interval, run
 from experiments.filters.command import main, mean_interval, rmse_interval
 
 BETAS = (0.02, 0.05, 0.09, 0.25, 0.5, 1.0, 2.3, 4.0)
-# ratios of a prototype, by beta
-PROTOTYPE = {0.25: 1.03, 1.0: 1.4, 2.3: 2.2, 4.0: 3.8}
+FILTERS = {"EKF": "EKF", "simplified": "modified EKF, simplified", "full": "modified EKF, full", "UKF": "UKF"}
+"""Names in the figure."""
 
 PAPER_SETTING = Setting(
     distance=float(np.hypot(np.hypot(15.0, 12.0), 5.0)),
@@ -121,19 +121,25 @@ def _paper_setting(count: int, rng: np.random.Generator) -> list[Claim]:
 
 def draw(figure: Any, shown: Any) -> None:
     """Draw errors over time on B1 beside the ratio over beta."""
+    from matplotlib.ticker import NullLocator
+
     b1, ratios = shown
     left, right = figure.subplots(1, 2)
     for name, result in b1.items():
         steps = np.arange(len(result.squared)) + 51
-        left.semilogy(steps, np.sqrt(result.squared.mean(axis=1)), label=name)
+        left.semilogy(steps, np.sqrt(result.squared.mean(axis=1)), label=FILTERS[name])
     left.set(xlabel="step (1 s)", ylabel="RMSE of position (m)", title="B1: 100 km, 1.5 deg, 30 m")
-    left.legend()
-    right.loglog(BETAS, ratios, "o-", label="ours")
-    right.loglog(list(PROTOTYPE), list(PROTOTYPE.values()), "x", color="black", label="prototype")
+    left.set_yticks([400, 500, 700, 1000, 1500, 2000, 3000], ["400", "500", "700", "1000", "1500", "2000", "3000"])
+    left.set_ylim(350, 3500)
+    left.legend(loc="lower left", fontsize=8)
+    right.loglog(BETAS, ratios, "o-")
     right.axhline(1.0, color="grey", linewidth=0.8)
-    right.set(xlabel="beta = r sigma_angle^2 / sigma_range", ylabel="RMSE, EKF / full modified EKF")
+    right.set(xlabel="beta = r sigma_angle² / sigma_range", ylabel="RMSE, EKF / full modified EKF")
     right.set_title("where the modification pays")
-    right.legend()
+    right.set_xticks(BETAS, [f"{beta:g}" for beta in BETAS])
+    right.set_yticks([1, 1.5, 2, 3, 4], ["1", "1.5", "2", "3", "4"])
+    for axis in (left.yaxis, right.xaxis, right.yaxis):
+        axis.set_minor_locator(NullLocator())
 
 
 TITLE = "Modified EKF for a 3-D radar"

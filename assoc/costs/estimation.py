@@ -10,9 +10,6 @@ directions only in which the measurements tell less than the prior does (standar
 region's width). The chi-square value is that of the measurements at the position found; the prior's own
 term is not part of it. So the cost of a determined tuple is exactly equation 5 at the maximum-likelihood
 position, and an undetermined one pays only where its measurements pull away from the region.
-
-Kernels that call one another live in one file: numba's cache does not notice an edited callee in another.
-Symmetric 3 x 3 matrices are passed as (xx, xy, xz, yy, yz, zz).
 """
 
 from __future__ import annotations
@@ -25,134 +22,16 @@ import numpy as np
 from assoc._compiled import njit
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
+from assoc.costs.residuals import normal
+from assoc.costs.symmetric import Six, inverse, solve
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Six = tuple[float, float, float, float, float, float]
 
-_TURN = 2.0 * math.pi
 # a position is undetermined along a direction if the measurements tell less of it than this times the prior
 _WEAK = 1.0
 _MAX_STEPS = 100
-# nearer to a sensor than this (metres) the derivatives of angles are those at this distance
-_NEAREST = 1e-9
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
 _POOR_FIT = 10.0
-
-
-@njit
-def _normal(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, x: float, y: float, z: float
-) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members at a position."""
-    chi = g0 = g1 = g2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
-    for n in members:
-        s = scan.owner[n]
-        code = sensors.code[s]
-        W = sensors.weight[s]
-        if code == 0:
-            v0, v1 = scan.z[n, 0] - x, scan.z[n, 1] - y
-            v2 = scan.z[n, 2] - z if sensors.dim[s] == 3 else 0.0
-            w0 = W[0, 0] * v0 + W[0, 1] * v1 + W[0, 2] * v2
-            w1 = W[0, 1] * v0 + W[1, 1] * v1 + W[1, 2] * v2
-            w2 = W[0, 2] * v0 + W[1, 2] * v1 + W[2, 2] * v2
-            chi += v0 * w0 + v1 * w1 + v2 * w2
-            g0, g1, g2 = g0 + w0, g1 + w1, g2 + w2
-            a0, a1, a2 = a0 + W[0, 0], a1 + W[0, 1], a2 + W[0, 2]
-            a3, a4, a5 = a3 + W[1, 1], a4 + W[1, 2], a5 + W[2, 2]
-            continue
-        dx, dy, dz = x - sensors.place[s, 0], y - sensors.place[s, 1], z - sensors.place[s, 2]
-        flat2 = dx * dx + dy * dy
-        turn = math.atan2(dy, dx)
-        if code == 3:
-            flat2 = max(flat2, _NEAREST * _NEAREST)
-            v0 = scan.z[n, 0] - turn
-            v0 -= _TURN * round(v0 / _TURN)
-            h0, h1 = -dy / flat2, dx / flat2
-            chi += W[0, 0] * v0 * v0
-            g0, g1 = g0 + W[0, 0] * v0 * h0, g1 + W[0, 0] * v0 * h1
-            a0, a1, a3 = a0 + W[0, 0] * h0 * h0, a1 + W[0, 0] * h0 * h1, a3 + W[0, 0] * h1 * h1
-            continue
-        flat = math.sqrt(flat2)
-        slant2 = flat2 + dz * dz
-        slant = math.sqrt(slant2)
-        v0 = scan.z[n, 0] - slant
-        v1 = scan.z[n, 1] - turn
-        v1 -= _TURN * round(v1 / _TURN)
-        # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
-        # taken if they help
-        slant = max(slant, _NEAREST)
-        flat = max(flat, 1e-5 * slant, _NEAREST)
-        r0, r1, r2 = dx / slant, dy / slant, dz / slant
-        t0, t1 = -dy / (flat * flat), dx / (flat * flat)
-        if code == 2:
-            w0, w1 = W[0, 0] * v0 + W[0, 1] * v1, W[0, 1] * v0 + W[1, 1] * v1
-            chi += v0 * w0 + v1 * w1
-            g0, g1, g2 = g0 + r0 * w0 + t0 * w1, g1 + r1 * w0 + t1 * w1, g2 + r2 * w0
-            p0, p1, p2 = W[0, 0] * r0 + W[0, 1] * t0, W[0, 0] * r1 + W[0, 1] * t1, W[0, 0] * r2
-            q0, q1, q2 = W[0, 1] * r0 + W[1, 1] * t0, W[0, 1] * r1 + W[1, 1] * t1, W[0, 1] * r2
-            a0, a1, a2 = a0 + r0 * p0 + t0 * q0, a1 + r0 * p1 + t0 * q1, a2 + r0 * p2 + t0 * q2
-            a3, a4, a5 = a3 + r1 * p1 + t1 * q1, a4 + r1 * p2 + t1 * q2, a5 + r2 * p2
-            continue
-        v2 = scan.z[n, 2] - math.atan2(dz, math.sqrt(flat2))
-        e0 = -dx * dz / (flat * slant * slant)
-        e1 = -dy * dz / (flat * slant * slant)
-        e2 = flat / (slant * slant)
-        w0 = W[0, 0] * v0 + W[0, 1] * v1 + W[0, 2] * v2
-        w1 = W[0, 1] * v0 + W[1, 1] * v1 + W[1, 2] * v2
-        w2 = W[0, 2] * v0 + W[1, 2] * v1 + W[2, 2] * v2
-        chi += v0 * w0 + v1 * w1 + v2 * w2
-        g0, g1 = g0 + r0 * w0 + t0 * w1 + e0 * w2, g1 + r1 * w0 + t1 * w1 + e1 * w2
-        g2 += r2 * w0 + e2 * w2
-        p0 = W[0, 0] * r0 + W[0, 1] * t0 + W[0, 2] * e0
-        p1 = W[0, 0] * r1 + W[0, 1] * t1 + W[0, 2] * e1
-        p2 = W[0, 0] * r2 + W[0, 2] * e2
-        q0 = W[0, 1] * r0 + W[1, 1] * t0 + W[1, 2] * e0
-        q1 = W[0, 1] * r1 + W[1, 1] * t1 + W[1, 2] * e1
-        q2 = W[0, 1] * r2 + W[1, 2] * e2
-        u0 = W[0, 2] * r0 + W[1, 2] * t0 + W[2, 2] * e0
-        u1 = W[0, 2] * r1 + W[1, 2] * t1 + W[2, 2] * e1
-        u2 = W[0, 2] * r2 + W[2, 2] * e2
-        a0 += r0 * p0 + t0 * q0 + e0 * u0
-        a1 += r0 * p1 + t0 * q1 + e0 * u1
-        a2 += r0 * p2 + t0 * q2 + e0 * u2
-        a3 += r1 * p1 + t1 * q1 + e1 * u1
-        a4 += r1 * p2 + t1 * q2 + e1 * u2
-        a5 += r2 * p2 + e2 * u2
-    return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
-
-
-@njit
-def _solve(A: Six, b0: float, b1: float, b2: float) -> tuple[bool, float, float, float]:
-    """Solve a positive definite system, scaled by its diagonal; False where it is not positive definite."""
-    if not (A[0] > 0.0 and A[3] > 0.0 and A[5] > 0.0):
-        return False, 0.0, 0.0, 0.0
-    p, q, r = 1.0 / math.sqrt(A[0]), 1.0 / math.sqrt(A[3]), 1.0 / math.sqrt(A[5])
-    c10, c20, c21 = A[1] * p * q, A[2] * p * r, A[4] * q * r
-    d1 = 1.0 - c10 * c10
-    if not d1 > 1e-15:
-        return False, 0.0, 0.0, 0.0
-    l11 = math.sqrt(d1)
-    l21 = (c21 - c20 * c10) / l11
-    d2 = 1.0 - c20 * c20 - l21 * l21
-    if not d2 > 1e-15:
-        return False, 0.0, 0.0, 0.0
-    l22 = math.sqrt(d2)
-    y0 = b0 * p
-    y1 = (b1 * q - c10 * y0) / l11
-    y2 = (b2 * r - c20 * y0 - l21 * y1) / l22
-    x2 = y2 / l22
-    x1 = (y1 - l21 * x2) / l11
-    x0 = y0 - c10 * x1 - c20 * x2
-    return True, x0 * p, x1 * q, x2 * r
-
-
-@njit
-def _inverse(A: Six) -> tuple[bool, float, float, float, float, float, float]:
-    """Inverse of a positive definite matrix."""
-    ok, c0, c1, c2 = _solve(A, 1.0, 0.0, 0.0)
-    ok1, _, c3, c4 = _solve(A, 0.0, 1.0, 0.0)
-    ok2, _, _, c5 = _solve(A, 0.0, 0.0, 1.0)
-    return ok and ok1 and ok2, c0, c1, c2, c3, c4, c5
 
 
 @njit
@@ -167,7 +46,7 @@ def _descend(
     x, y, z = at
     m0, m1, m2 = sensors.middle[0], sensors.middle[1], sensors.middle[2]
     damping = 0.0
-    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, x, y, z)
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = normal(sensors, scan, members, x, y, z)
     q0, q1, q2 = m0 - x, m1 - y, m2 - z
     w0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
     w1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -179,7 +58,7 @@ def _descend(
             (a0 + prior[0]) * f, a1 + prior[1], a2 + prior[2],
             (a3 + prior[3]) * f, a4 + prior[4], (a5 + prior[5]) * f,
         )  # fmt: skip
-        ok, s0, s1, s2 = _solve(A, g0 + w0, g1 + w1, g2 + w2)
+        ok, s0, s1, s2 = solve(A, g0 + w0, g1 + w1, g2 + w2)
         if not ok:
             if damping > 1e8:
                 break
@@ -188,7 +67,7 @@ def _descend(
         promise = s0 * (g0 + w0) + s1 * (g1 + w1) + s2 * (g2 + w2)
         if promise <= 1e-13 * goal + 1e-20:
             break
-        trial = _normal(sensors, scan, members, x + s0, y + s1, z + s2)
+        trial = normal(sensors, scan, members, x + s0, y + s1, z + s2)
         q0, q1, q2 = m0 - x - s0, m1 - y - s1, m2 - z - s2
         v0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
         v1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -225,7 +104,7 @@ def _start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) 
         b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
         b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
         last = n
-    ok, x, y, z = _solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
+    ok, x, y, z = solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
     if not ok:
         return scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
     return x, y, z
@@ -272,7 +151,7 @@ def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
         A[4] * h[1] * h[2],
         height,
     )
-    ok, c0, _, _, c3, _, c5 = _inverse(scaled)
+    ok, c0, _, _, c3, _, c5 = inverse(scaled)
     return ok and c0 + c3 + c5 <= 1.0 / _WEAK
 
 
@@ -324,7 +203,7 @@ def _settle(
     h = sensors.half
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / (h[2] * h[2]) if flat else 0.0)
     every = (1.0 / (h[0] * h[0]), 0.0, 0.0, 1.0 / (h[1] * h[1]), 0.0, 1.0 / (h[2] * h[2]))
-    _, _, _, _, a0, a1, a2, a3, a4, a5 = _normal(sensors, scan, members, at[0], at[1], at[2])
+    _, _, _, _, a0, a1, a2, a3, a4, a5 = normal(sensors, scan, members, at[0], at[1], at[2])
     pure = _determined(sensors, (a0, a1, a2, a3, a4, a5), flat)
     if pure:
         chi, x, y, z, A = _descend(sensors, scan, members, at, none)
@@ -340,9 +219,7 @@ def _settle(
 
 
 @njit
-def _locate(
-    sensors: SensorArrays, scan: ScanArrays, members: Array
-) -> tuple[float, float, float, float, Six, Six]:
+def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[float, float, float, float, Six, Six]:
     """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed."""
     # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
     full_ones = tall_ones = located_ones = 0
@@ -409,12 +286,12 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
             A[0] + prior[0], A[1] + prior[1], A[2] + prior[2],
             A[3] + prior[3], A[4] + prior[4], A[5] + prior[5],
         )  # fmt: skip
-        ok, c0, c1, c2, c3, c4, c5 = _inverse(B)
+        ok, c0, c1, c2, c3, c4, c5 = inverse(B)
         if not ok:
             # numerically singular: the region's width is all that can be said
             c0, c3, c5 = sensors.half[0] ** 2, sensors.half[1] ** 2, sensors.half[2] ** 2
             c1 = c2 = c4 = 0.0
-        elif not _solve((c0, c1, c2, c3, c4, c5), 0.0, 0.0, 0.0)[0]:
+        elif not solve((c0, c1, c2, c3, c4, c5), 0.0, 0.0, 0.0)[0]:
             # longer than thin by more digits than there are: rounding must not leave it indefinite
             least = 4e-15 * (c0 + c3 + c5)
             c0, c3, c5 = c0 + least, c3 + least, c5 + least

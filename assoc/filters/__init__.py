@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from assoc.filters.adaptive import Alarm, FuzzyAdaptiveEKF, paper_rules, tuned_data
+from assoc.filters.adaptive import Alarm, FuzzyAdaptiveEKF
 from assoc.filters.base import Expected, Filter, History, Update
 from assoc.filters.consistency import bounds, nees
 from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
+from assoc.filters.given_rules import paper_rules, tuned_data
 from assoc.filters.imm import InteractingMultipleModel, Mixture
 from assoc.filters.inference import FuzzyRules, FuzzyVariable
 from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
@@ -22,10 +23,11 @@ from assoc.filters.motion import (
 )
 from assoc.filters.smoother import FixedLagSmoother, Window
 from assoc.filters.state import Gaussian
-from assoc.filters.uav import UnmannedAircraft
+from assoc.filters.uav import Aerodynamics, UnmannedAircraft
 from assoc.filters.unscented import UnscentedKalmanFilter
 
 __all__ = [
+    "Aerodynamics",
     "Alarm",
     "ConstantAcceleration",
     "ConstantVelocity",

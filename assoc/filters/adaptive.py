@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from assoc.filters.base import Expected, Filter, Update
 from assoc.filters.inference import FuzzyRules, FuzzyVariable
 from assoc.filters.kalman import ExtendedKalmanFilter
 from assoc.filters.measurement import Measurement
-from assoc.filters.motion import Motion, positive
+from assoc.filters.motion import Motion
 from assoc.filters.state import Gaussian, gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -34,6 +32,8 @@ class Adaptive:
         Process noise of the last prediction, unscaled.
     innovations : (B, W, d)
         The last normalised innovations, newest last; d is 0 before the first measurement.
+    turns : (B, W)
+        The last corrections of the state's last component, each in units of its standard deviation.
     process_scale : (B, n)
         What the process noise of each component is multiplied with, q.
     """
@@ -43,6 +43,7 @@ class Adaptive:
     without_noise: Array
     process_noise: Array
     innovations: Array
+    turns: Array
     process_scale: Array
 
     def __len__(self) -> int:
@@ -57,6 +58,7 @@ class Adaptive:
             self.without_noise[rows],
             noise[rows] if len(noise) > 1 else noise,
             self.innovations[rows],
+            self.turns[rows],
             self.process_scale[rows],
         )
 
@@ -69,9 +71,12 @@ class Adaptive:
         return gaussian(self.mean, self.covariance)
 
 
+Watched = Literal["innovations", "turn", "turn rate"]
+
+
 @dataclass(frozen=True)
 class Alarm:
-    """A window of innovations, and what is inferred from them.
+    """Something that is watched over a window of measurements, and what is inferred from it.
 
     Parameters
     ----------
@@ -81,13 +86,24 @@ class Alarm:
         Infer q, one for each group of components.
     calm : FuzzyRules or None
         Infer the variance with which the last component of the state is believed to be 0.
+    watches : "innovations", "turn" or "turn rate"
+        The rules' input. "innovations": ``|sum of the last W innovations|^2`` / W in units of their standard
+        deviations, averaged over the components. "turn": the same of what the innovations say of the last
+        component of the state, a turn rate, K v / sqrt(K S K') with its row of the gain: along that direction
+        alone in which a turn moves the target. "turn rate": the square of the estimate itself in units
+        of its standard deviation, of one measurement (W = 1): in a steady turn there is nothing else to see.
     """
 
     window: int
     process: Sequence[FuzzyRules]
     calm: FuzzyRules | None = None
+    watches: Watched = "innovations"
 
     def __post_init__(self) -> None:
+        if self.watches not in get_args(Watched):
+            raise InvalidInputError(f"watches must be one of {', '.join(get_args(Watched))}, got {self.watches!r}")
+        if self.watches == "turn rate" and self.window != 1:
+            raise InvalidInputError(f"window must be 1 for a turn rate, got {self.window!r}")
         if isinstance(self.window, bool) or not isinstance(self.window, int) or self.window < 1:
             raise InvalidInputError(f"window must be a whole number of at least 1, got {self.window!r}")
 
@@ -124,7 +140,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         Infer the variance with which the last component of the state, a turn rate, is believed to be 0: it is
         corrected with a measurement of 0 of that variance, so that in straight flight one model forgets its turns.
     others : sequence of Alarm
-        More windows with rules of their own; of all that is inferred the largest counts. A short window sees
+        More windows, with rules of their own; of all that is inferred the largest counts. A short window sees
         a hard manoeuvre at once, a long one a gentle one at all.
 
     References
@@ -175,7 +191,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         data : mapping
             "inputs" (increasing centres), "outputs" (their log10 q, or a list of those for each group),
             "groups" if there are several, "components" if not all count, "window", "immediate"; "calm", log10
-            variances; "others", a list of more "window" and "inputs".
+            variances; "others", a list of more "window", "inputs" and what each "watches".
         """
         outputs = data["outputs"] if isinstance(data["outputs"][0], list) else [data["outputs"]]
         every = [data, *data.get("others", ())]
@@ -194,7 +210,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
                 for centres in (*outputs, *([data["calm"]] if "calm" in data else []))
             ]
             calm = rules.pop() if "calm" in data else None
-            alarms.append(Alarm(int(one["window"]), rules, calm))
+            alarms.append(Alarm(int(one["window"]), rules, calm, one.get("watches", "innovations")))
         return cls(
             motion,
             alarms[0].process,
@@ -213,7 +229,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         B = len(state)
         return Adaptive(
             state.mean, state.covariance, state.covariance, np.zeros((1, *state.covariance.shape[1:])),
-            np.zeros((B, self.window, 0)), np.ones((B, self.motion.dim)),
+            np.zeros((B, self.window, 0)), np.zeros((B, self.window)), np.ones((B, self.motion.dim)),
         )  # fmt: skip
 
     def predict(self, state: Adaptive, dt: float) -> Adaptive:
@@ -222,8 +238,9 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         moved = self._bare.predict(state.gaussian, dt)
         scaled = _scaled(state.process_scale, Q)
         return Adaptive(
-            moved.mean, moved.covariance + scaled, moved.covariance, Q, state.innovations, state.process_scale
-        )
+            moved.mean, moved.covariance + scaled, moved.covariance, Q, state.innovations, state.turns,
+            state.process_scale,
+        )  # fmt: skip
 
     def move(self, state: Adaptive, dt: float) -> tuple[Adaptive, Array]:
         """`predict`, and the covariance P F' of the states before and after it."""
@@ -241,7 +258,8 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             # the first measurement, or a sensor with other components: nothing to add it to
             past = np.zeros((len(fresh), self.window, o.dim))
         recent = np.concatenate([past[:, 1:], fresh[:, None]], axis=1)
-        level, q, calm = self._infer(recent)
+        turns = np.concatenate([state.turns[:, 1:], _turn(state, first.state)[:, None]], axis=1)
+        level, q, calm = self._infer(recent, turns, first.state)
         r = self._scale(self.measurement, level)
         prior = state.covariance
         if self.immediate:
@@ -252,23 +270,18 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         mean, covariance = done.state.mean, done.state.covariance
         if calm is not None:
             mean, covariance = _calmed(mean, covariance, calm)
-        corrected = Adaptive(mean, covariance, prior, state.process_noise, recent, q)
+        corrected = Adaptive(mean, covariance, prior, state.process_noise, recent, turns, q)
         return Update(corrected, done.innovation, done.covariance, done.nis, done.log_likelihood)
 
     def prior(self, predicted: Adaptive, corrected: Adaptive) -> tuple[Array, Array]:
         """Mean and covariance of the prediction as it was corrected, after the adaptation."""
         return predicted.mean, corrected.without_noise
 
-    def _infer(self, recent: Array) -> tuple[Array, Array, Array | None]:
+    def _infer(self, recent: Array, turns: Array, present: Gaussian) -> tuple[Array, Array, Array | None]:
         """Input of the first rules (B,), q (B, n), and the variance of a turn rate of 0, (B,)."""
         q = calm = first = None
         for alarm in self.alarms:
-            late = recent[:, -alarm.window :]
-            known = np.maximum((late != 0).any(axis=2).sum(axis=1), 1)
-            drift = late.sum(axis=1)
-            if self.components is not None:
-                drift = drift[:, self.components]
-            level = (drift**2).mean(axis=1) / known
+            level = self._level(alarm, recent, turns, present)
             one = np.ones((len(level), self.motion.dim))
             for group, rules in enumerate(alarm.process):
                 one[:, self.groups == group] = self._scale(rules, level)[:, None]
@@ -279,6 +292,22 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
                 calm = variance if calm is None else np.maximum(calm, variance)
         assert q is not None and first is not None
         return first, q, calm
+
+    def _level(self, alarm: Alarm, recent: Array, turns: Array, present: Gaussian) -> Array:
+        """Return what an alarm watches, (B,)."""
+        if alarm.watches == "turn rate":
+            rate: Array = present.mean[:, -1] ** 2 / present.covariance[:, -1, -1]
+            return rate
+        late = recent[:, -alarm.window :]
+        known = np.maximum((late != 0).any(axis=2).sum(axis=1), 1)
+        if alarm.watches == "turn":
+            turn: Array = turns[:, -alarm.window :].sum(axis=1) ** 2 / known
+            return turn
+        drift = late.sum(axis=1)
+        if self.components is not None:
+            drift = drift[:, self.components]
+        level: Array = (drift**2).mean(axis=1) / known
+        return level
 
     def _scale(self, rules: FuzzyRules | None, level: Array) -> Array:
         if rules is None:
@@ -301,10 +330,20 @@ def _scaled(q: Array, Q: Array) -> Array:
 def _calmed(mean: Array, P: Array, variance: Array) -> tuple[Array, Array]:
     """Correct with a measurement of 0 of the last component, (B,) variances; Joseph's form."""
     gain = P[:, :, -1] / (P[:, -1, -1] + variance)[:, None]
-    rest = np.broadcast_to(np.eye(mean.shape[1]), P.shape).copy()
-    rest[:, :, -1] -= gain
-    P = rest @ P @ rest.transpose(0, 2, 1) + variance[:, None, None] * gain[:, :, None] * gain[:, None, :]
+    # (I - K h') P (I - K h')' with h' the last unit vector: two steps of rank one
+    P = P - gain[:, :, None] * P[:, -1:, :]
+    P = P - P[:, :, -1:] * gain[:, None, :] + variance[:, None, None] * gain[:, :, None] * gain[:, None, :]
     return mean - gain * mean[:, -1:], 0.5 * (P + P.transpose(0, 2, 1))
+
+
+def _turn(before: Adaptive, after: Gaussian) -> Array:
+    """Correction of the last component in units of its standard deviation, (B,); 0 where nothing is said of it."""
+    # K S K' is what a correction takes from the variance
+    gained = before.covariance[:, -1, -1] - after.covariance[:, -1, -1]
+    told = gained > 1e-12 * before.covariance[:, -1, -1]
+    change = after.mean[:, -1] - before.mean[:, -1]
+    turn: Array = np.where(told, change / np.sqrt(np.where(told, gained, 1.0)), 0.0)
+    return turn
 
 
 class _NoiseFree(Motion):
@@ -326,38 +365,3 @@ class _NoiseFree(Motion):
 
     def noise(self, states: Array, dt: float) -> Array:
         return self._zero
-
-
-PAPER_SETS: dict[str, Mapping[str, tuple[float, float, float, float]]] = {
-    "input": {
-        "near zero": (0.0, 0.0, 0.1, 0.6),
-        "small": (0.1, 1.0, 1.0, 2.0),
-        "medium": (1.0, 2.0, 2.0, 4.0),
-        "large": (2.0, 4.0, 6.0, 6.0),
-    },
-    "output": {
-        "near zero": (0.0, 0.0, 0.2, 0.6),
-        "near 1": (0.2, 1.0, 1.0, 1.5),
-        "little larger than 1": (1.0, 1.5, 1.5, 3.0),
-        "large": (2.0, 4.0, 6.0, 6.0),
-    },
-}
-"""Membership functions under the paper's names; it shows no numbers, these are chosen."""
-
-
-def paper_rules() -> FuzzyRules:
-    """Return the paper's four rules, the same for q and r, with the chosen `PAPER_SETS`."""
-    input_sets, output_sets = FuzzyVariable(PAPER_SETS["input"]), FuzzyVariable(PAPER_SETS["output"])
-    return FuzzyRules(input_sets, output_sets, list(zip(input_sets.sets, output_sets.sets, strict=True)), points=201)
-
-
-def tuned_data() -> dict[str, Any]:
-    """Return the tuned parameters that come with the package, for `FuzzyAdaptiveEKF.from_data`.
-
-    They were tuned by experiments/filters/tune_fuzzy.py for a coordinated turn with `acceleration_noise` and
-    `rate_noise`.
-    """
-    text = files("assoc.filters").joinpath("fuzzy_parameters.json").read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
-    positive(data["acceleration_noise"], "acceleration_noise")
-    return data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,23 +18,29 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @njit
-def infer(x: Array, sets: Array, universe: Array, outputs: Array, rules: Array, out: Array) -> None:
+def infer(
+    x: Array, low: float, high: float, sets: Array, universe: Array, outputs: Array, rules: Array, out: Array
+) -> int:
     """Mamdani inference, minimum and maximum, with the centroid; inputs (B,), crisp outputs (B,).
 
     sets (I, 4) are the trapezoids of the input, outputs (O, U) the output sets over the universe (U,),
     rules (K, 2) pairs of an input and an output set. Between points of the universe the combined set is
-    taken as a straight line.
+    taken as a straight line. Inputs below `low` or above `high` are taken there. Returns the number of the first
+    input that is not finite or of which no rule speaks, or -1.
     """
     degree = np.empty(len(outputs))
     for b in range(len(x)):
+        if not math.isfinite(x[b]):
+            return b
+        at = min(max(x[b], low), high)
         degree[:] = 0.0
         for k in range(len(rules)):
             a = sets[rules[k, 0]]
             value = 1.0
-            if x[b] < a[1]:
-                value = (x[b] - a[0]) / (a[1] - a[0]) if x[b] > a[0] else 0.0
-            elif x[b] > a[2]:
-                value = (a[3] - x[b]) / (a[3] - a[2]) if x[b] < a[3] else 0.0
+            if at < a[1]:
+                value = (at - a[0]) / (a[1] - a[0]) if at > a[0] else 0.0
+            elif at > a[2]:
+                value = (a[3] - at) / (a[3] - a[2]) if at < a[3] else 0.0
             degree[rules[k, 1]] = max(degree[rules[k, 1]], value)
         area = moment = 0.0
         y0 = 0.0
@@ -48,7 +55,10 @@ def infer(x: Array, sets: Array, universe: Array, outputs: Array, rules: Array, 
                 # the moment of a trapezoid about its left end
                 moment += piece * universe[u - 1] + width * width * (y0 + 2.0 * y1) / 6.0
             y0 = y1
-        out[b] = moment / area if area > 0.0 else np.nan
+        if not area > 0.0:
+            return b
+        out[b] = moment / area
+    return -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +162,12 @@ class FuzzyRules:
         rules = np.array([[ins.index(i), outs.index(o)] for i, o in self.rules], dtype=np.int64)
         return memberships, rules
 
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        """Where inputs beyond the outermost sets are taken."""
+        corners = self.input.corners
+        return float(corners[:, 1].min()), float(corners[:, 2].max())
+
     @property
     def memberships(self) -> Array:
         """Output sets over the grid, (O, U)."""
@@ -167,12 +183,13 @@ class FuzzyRules:
         InvalidInputError
             An input that is not finite, or one that no rule speaks of.
         """
-        x = finite(inputs, "inputs", 1)
-        corners = self.input.corners
-        x = np.clip(x, corners[:, 1].min(), corners[:, 2].max())
+        x = inputs
+        if type(x) is not np.ndarray or x.dtype != np.float64 or x.ndim != 1 or not x.flags.c_contiguous:
+            x = finite(inputs, "inputs", 1)
         out = np.empty(len(x))
         memberships, rules = self._tables
-        infer(x, corners, self.universe, memberships, rules, out)
-        if np.isnan(out).any():
-            raise InvalidInputError(f"inputs: no rule speaks of {x[np.isnan(out)][0]:g}")
+        bad = infer(x, *self._ends, self.input.corners, self.universe, memberships, rules, out)
+        if bad >= 0:
+            finite(x, "inputs", 1)
+            raise InvalidInputError(f"inputs: no rule speaks of {np.clip(x[bad], *self._ends):g}")
         return out

@@ -15,8 +15,11 @@ import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.filters.state import finite
+from assoc.filters.turn_kernels import turn
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+_NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
 
 
 def positive(value: object, what: str, *, zero: bool = False) -> float:
@@ -213,56 +216,30 @@ class CoordinatedTurn(Motion):
         self.dim, self.position = 7, (0, 1, 2)
         self.sigma = positive(noise, "noise", zero=True)
         self.rate_sigma = positive(rate_noise, "rate_noise", zero=True)
-
-    @staticmethod
-    def _terms(w: Array, dt: float) -> tuple[Array, Array, Array, Array]:
-        """sin(w t)/w, (1 - cos(w t))/w and their derivatives by w, smooth through w = 0."""
-        a = w * dt
-        small = np.abs(a) < 1e-3
-        safe = np.where(small, 1.0, w)
-        s, c = np.sin(a), np.cos(a)
-        sine = np.where(small, dt * (1 - a**2 / 6), s / safe)
-        versine = np.where(small, dt * (a / 2 - a**3 / 24), (1 - c) / safe)
-        d_sine = np.where(small, dt**2 * (-a / 3 + a**3 / 30), (a * c - s) / safe**2)
-        d_versine = np.where(small, dt**2 * (0.5 - a**2 / 8), (a * s - 1 + c) / safe**2)
-        return sine, versine, d_sine, d_versine
+        self._noise: tuple[float, Array] | None = None
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, 7) on by dt seconds, without noise."""
-        vx, vy, w = states[:, 3], states[:, 4], states[:, 6]
-        sine, versine, _, _ = self._terms(w, dt)
-        c, s = np.cos(w * dt), np.sin(w * dt)
-        moved = states.copy()
-        moved[:, 0] += sine * vx - versine * vy
-        moved[:, 1] += versine * vx + sine * vy
-        moved[:, 2] += dt * states[:, 5]
-        moved[:, 3] = c * vx - s * vy
-        moved[:, 4] = s * vx + c * vy
+        states = np.ascontiguousarray(states, dtype=np.float64)
+        moved = np.empty(states.shape)
+        turn(states, float(dt), moved, _NO_SLOPES)
         return moved
 
     def jacobian(self, states: Array, dt: float) -> Array:
         """Derivatives of `propagate` at states (m, 7): (m, 7, 7)."""
-        vx, vy, w = states[:, 3], states[:, 4], states[:, 6]
-        sine, versine, d_sine, d_versine = self._terms(w, dt)
-        c, s = np.cos(w * dt), np.sin(w * dt)
-        F = np.zeros((len(states), 7, 7))
-        F[:] = np.eye(7)
-        F[:, 0, 3], F[:, 0, 4] = sine, -versine
-        F[:, 1, 3], F[:, 1, 4] = versine, sine
-        F[:, 2, 5] = dt
-        F[:, 3, 3], F[:, 3, 4], F[:, 4, 3], F[:, 4, 4] = c, -s, s, c
-        F[:, 0, 6] = d_sine * vx - d_versine * vy
-        F[:, 1, 6] = d_versine * vx + d_sine * vy
-        F[:, 3, 6] = -dt * (s * vx + c * vy)
-        F[:, 4, 6] = dt * (c * vx - s * vy)
+        states = np.ascontiguousarray(states, dtype=np.float64)
+        F = np.empty((len(states), 7, 7))
+        turn(states, float(dt), _NO_STATES, F)
         return F
 
     def noise(self, states: Array, dt: float) -> Array:
-        """Process noise covariance, (1, 7, 7)."""
-        Q = np.zeros((1, 7, 7))
-        Q[0, :6, :6] = np.kron(polynomial_noise(1, dt, self.sigma, "discrete"), np.eye(3))
-        Q[0, 6, 6] = self.rate_sigma**2
-        return Q
+        """Process noise covariance, (1, 7, 7); that of the last time step is remembered."""
+        if self._noise is None or self._noise[0] != dt:
+            Q = np.zeros((1, 7, 7))
+            Q[0, :6, :6] = np.kron(polynomial_noise(1, dt, self.sigma, "discrete"), np.eye(3))
+            Q[0, 6, 6] = self.rate_sigma**2
+            self._noise = (dt, Q)
+        return self._noise[1]
 
 
 class Padded(LinearMotion):

@@ -40,6 +40,23 @@ def observe_point(x: Array, code: int, d: int, place: Array, columns: Array, mat
 
 
 @njit
+def observe_from_first(
+    s: int, x: Array, code: int, d: int, place: Array, columns: Array, matrix: Array, first: Array, h: Array
+) -> None:
+    """Write the measurement of point number s into h[s] as the difference from the first, so that angles do not jump.
+
+    That of the first point is kept in `first`.
+    """
+    observe_point(x, code, d, place, columns, matrix, h[s])
+    if s == 0:
+        for a in range(d):
+            first[a] = h[0, a]
+    for a in range(d):
+        h[s, a] -= first[a]
+    wrap(code, h[s])
+
+
+@njit
 def sigma_points(mean: Array, P: Array, scale: float, points: Array) -> int:
     """Write the 2 n + 1 points of each Gaussian, mean and mean +- scale times a column of the factor."""
     B, n = mean.shape
@@ -127,14 +144,7 @@ def unscented(
                 sign = scale if s <= n else -scale
                 for i in range(k, n):
                     x[i] += sign * L[i, k]
-            observe_point(x, code, d, place, columns, matrix, h[s])
-            if s == 0:
-                for a in range(d):
-                    first[a] = h[0, a]
-            # differences from the first point, so that angles do not jump
-            for a in range(d):
-                h[s, a] -= first[a]
-            wrap(code, h[s])
+            observe_from_first(s, x, code, d, place, columns, matrix, first, h)
         for a in range(d):
             total = 0.0
             for s in range(m):
@@ -248,13 +258,7 @@ def ensemble_update(
                 for a in range(d):
                     h[s, a] = given[b, s, a]
             else:
-                observe_point(members[b, s], code, d, place, columns, matrix, h[s])
-                if s == 0:
-                    for a in range(d):
-                        first[a] = h[0, a]
-                for a in range(d):
-                    h[s, a] -= first[a]
-                wrap(code, h[s])
+                observe_from_first(s, members[b, s], code, d, place, columns, matrix, first, h)
             for a in range(d):
                 mu[a] += h[s, a] / N
             for i in range(n):

@@ -8,15 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc.filters import (
-    ConstantVelocity,
-    CoordinatedTurn,
-    ExtendedKalmanFilter,
-    FixedLagSmoother,
-    Gaussian,
-    InteractingMultipleModel,
-    Padded,
-)
+from assoc.filters import FixedLagSmoother, Gaussian
 from assoc.filters.base import Filter
 from assoc.sensors import Radar3D
 from experiments.filters.b1 import converted
@@ -167,13 +159,3 @@ def smoothed_errors(filter_: Filter[Any], batch: Batch, lag: int) -> Array:
             if first + i >= 2:
                 result.append(((state.mean[:, :3] - batch.truth[first + i]) ** 2).sum(axis=1))
     return np.array(result)
-
-
-def imm(data: dict[str, float]) -> InteractingMultipleModel:
-    """Constant velocity and coordinated turn, with tuned parameters."""
-    straight = Padded(ConstantVelocity(data["straight_noise"]), data["rate_spread"])
-    turn = CoordinatedTurn(data["turn_noise"], data["rate_noise"])
-    a, b = data["stay_straight"], data["stay_turning"]
-    return InteractingMultipleModel(
-        [ExtendedKalmanFilter(straight), ExtendedKalmanFilter(turn)], np.array([[a, 1 - a], [1 - b, b]])
-    )
