@@ -83,10 +83,12 @@ class AssignmentProblem:
             raise InvalidInputError(f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}")
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
-        _check_indices(tuples_, sizes_, dummy)
-        costs_, tuples_ = _check_costs(costs_, tuples_)
+        alone = _check_indices(tuples_, sizes_, dummy)
+        if not _finite(costs_):
+            keep = _allowed(costs_)
+            costs_, tuples_, alone = costs_[keep], tuples_[keep], alone[keep]
         if dummy:
-            tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_)
+            tuples_, costs_ = _with_singletons(tuples_, costs_, sizes_, alone)
         self.tuples = _frozen(tuples_, np.int32)
         self.costs = _frozen(costs_, np.float64)
         self.sizes = _frozen(sizes_, np.int32)
@@ -261,58 +263,56 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return array.astype(np.float64, copy=False)
 
 
-def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> None:
+def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> NDArray[np.bool_]:
+    """Refuse indices out of range and the all-dummy tuple; returns which tuples are singletons."""
     if tuples.shape[0] == 0:
-        return
+        return np.zeros(0, dtype=np.bool_)
     # sensor by sensor in memory: numpy is slow along the short axis of a long array
     columns = np.ascontiguousarray(tuples.T)
     low, high = columns.min(axis=1), columns.max(axis=1)
     least = 0 if dummy else 1
-    for sensor in np.flatnonzero((low < least) | (high > sizes)):
-        column = tuples[:, sensor]
+    wrong = (low < least) | (high > sizes)
+    if wrong.any():
+        sensor = int(np.argmax(wrong))
+        column = columns[sensor]
         row = int(np.flatnonzero((column < least) | (column > sizes[sensor]))[0])
         raise InvalidInputError(
             f"tuples: row {row}, sensor {sensor + 1}: index {column[row]} is outside {least}..{sizes[sensor]}"
         )
-    if dummy and low.max() == 0:
-        used = np.bitwise_or.reduce(columns, axis=0)
-        if not used.all():
-            empty = used == 0
-            raise InvalidInputError(f"tuples: row {int(np.argmax(empty))} is the all-dummy tuple")
+    found = (columns != 0).sum(axis=0, dtype=np.int16)
+    if dummy and not found.all():
+        raise InvalidInputError(f"tuples: row {int(np.argmin(found))} is the all-dummy tuple")
+    alone: NDArray[np.bool_] = found == 1
+    return alone
 
 
-def _check_costs(
-    costs: NDArray[np.float64], tuples: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _finite(costs: NDArray[np.float64]) -> bool:
+    """Whether all costs are numbers and their sums stay in range."""
     with np.errstate(over="ignore"):
-        total = float(np.abs(costs).sum()) if costs.size else 0.0
-    if total <= _MAX_TOTAL_COST:
-        return costs, tuples
+        return not costs.size or float(np.abs(costs).sum()) <= _MAX_TOTAL_COST
+
+
+def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which tuples are not forbidden (inf); refuses what is no cost at all."""
     bad = np.isnan(costs) | np.isneginf(costs)
     if bad.any():
         row = int(np.argmax(bad))
         raise InvalidInputError(f"costs: row {row} is {costs[row]}; expected a number, or inf for a forbidden tuple")
-    keep = ~np.isposinf(costs)
-    costs, tuples = costs[keep], tuples[keep]
-    with np.errstate(over="ignore"):
-        total = float(np.abs(costs).sum())
-    if not total <= _MAX_TOTAL_COST:
+    keep: NDArray[np.bool_] = ~np.isposinf(costs)
+    if not _finite(costs[keep]):
         raise InvalidInputError(f"costs: the sum of magnitudes exceeds {_MAX_TOTAL_COST:.0e}; rescale the costs")
-    return costs, tuples
+    return keep
 
 
 def _with_singletons(
-    tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64]
+    tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64], alone: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Append the singletons that are not listed, at cost 0."""
-    total = int(sizes.sum())
+    """Append the singletons that are not listed, at cost 0; ``alone`` says which tuples are singletons."""
     offsets = np.cumsum(sizes) - sizes
-    present = np.zeros(total, dtype=bool)
-    singles = np.flatnonzero((np.ascontiguousarray(tuples.T) != 0).sum(axis=0, dtype=np.int16) == 1)
-    if singles.size:
-        listed = tuples[singles]
-        sensor = np.argmax(listed != 0, axis=1)
-        present[offsets[sensor] + listed[np.arange(singles.size), sensor] - 1] = True
+    present = np.zeros(int(sizes.sum()), dtype=np.bool_)
+    listed = tuples[alone]
+    # one index of each is not 0: the sum is the measurement, the place its sensor
+    present[offsets[np.argmax(listed != 0, axis=1)] + listed.sum(axis=1) - 1] = True
     missing = np.flatnonzero(~present)
     if missing.size == 0:
         return tuples, costs

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from dataclasses import fields
+from itertools import accumulate, pairwise
 from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._compiled import njit
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
@@ -63,7 +66,7 @@ def assign(
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
-    run = Run(_generator(seed), time_limit=_limit(time_limit), callback=callback, started=started)
+    run = Run(_seed(seed), time_limit=_limit(time_limit), callback=callback, started=started)
     prepared = prepare(problem)
     run.offset = prepared.offset
     outcome = solve(prepared.packing, chosen, run)
@@ -75,15 +78,19 @@ def _certify(
 ) -> Solution:
     packing = prepared.packing
     columns = np.asarray(outcome.columns, dtype=np.int64)
-    indices = _indices(problem, prepared, columns)
-    tuples = problem.tuples[indices]
+    exact, indices, tuples, costs, magnitude = _complete(
+        problem.tuples, problem.costs, problem.sizes, packing.cols, packing.weights, packing.slack, packing.origin,
+        packing.row_origin, prepared.single, columns,
+    )  # fmt: skip
+    if not exact:
+        raise InfeasibleError("the solver's answer does not use every measurement exactly once")
     bound, duals = outcome.lower_bound, outcome.duals
     if bound == -np.inf:
         duals = dual_bound(packing, run=run)
         bound = certified_bound(packing, duals)
     # packing weights are differences of costs: what they lose to rounding is taken off the bound
-    rounding = 4.0 * np.finfo(float).eps * (np.abs(packing.weights[columns]).sum() + np.abs(prepared.single_cost).sum())
-    cost = math.fsum(problem.costs[indices])
+    rounding = 4.0 * sys.float_info.epsilon * (magnitude + float(np.abs(prepared.single_cost).sum()))
+    cost = math.fsum(costs)
     return Solution(
         tuples=tuples,
         indices=indices,
@@ -99,38 +106,82 @@ def _certify(
     )
 
 
-def _indices(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.int64]) -> NDArray[np.intp]:
-    """Rows of ``problem.tuples`` of a choice of columns, completed by singletons and checked."""
-    packing = prepared.packing
-    rows = packing.cols[columns]
-    covered = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
-    if covered.size and (covered.max() > 1 or (covered[~packing.slack] != 1).any()):
-        raise InfeasibleError("the solver's answer does not use every measurement exactly once")
-    indices = packing.origin[columns].astype(np.intp)
-    if problem.dummy:
-        alone = np.ones(prepared.single.size, dtype=bool)
-        alone[packing.row_origin[covered > 0]] = False
-        indices = np.concatenate([indices, prepared.single[alone]])
-    chosen = problem.tuples[indices]
-    return indices[np.lexsort(chosen.T[::-1])]
+@njit
+def _complete(
+    tuples: Any, costs: Any, sizes: Any, cols: Any, weights: Any, slack: Any, origin: Any, row_origin: Any, single: Any,
+    columns: Any,
+) -> Any:  # fmt: skip
+    """A choice of columns as rows of ``problem.tuples`` in lexicographic order, completed by singletons.
+
+    Returns whether each measurement is used exactly once (each that must be, without dummies), the indices, their
+    tuples and costs, and the sum of the chosen weights' magnitudes.
+    """
+    num_sensors = sizes.size
+    start = np.zeros(num_sensors + 1, np.int64)
+    for s in range(num_sensors):
+        start[s + 1] = start[s] + sizes[s]
+    # no two tuples share a measurement: each is found by its first one
+    found = np.full(start[num_sensors], -1, np.int64)
+    covered = np.zeros(slack.size, np.bool_)
+    exact = True
+    count = columns.size
+    magnitude = 0.0
+    for k in range(columns.size):
+        j = columns[k]
+        if j < 0 or j >= weights.size:
+            exact = False
+            continue
+        magnitude += abs(weights[j])
+        for s in range(num_sensors):
+            r = cols[j, s]
+            if r >= 0:
+                exact = exact and not covered[r]
+                covered[r] = True
+        for s in range(num_sensors):
+            i = tuples[origin[j], s]
+            if i > 0:
+                found[start[s] + i - 1] = origin[j]
+                break
+    if single.size > 0:
+        taken = np.zeros(single.size, np.bool_)
+        for r in range(slack.size):
+            taken[row_origin[r]] = covered[r]
+        for r in range(single.size):
+            if not taken[r]:
+                found[r] = single[r]
+                count += 1
+    for r in range(slack.size):
+        exact = exact and (slack[r] or covered[r])
+    indices = np.empty(count, np.int64)
+    chosen = np.empty((count, num_sensors), tuples.dtype)
+    prices = np.empty(count)
+    count = 0
+    # those that the first sensors missed come first
+    for s in range(num_sensors - 1, -1, -1):
+        for r in range(start[s], start[s + 1]):
+            if found[r] >= 0 and exact:
+                indices[count] = found[r]
+                chosen[count] = tuples[found[r]]
+                prices[count] = costs[found[r]]
+                count += 1
+    return exact, indices, chosen, prices, magnitude
 
 
 def _duals_by_sensor(
     problem: AssignmentProblem, prepared: Prepared, duals: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
     """Multipliers of the problem's measurements: those of the packing plus the singletons' costs."""
-    total = prepared.single_cost.copy() if problem.dummy else np.zeros(int(problem.sizes.sum()))
+    ends = list(accumulate(problem.sizes.tolist(), initial=0))
+    total = prepared.single_cost.copy() if problem.dummy else np.zeros(ends[-1])
     total[prepared.packing.row_origin] += duals
-    return tuple(np.split(total, np.cumsum(problem.sizes)[:-1]))
+    return tuple(total[first:last] for first, last in pairwise(ends))
 
 
-def _generator(seed: object) -> np.random.Generator:
-    if isinstance(seed, np.random.Generator):
+def _seed(seed: object) -> int | np.random.SeedSequence | np.random.Generator:
+    if isinstance(seed, (np.random.Generator, np.random.SeedSequence)):
         return seed
-    if isinstance(seed, np.random.SeedSequence):
-        return np.random.default_rng(seed)
     if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0:
-        return np.random.default_rng(int(seed))
+        return int(seed)
     raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
 
 

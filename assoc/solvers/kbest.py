@@ -92,7 +92,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     k = checked_k(k)
-    run = Run(np.random.default_rng(0), time_limit=_limit(time_limit), started=started)
+    run = Run(0, time_limit=_limit(time_limit), started=started)
     if problem.num_sensors == 2:
         columns, found = rank_planar(problem, k, run)
     else:

@@ -102,7 +102,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     the least of several.
     """
     checked_k(k)
-    run = Run(np.random.default_rng(0), time_limit=_limit(time_limit))
+    run = Run(0, time_limit=_limit(time_limit))
     tuples, place = _distinct(problem.tuples)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0
@@ -144,7 +144,7 @@ def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, N
 
 def _of_cluster(problem: AssignmentProblem, k: int, time_limit: float | None) -> tuple[Floats, float, int]:
     """Each tuple's share in the weight of the k best, the share of the unseen rest, and how many are listed."""
-    run = Run(np.random.default_rng(0), time_limit=time_limit)
+    run = Run(0, time_limit=time_limit)
     # one more than is listed: its cost bounds all that are not
     ranking = rank(problem, k + 1, time_limit)
     solutions = ranking.solutions[:k]

@@ -9,7 +9,8 @@ smallest dimension have no slack.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -131,20 +132,17 @@ def prepare(problem: AssignmentProblem) -> Prepared:
         return problem._prepared
     sizes = problem.sizes.astype(np.int64)
     offsets = np.cumsum(sizes) - sizes
-    total = int(sizes.sum())
     if problem.dummy:
-        rows, weights, origin, single, single_cost = _columns_with_dummies(
-            problem.tuples, problem.costs, offsets, total
+        *arrays, whole, single, single_cost = _prepare_with_dummies(
+            problem.tuples, problem.costs, offsets, int(sizes.sum())
         )
-        slack = np.ones(total, dtype=np.bool_)
     else:
         rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
-        weights = problem.costs
-        origin = np.arange(problem.num_tuples, dtype=np.int32)
-        single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
         slack = np.repeat(sizes > sizes.min(), sizes)
-    whole = weights.size and float(np.abs(weights).max()) < 1e9 and bool((weights == np.rint(weights)).all())
-    packing = assemble(rows, weights, slack, origin, 1.0 if whole else 0.0)
+        arrays = _assemble(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
+        whole = _whole_numbers(problem.costs)
+        single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
+    packing = Packing(*arrays, granularity=1.0 if whole else 0.0)
     prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
     problem._prepared = prepared
     return prepared
@@ -159,7 +157,33 @@ def assemble(
 ) -> Packing:
     """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
     arrays: Any = _assemble(rows, weights, slack, origin)
-    return replace(Packing(*arrays), granularity=granularity)
+    return Packing(*arrays, granularity=granularity)
+
+
+@njit
+def _prepare_with_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+) -> Any:
+    """Arrays of the packing, whether its weights are whole numbers, and the singletons."""
+    rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
+    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = _assemble(
+        rows, weights, np.ones(total, np.bool_), origin
+    )
+    return (
+        cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin,
+        _whole_numbers(weights), single, single_cost,
+    )  # fmt: skip
+
+
+@njit
+def _whole_numbers(weights: NDArray[np.float64]) -> bool:
+    """Whether all weights are whole numbers, small enough for sums of them to be exact."""
+    if weights.size == 0:
+        return False
+    for j in range(weights.size):
+        if not (abs(weights[j]) < 1e9 and weights[j] == math.floor(weights[j])):
+            return False
+    return True
 
 
 @njit

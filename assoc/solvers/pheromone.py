@@ -72,7 +72,7 @@ def pheromone_history(problem: AssignmentProblem, *, seed: int = 0, **parameters
     def keep(cycle: int, state: NDArray[np.float64]) -> None:
         kept.append((cycle, state))
 
-    run = Run(np.random.default_rng(seed), offset=prepared.offset, watch=keep)
+    run = Run(seed, offset=prepared.offset, watch=keep)
     outcome = solve_as_in_the_paper(packing, chosen, run)
     rows, costs = nodes_of(packing)
     best = np.zeros(len(rows), dtype=np.bool_)

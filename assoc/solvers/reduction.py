@@ -81,7 +81,7 @@ class Reduction:
         self.closed_columns.append(columns[: counts[1]])
         self.closed_bound = math.fsum(closed[: counts[2], 0])
         self.closed_weight = math.fsum(closed[: counts[2], 1])
-        return self._open_parts(*state)
+        return self._open_parts(*state) if state[2].size else []
 
     def _open_parts(
         self, cols: Any, weights: Any, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,

@@ -76,7 +76,7 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         Unknown solver or parameter (the near names are listed), or a value out of range.
     """
     kind = parameters(name)
-    known = [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    known = [f.name for f in fields(kind)] if values else []  # type: ignore[arg-type]
     for key in values:
         if key not in known:
             raise InvalidInputError(f"{key}: no parameter of solver {name!r}; {_near(key, known)}")

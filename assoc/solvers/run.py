@@ -25,8 +25,8 @@ class Run:
 
     Attributes
     ----------
-    rng : numpy.random.Generator
-        The only source of randomness.
+    seed : int, SeedSequence or Generator
+        Where ``rng`` comes from.
     offset : float
         Added to packing weights gives costs of the problem (the cost of all singletons).
     time_limit : float or None
@@ -37,7 +37,7 @@ class Run:
         Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
     """
 
-    rng: np.random.Generator
+    seed: int | np.random.SeedSequence | np.random.Generator
     offset: float = 0.0
     time_limit: float | None = None
     callback: Callback | None = None
@@ -45,6 +45,14 @@ class Run:
     started: float = field(default_factory=time.perf_counter)
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""
+    _rng: np.random.Generator | None = None
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """The only source of randomness; made when a solver first needs it, which on easy problems is never."""
+        if self._rng is None:
+            self._rng = np.random.default_rng(self.seed)
+        return self._rng
 
     def elapsed(self) -> float:
         """Seconds since the start."""
