@@ -44,14 +44,13 @@ class Cover:
     def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
         """Return the cover of columns that share no row."""
         cover = cls.empty(packing)
-        rows = packing.cols[columns]
-        used = rows >= 0
-        cover.owner[rows[used]] = np.repeat(columns, used.sum(axis=1))
+        _own(packing.cols, columns, cover.owner)
         return cover
 
     def columns(self) -> NDArray[np.int32]:
         """Return the chosen columns, ascending."""
-        return np.unique(self.owner[self.owner >= 0])
+        columns: NDArray[np.int32] = chosen_columns(self.packing.cols, self.owner)
+        return columns
 
     @property
     def weight(self) -> float:
@@ -95,6 +94,32 @@ class Cover:
             return False
         self.owner[:] = Cover.of(self.packing, columns).owner
         return True
+
+
+@njit
+def _own(cols: Any, columns: Any, owner: Any) -> None:
+    for j in columns:
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                owner[cols[j, s]] = j
+
+
+@njit
+def chosen_columns(cols: Any, owner: Any) -> Any:
+    """The chosen columns, ascending, in the type of ``owner``."""
+    chosen = np.zeros(cols.shape[0], np.bool_)
+    count = 0
+    for j in owner:
+        if j >= 0 and not chosen[j]:
+            chosen[j] = True
+            count += 1
+    result = np.empty(count, owner.dtype)
+    count = 0
+    for j in range(chosen.size):
+        if chosen[j]:
+            result[count] = j
+            count += 1
+    return result
 
 
 def penalised(packing: Packing) -> Floats:

@@ -25,7 +25,7 @@ from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.cluster_steps import ClusterSteps
 from assoc.solvers.feasibility import infeasible
 from assoc.solvers.linear_program import linear_program_duals
-from assoc.solvers.local_search import Cover
+from assoc.solvers.local_search import Cover, chosen_columns
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
 
@@ -152,7 +152,7 @@ class Part:
 
 def weight_of(part: Part, owner: Owner) -> float:
     """Weight of a cover of the part."""
-    return float(part.packing.weights[np.unique(owner[owner >= 0])].sum())
+    return float(part.packing.weights[chosen_columns(part.packing.cols, owner)].sum())
 
 
 def incomplete(part: Part, owner: Owner) -> bool:
@@ -291,8 +291,7 @@ def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
     if part.best is None:
         return None
     keep = part.reduced <= part.weight - part.bound - (part.tolerance if part.packing.granularity else 0.0)
-    chosen = np.unique(part.best[part.best >= 0])
-    keep[chosen] = True
+    keep[chosen_columns(part.packing.cols, part.best)] = True
     if np.count_nonzero(keep) > share * keep.size:
         return None
     smaller = part.packing.restrict(keep)
@@ -314,7 +313,7 @@ def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
 
 def _columns(part: Part) -> NDArray[np.int64]:
     assert part.best is not None
-    return np.unique(part.best[part.best >= 0]).astype(np.int64)
+    return np.asarray(chosen_columns(part.packing.cols, part.best), dtype=np.int64)
 
 
 def complete(part: Part, run: Run) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc.solvers.bounds import dual_bound
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.breeding import Breeding
 from assoc.solvers.feasibility import infeasible
 from assoc.solvers.genetic import GeneticParameters
+from assoc.solvers.local_search import Cover, chosen_columns
 from assoc.solvers.metaheuristic import Part, complete, split_part
 from assoc.solvers.packing import Packing
 from assoc.solvers.reduction import Reduction
@@ -50,7 +50,7 @@ class _Task:
         if search is None or search.columns is None or search.weight >= part.weight:
             return False
         part.weight = search.weight
-        part.best = _owner(part.packing, search.columns)
+        part.best = Cover.of(part.packing, search.columns).owner
         return True
 
 
@@ -107,7 +107,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 raise infeasible(part.packing)
             complete(part, run)
         assert part.best is not None
-        columns.append(part.origin[np.unique(part.best[part.best >= 0])])
+        columns.append(part.origin[chosen_columns(part.packing.cols, part.best)])
         weight += part.weight
         bound += task.bound
     if nodes >= node_limit and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
@@ -187,14 +187,6 @@ def _search_better(task: _Task, run: Run) -> bool:
     part.refine(run, TabuParameters.clusters)
     part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
     return part.stalled == 0
-
-
-def _owner(packing: Packing, columns: NDArray[np.int32]) -> NDArray[np.int32]:
-    owner = np.full(packing.num_rows, -1, dtype=np.int32)
-    rows = packing.cols[columns]
-    used = rows >= 0
-    owner[rows[used]] = np.repeat(columns, used.sum(axis=1))
-    return owner
 
 
 def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:

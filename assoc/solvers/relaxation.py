@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.assignment2d import match_sparse
+from assoc.solvers.local_search import chosen_columns
 from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
@@ -27,21 +28,7 @@ class Relaxation:
 
     def __init__(self, packing: Packing) -> None:
         self.packing = packing
-        num_sensors = packing.cols.shape[1]
-        sensor = np.zeros(packing.num_rows, dtype=np.int64)
-        for s in range(num_sensors):
-            rows = packing.cols[:, s]
-            sensor[rows[rows >= 0]] = s
-        must = np.array([(~packing.slack[sensor == s]).any() for s in range(num_sensors)])
-        order = np.argsort(~must, kind="stable")
-        self.cols = np.ascontiguousarray(packing.cols[:, order])
-        self.sensor = np.argsort(order)[sensor]
-        first = self.cols[:, 0].astype(np.int64)
-        second = self.cols[:, 1].astype(np.int64) if num_sensors > 1 else np.full(first.size, -1)
-        key = first * (packing.num_rows + 1) + second
-        self.by_pair = np.argsort(key, kind="stable")
-        self.group_start = np.flatnonzero(np.diff(key[self.by_pair], prepend=-(2**62)))
-        self.group_start = np.append(self.group_start, self.by_pair.size)
+        self.cols, self.sensor, self.by_pair, self.group_start = _arrange(packing.cols, packing.slack)
 
     def solve(self, duals: Floats) -> tuple[Floats, Floats] | None:
         """Solve the relaxation for the multipliers of sensors 3..S in ``duals``.
@@ -73,10 +60,65 @@ class Relaxation:
             # with one sensor there is nothing to assign upward: each row takes its cheapest column
             order = np.argsort(-self.packing.weights, kind="stable")
             owner[self.cols[order, 0]] = order
-            return np.unique(owner[owner >= 0])
-        if not _recover(self.cols, self.packing.weights, self.packing.slack, self.sensor, duals, owner):
+        elif not _recover(self.cols, self.packing.weights, self.packing.slack, self.sensor, duals, owner):
             return None
-        return np.unique(owner[owner >= 0])
+        chosen: NDArray[np.int64] = chosen_columns(self.cols, owner)
+        return chosen
+
+
+@njit
+def _arrange(cols: Any, slack: Any) -> Any:
+    """Columns with the sensors in order of relaxation, the sensor of each row, and the columns by pair.
+
+    The columns of each group share their rows of the first two sensors; groups come in order of the first row.
+    """
+    num, num_sensors = cols.shape
+    num_rows = slack.size
+    sensor = np.zeros(num_rows, np.int64)
+    for j in range(num):
+        for s in range(num_sensors):
+            if cols[j, s] >= 0:
+                sensor[cols[j, s]] = s
+    must = np.zeros(num_sensors, np.bool_)
+    for r in range(num_rows):
+        if not slack[r]:
+            must[sensor[r]] = True
+    place = np.empty(num_sensors, np.int64)
+    count = 0
+    for wanted in (True, False):
+        for s in range(num_sensors):
+            if must[s] == wanted:
+                place[s] = count
+                count += 1
+    ordered = np.empty_like(cols)
+    for j in range(num):
+        for s in range(num_sensors):
+            ordered[j, place[s]] = cols[j, s]
+    for r in range(num_rows):
+        sensor[r] = place[sensor[r]]
+    # sorted by counting, by the second row and then by the first
+    by_pair, other = np.arange(num), np.empty(num, np.int64)
+    for s in range(min(num_sensors, 2) - 1, -1, -1):
+        start = np.zeros(num_rows + 2, np.int64)
+        for j in range(num):
+            start[ordered[j, s] + 2] += 1
+        for r in range(num_rows + 1):
+            start[r + 1] += start[r]
+        for j in by_pair:
+            other[start[ordered[j, s] + 1]] = j
+            start[ordered[j, s] + 1] += 1
+        by_pair, other = other, by_pair
+    group_start = np.empty(num + 1, np.int64)
+    count = 0
+    for k in range(num):
+        same = k > 0
+        for s in range(min(num_sensors, 2)):
+            same = same and ordered[by_pair[k], s] == ordered[by_pair[k - 1], s]
+        if not same:
+            group_start[count] = k
+            count += 1
+    group_start[count] = num
+    return ordered, sensor, by_pair, group_start[: count + 1].copy()
 
 
 @njit
