@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 # generations without improvement after which a population is renewed
-_RENEWAL = 20
+_RENEWAL = 10
 
 
 class Breeding:

@@ -20,12 +20,15 @@ from numpy.typing import NDArray
 from assoc._compiled import njit
 from assoc.solvers.clock import now
 from assoc.solvers.local_search import _improve, penalised
-from assoc.solvers.metaheuristic import Part
+from assoc.solvers.metaheuristic import Part, incomplete
 
 if TYPE_CHECKING:
     from assoc.solvers.aco import AcoParameters
 
 Floats = NDArray[np.float64]
+
+# cycles without improvement until the pheromone is laid anew
+_RENEWAL = 15
 
 
 class Colony:
@@ -39,6 +42,9 @@ class Colony:
         # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
         degree = part.packing.row_cols.size / max(part.packing.num_rows, 1)
         self.lowest = 1.0 / (2.0 * max(degree, 1.0))
+        # the best since the pheromone was laid anew
+        self.recent: NDArray[np.int32] | None = None
+        self.least = np.inf
         if part.best is not None:
             self._deposit(part.packing.cols, part.best, 1.0 - parameters.rho)
 
@@ -66,11 +72,14 @@ class Colony:
         if weight - part.bound > part.tolerance:
             weight += part.improve(owner, rng, p.clusters)
         part.offer(owner, weight)
-        elite = part.best if part.best is not None and part.iterations % 3 == 2 else owner
+        if weight < self.least and not incomplete(part, owner):
+            self.recent, self.least = owner, weight
+        elite = self.recent if self.recent is not None and part.iterations % 3 == 2 else owner
         self._deposit(packing.cols, elite, 1.0 - p.rho)
-        if part.stalled and part.stalled % 25 == 0:
+        if part.stalled and part.stalled % _RENEWAL == 0:
             self.pheromone[:] = 1.0
             self.slack_pheromone[:] = 1.0
+            self.recent, self.least = None, np.inf
 
     def _deposit(self, cols: NDArray[np.int32], owner: NDArray[np.int32], share: float) -> None:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)

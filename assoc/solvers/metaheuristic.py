@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -24,6 +24,7 @@ from assoc.solvers.bounds import certified_bound, component_bounds, dual_bound, 
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.cluster_steps import ClusterSteps
 from assoc.solvers.feasibility import infeasible
+from assoc.solvers.large_neighbourhood import LargeNeighbourhood
 from assoc.solvers.linear_program import linear_program_duals
 from assoc.solvers.local_search import Cover, chosen_columns
 from assoc.solvers.packing import Packing
@@ -36,6 +37,9 @@ TOLERANCE = 1e-9
 _PROOF_NODES = 2000
 # columns up to which the linear program is solved: some seconds at the most
 _LINEAR_PROGRAM = 200_000
+# rows from which large neighbourhoods pay, and tries on one best cover: then only another one helps
+_LARGE = 30
+_TRIES = 300
 
 
 @dataclass(slots=True)
@@ -71,6 +75,9 @@ class Part:
     stalled: int = 0
     deadline: float = np.inf
     clusters: ClusterSteps | None = None
+    neighbourhood: LargeNeighbourhood = field(default_factory=LargeNeighbourhood)
+    tried: int = 0
+    tried_weight: float = np.inf
 
     @property
     def tolerance(self) -> float:
@@ -132,7 +139,7 @@ class Part:
         return weight_of(self, owner)
 
     def refine(self, run: Run, steps: int) -> None:
-        """Improve the best cover by exact sub-steps, ``steps`` for every 30 rows."""
+        """Improve the best cover: exact sub-steps, ``steps`` for every 30 rows, and ``steps`` large neighbourhoods."""
         if self.best is None or steps == 0:
             return
         left = steps * max(1, self.packing.num_rows // 30)
@@ -141,6 +148,15 @@ class Part:
             # summed anew: changes of the order of rounding would add up to an improvement that is none
             self.weight = weight_of(self, self.best)
             left -= 10
+        if self.weight < self.tried_weight:
+            self.tried_weight, self.tried = self.weight, 0
+        for _ in range(steps if self.packing.num_rows >= _LARGE and not incomplete(self, self.best) else 0):
+            if self.closed or self.tried >= _TRIES or run.should_stop():
+                return
+            self.tried += 1
+            if self.neighbourhood.improve(self, self.best, self.weight, run.rng) < 0.0:
+                self.weight = weight_of(self, self.best)
+                self.tried_weight, self.tried = self.weight, 0
 
     def offer(self, owner: Owner, weight: float) -> bool:
         """Keep a cover if it is complete and better than the best; whether it was."""

@@ -80,7 +80,6 @@ class TabuSearch:
             if part.offer(best, weight):
                 self.owner = best
 
-
     def _afresh(self, part: Part, rng: np.random.Generator) -> NDArray[np.int32]:
         """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
         best, least = part.best, np.inf
