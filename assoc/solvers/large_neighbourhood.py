@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from assoc.solvers.metaheuristic import Part
 
 # shares of the rows that are set free: at first, at the least and at the most (all would be an exact solver)
-_START, _LEAST, _MOST = 0.5, 0.2, 0.85
+_START, _LEAST, _MOST = 0.5, 0.2, 0.92
 # nodes of one try, and those up to which it was easy
 _NODES, _EASY = 50, 5
 

@@ -228,6 +228,7 @@ def solve_by(
     done = len(parts)
     cut_off = False
     root_bound = sum(part.bound for part in parts)
+    _record_all(run, done, weight, root_bound, parts)
     queue: list[tuple[Part, Searcher | None]] = [(part, None) for part in parts]
     while queue:
         part, searcher = queue.pop(0)
@@ -242,12 +243,12 @@ def solve_by(
             cut_off |= part.iterations >= iterations and part.stalled < patience and not part.closed
             if part.best is None and over:
                 complete(part, run)
+            if part.weight < before:
+                _record_all(run, done, weight, root_bound, [part, *(other for other, _ in queue)])
             pieces = None if over else split_part(part)
             if pieces is not None:
                 queue.extend((piece, None) for piece in pieces)
                 continue
-            if part.weight < before:
-                _record_all(run, done, weight, root_bound, [part, *(other for other, _ in queue)])
         if over:
             columns.append(part.origin[_columns(part)])
             bound += bound_of_part(part, run)

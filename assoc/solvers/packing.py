@@ -132,6 +132,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
         return problem._prepared
     sizes = problem.sizes.astype(np.int64)
     offsets = np.cumsum(sizes) - sizes
+    arrays: Any
     if problem.dummy:
         *arrays, whole, single, single_cost = _prepare_with_dummies(
             problem.tuples, problem.costs, offsets, int(sizes.sum())
@@ -142,7 +143,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
         arrays = _assemble(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
         whole = _whole_numbers(problem.costs)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
-    packing = Packing(*arrays, granularity=1.0 if whole else 0.0)
+    packing = Packing(*(*arrays, 1.0 if whole else 0.0))
     prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
     problem._prepared = prepared
     return prepared
@@ -157,7 +158,7 @@ def assemble(
 ) -> Packing:
     """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
     arrays: Any = _assemble(rows, weights, slack, origin)
-    return Packing(*arrays, granularity=granularity)
+    return Packing(*(*arrays, granularity))
 
 
 @njit
