@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc.costs.track_tuples import TrackPairs, gate_of, track_pairs
 from assoc.filters.base import Filter
-from assoc.filters.batches import concatenate, predict_each
+from assoc.filters.batches import concatenate
 from assoc.sensors import Sensor
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -77,4 +77,4 @@ def look(
 
 
 def _later(filter: Filter[Any], states: Any, dt: float) -> Any:
-    return predict_each(filter, states, np.full(len(states), max(dt, 0.0))) if len(states) else states
+    return filter.predict(states, dt) if len(states) and dt > 0.0 else states

@@ -90,8 +90,8 @@ class TrackOrientedMHT(Tracker):
         self._chosen = self._best_hypothesis()
         self._confirm()
         now = self._opinion(0, self._chosen)
-        final = self._prune() if len(self._window) == self.depth else ()
-        ended = self._end(time)
+        final, kept = self._prune() if len(self._window) == self.depth else ((), None)
+        ended = self._end(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
     def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
@@ -194,8 +194,8 @@ class TrackOrientedMHT(Tracker):
             confirmed.append(known[1:])
         return Decision(self._scan - age, time, tuple(assigned), tuple(confirmed))
 
-    def _prune(self) -> tuple[Decision, ...]:
-        """Decide the oldest scan of the window and cut what contradicts."""
+    def _prune(self) -> tuple[tuple[Decision, ...], Array]:
+        """Decide the oldest scan of the window; the branches that do not contradict it."""
         count = len(self.sensors)
         oldest = np.ascontiguousarray(self._history[:, -count:])
         kept, speakers = decide(
@@ -208,21 +208,20 @@ class TrackOrientedMHT(Tracker):
         )
         final = self._opinion(self.depth - 1, speakers)
         self._window.pop()
-        self._select(kept)
-        return (final,)
+        return (final,), kept
 
-    def _end(self, time: float) -> Array:
-        gone = self._doomed(self._bank, time)
-        if not gone.any():
+    def _end(self, time: float, kept: Array | None) -> Array:
+        """Cut all branches but these and delete tracks; the ids of confirmed ones that are gone."""
+        stay = ~self._doomed(self._bank, time)
+        if kept is not None:
+            stay &= kept
+        if stay.all():
             return np.zeros(0, dtype=np.int64)
-        lost = self._bank.track_id[gone & self._bank.confirmed]
-        self._select(~gone)
-        return np.setdiff1d(lost, self._bank.track_id) if len(lost) else lost
-
-    def _select(self, mask: Array) -> None:
-        if not mask.all():
-            self._bank, self._history = self._bank[mask], self._history[mask]
-            self._born, self._chosen = self._born[mask], self._chosen[mask]
+        ids = self._bank.track_id.copy()
+        lost = ids[self._bank.confirmed & ~same_tree(ids, stay)]
+        self._bank, self._history = self._bank[stay], self._history[stay]
+        self._born, self._chosen = self._born[stay], self._chosen[stay]
+        return np.unique(lost) if len(lost) else lost
 
     def flush(self) -> tuple[Decision, ...]:
         """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
