@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from assoc._extras import check_extra
+from assoc._inputs import check_distinct, check_output, number
 from assoc._program import (
     Option,
     Parser,
@@ -83,10 +82,12 @@ def _track(words: list[str]) -> None:
         one.kind = float
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
-    _check_output(parsed["output"], file)
+    outputs = [path for path in (parsed["output"], parsed["report"]) if path]
+    check_distinct(outputs, [file])
+    for path in outputs:
+        check_output(path)
     if parsed["report"]:
         check_extra("plotly", "report")
-        _check_output(parsed["report"], file)
     settings: dict[str, Any] = {
         "solver": solver,
         "solver_parameters": given(own, parsed),
@@ -176,25 +177,8 @@ def _common(parsed: dict[str, Any]) -> dict[str, Any]:
     if parsed["time_limit"] is not None:
         found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
     if parsed["gate_probability"] is not None:
-        found["gate_probability"] = _number(parsed["gate_probability"], "--gate-probability")
+        found["gate_probability"] = number(parsed["gate_probability"], "--gate-probability")
     return found
-
-
-def _number(text: str, label: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InvalidInputError(f"{label}: expected a number, got {text!r}") from None
-
-
-def _check_output(output: str, file: str) -> None:
-    """Refuse before the work what could not be written after it."""
-    if os.path.realpath(output) == os.path.realpath(file):
-        raise InvalidInputError(f"{output}: would overwrite what is read")
-    if Path(output).is_dir():
-        raise InvalidInputError(f"{output}: is a folder, expected a file name to write")
-    if not Path(output).parent.is_dir():
-        raise InvalidInputError(f"{output}: the folder {Path(output).parent} does not exist")
 
 
 def _is_npz(file: str) -> bool:
@@ -226,7 +210,7 @@ def _make(
         extra[option] = whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
-        noise = positive(_number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
+        noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
     made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
     return KINDS[name](sensors, made, region=region, **settings, **extra)
 
@@ -267,7 +251,7 @@ def _of_plots(
     radar: dict[str, Any] = {}
     for flag, (argument, unit) in _RADAR.items():
         if parsed[flag] is not None:
-            radar[argument] = unit * _number(parsed[flag], "--" + flag.replace("_", "-"))
+            radar[argument] = unit * number(parsed[flag], "--" + flag.replace("_", "-"))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
     if window == "none":

@@ -85,7 +85,8 @@ def against_peers(
     ]
     _, better, _ = _paired(found["mht"], found["gnn"])
     dense = clutter == max(CLUTTER)
-    claims.append(Claim(f"{label}: mean GOSPA, ours - GNN", "m", 0.0, *better, band=(None, ROUNDING) if dense else None))
+    band = (None, ROUNDING) if dense else None
+    claims.append(Claim(f"{label}: mean GOSPA, ours - GNN", "m", 0.0, *better, band=band))
     return claims, found
 
 

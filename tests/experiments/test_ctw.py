@@ -172,3 +172,11 @@ def test_rates_need_sources():
     found = taken.rates(straight(1))
     assert (found.ct, found.it) == (100.0, 0.0)
     assert found.mt == ct_mt_it([0], [0], [0], [True]).mt == 0.0
+
+
+def test_every_method_of_the_table_runs():
+    short = simulate_recording("rotating-radar", 3, duration=60.0).recording
+    windows = clustering_time_window(short, 9.5)
+    for name, (_, make) in traffic.METHODS.items():
+        taken = run(make(short), windows)
+        assert len(taken.rows) == sum(len(window) for window in windows), name
