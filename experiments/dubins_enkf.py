@@ -150,9 +150,11 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
 
 
 def draw(figure: Any, shown: Any) -> None:
-    """Draw the two paths beside the error over the number of members."""
+    """Draw the two paths above the error over the number of members."""
+    from matplotlib.ticker import NullLocator
+
     drawn, ratios = shown
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
+    left, right = figure.subplots(2, 1, height_ratios=(1, 1.5))
     for (label, one), style in zip(drawn.items(), ("--", "-"), strict=True):
         points = one.sample(20.0, 0.05)[1]
         left.plot(points[:, 0], points[:, 1], style, label=f"{label}: {one.word}, {one.length:.1f} m")
@@ -169,11 +171,14 @@ def draw(figure: Any, shown: Any) -> None:
             arrowprops={"arrowstyle": "->"},
         )  # fmt: skip
     left.set(xlabel="x (m)", ylabel="y (m)", title="path 1, turning radius 100 m", aspect="equal")
+    left.set(xlim=(-520, 60), ylim=(85, 225))
     left.legend(fontsize=8, loc="lower right")
     for i, state in enumerate(STATES):
         right.semilogx(list(ratios), [r[i] for r in ratios.values()], "o-", label=state)
     right.axhline(1.0, color="grey", linewidth=0.8)
-    right.set(xlabel="members N", ylabel="RMS / that of the EKF", title="all four states measured")
+    right.set(xlabel="members N", ylabel="RMS / that of the EKF", title="ensemble filter, all four states measured")
+    right.set_xticks(list(ratios), [str(size) for size in ratios])
+    right.xaxis.set_minor_locator(NullLocator())
     right.legend(fontsize=8)
 
 
@@ -182,7 +187,7 @@ TITLE = "Dubins paths and the ensemble Kalman filter for an unmanned aircraft"
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    return main("dubins_enkf", TITLE, experiment, draw, (12, 4.2), arguments)
+    return main("dubins_enkf", TITLE, experiment, draw, (8.5, 6.8), arguments)
 
 
 if __name__ == "__main__":

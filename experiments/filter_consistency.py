@@ -127,14 +127,26 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
 
 def draw(figure: Any, shown: Any) -> None:
     """Draw the mean NEES over time."""
+    from matplotlib.ticker import NullLocator
+
     results, count = shown
-    for panel, (label, kinds) in zip(figure.subplots(1, 2), results.items(), strict=True):
+    names = list(dict.fromkeys(name for kinds in results.values() for name in kinds))
+    drawn: dict[str, Any] = {}
+    panels = figure.subplots(1, 2)
+    for panel, (label, kinds) in zip(panels, results.items(), strict=True):
         for name, values in kinds.items():
-            panel.semilogy(np.arange(len(values)) + STEPS // 2, values, label=name, linewidth=1.1)
+            # Kalman filter, EKF and UKF are one line on the linear case: the later ones are dashed
+            dashes = {"EKF": (6, 2), "UKF": (1, 2)}.get(name, (None, None)) if label == "linear" else (None, None)
+            (drawn[name],) = panel.plot(
+                np.arange(len(values)) + STEPS // 2, values, color=f"C{names.index(name)}", linewidth=1.2, dashes=dashes
+            )
         low, high = bounds(6, count)
-        panel.axhspan(low, high, color="0.85", label="95 % bounds")
+        drawn["95 % bounds"] = panel.axhspan(low, high, color="0.88")
         panel.set(xlabel="step", ylabel="mean NEES (ideal 6)", title=label)
-        panel.legend(fontsize=7)
+    panels[1].set_yscale("log")
+    panels[1].set_yticks([4, 6, 10, 20, 50, 100, 1000], ["4", "6", "10", "20", "50", "100", "1000"])
+    panels[1].yaxis.set_minor_locator(NullLocator())
+    figure.legend(list(drawn.values()), list(drawn), loc="outside right center", fontsize=8)
 
 
 TITLE = "Consistency of the filters (holds: within the 99.9 % bounds)"

@@ -234,8 +234,8 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
 
     def predict(self, state: Adaptive, dt: float) -> Adaptive:
         """Return the state dt seconds later; see `Filter.predict`."""
-        Q = self.motion.noise(state.mean, dt)
         moved = self._bare.predict(state.gaussian, dt)
+        Q = self.motion.noise(state.mean, dt)
         scaled = _scaled(state.process_scale, Q)
         return Adaptive(
             moved.mean, moved.covariance + scaled, moved.covariance, Q, state.innovations, state.turns,

@@ -12,7 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
 from assoc.filters.kernels import GOOD
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import Motion
+from assoc.filters.motion import Motion, positive
 from assoc.filters.sigma_kernels import ensemble_update, move_ensemble
 from assoc.filters.state import Gaussian, finite
 
@@ -99,6 +99,7 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         if n != self.motion.dim:
             raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
         motion = self.motion
+        positive(dt, "dt", zero=True)
         if motion.linear:
             moved, F = _NOTHING3, motion.jacobian(_NOTHING2, dt)
         else:

@@ -23,7 +23,7 @@ from assoc.filters.kernels import predict as predict_kernel
 from assoc.filters.kernels import step as step_kernel
 from assoc.filters.kernels import update as update_kernel
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import LinearMotion, Motion
+from assoc.filters.motion import LinearMotion, Motion, positive
 from assoc.filters.state import Gaussian, gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -62,6 +62,7 @@ class GaussianFilter(Filter[Gaussian]):
         if linear is not None:
             F, Q = linear.matrices(dt)
         else:
+            positive(dt, "dt", zero=True)
             if not motion.linear:
                 moved = motion.propagate(before, dt)
             F, Q = motion.jacobian(before, dt), motion.noise(before, dt)

@@ -98,8 +98,7 @@ class LinearMotion(Motion):
         """Return F, Q and both in one array (2, 1, n, n); remembered, since most trackers use few time steps."""
         known = self._known.get(dt)
         if known is None:
-            if not math.isfinite(dt) or dt < 0:
-                raise InvalidInputError(f"dt must be a number >= 0, got {dt!r}")
+            positive(dt, "dt", zero=True)
             F = finite(self._transition(dt), "transition", 2)
             Q = finite(self._noise(dt), "noise", 2)
             for name, one in (("transition", F), ("noise", Q)):

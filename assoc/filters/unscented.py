@@ -12,7 +12,7 @@ from assoc.filters.base import Expected, Filter, Update, check_dimension, compla
 from assoc.filters.kernels import GOOD
 from assoc.filters.kernels import predict as predict_kernel
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import Motion
+from assoc.filters.motion import Motion, positive
 from assoc.filters.sigma_kernels import moments, sigma_points, unscented
 from assoc.filters.state import Gaussian, gaussian
 
@@ -69,6 +69,7 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
     def move(self, state: Gaussian, dt: float) -> tuple[Gaussian, Array]:
         """`predict`, and the covariance of the states before and after it, (B, n, n)."""
         check_dimension(state, self.motion.dim)
+        positive(dt, "dt", zero=True)
         points = self._points(state)
         moved = self.motion.propagate(points.reshape(-1, self.motion.dim), dt).reshape(points.shape)
         mean, P = np.empty(state.mean.shape), np.empty(state.covariance.shape)

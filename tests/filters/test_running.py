@@ -170,6 +170,21 @@ def test_refusals_of_a_run():
         ekf.run(far, z[:, :1], RADAR, 1.0)
 
 
+@pytest.mark.parametrize("dt", [-1.0, np.nan, np.inf, "1"])
+@pytest.mark.parametrize("name", every_filter())
+def test_time_does_not_run_backwards(name, dt):
+    one, sensor = every_filter()[name]
+    turning = ("turn", "unscented", "ensemble", "fuzzy")
+    if name in turning:
+        # models that are no matrix take another way
+        kind = {"turn": ExtendedKalmanFilter, "unscented": UnscentedKalmanFilter, "ensemble": EnsembleKalmanFilter}
+        turn = CoordinatedTurn(2.0, 0.01)
+        one = kind[name](turn) if name in kind else FuzzyAdaptiveEKF(turn, paper_rules())
+    state = one.start(random_state(2, np.random.default_rng(0), one.motion.dim))
+    with pytest.raises(InvalidInputError, match="dt must be a number >= 0"):
+        one.predict(state, dt)
+
+
 def test_a_sensor_that_was_refused_once_is_refused_again():
     one, start = KalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
     for _ in range(2):
