@@ -44,7 +44,7 @@ def warm_up(ours: set[str], others: set[str]) -> None:
     small = [synthetic.planted(s, 0, targets=6)[0] for s in (2, 3, 4)]
     small += [synthetic.axial_random(5, 0), synthetic.planar_random(6, 0)]
     # only a hard problem meets all kernels
-    small.append(build_problem(scenes.ghost(20, 0)))
+    small.append(build_problem(scenes.ghost(20, 0), 0))
     for name in sorted(ours):
         for problem in small:
             with contextlib.suppress(InfeasibleError):
