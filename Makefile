@@ -5,6 +5,7 @@
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
 # make test-uncompiled  a part of the tests with numba switched off
+# make test-cold        the same bytes with a cold cache of kernels, a warm one, and on 1, 2 and 4 processes
 # make check-dist       sdist and wheel: what they hold, and that they work in an empty environment
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
@@ -13,10 +14,14 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 p
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
 VENV := .venv
 OLDEST := .venv-oldest
+# tests with much behind them that are quick without a compiler
+UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_track_gating.py tests/simulation/test_observation.py \
+	tests/solvers/test_reduction.py tests/solvers/test_assignment2d.py tests/solvers/test_dimensionwise.py \
+	"tests/solvers/test_against_brute_force.py::test_small_problems[exact]" tests/tracking/test_multi_sensor.py
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-oldest test-uncompiled lint docs fuzz check-dist audit bench bench-quick clean
+.PHONY: demo test test-oldest test-uncompiled test-cold lint docs fuzz check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -43,7 +48,10 @@ test-oldest: $(OLDEST)/.installed-test
 	NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/kernels" $(OLDEST)/bin/python -m pytest -n 2 -q -p no:cacheprovider
 
 test-uncompiled: $(VENV)/.installed-test
-	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $$($(PY) -m tests.trust.uncompiled)
+	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $(UNCOMPILED)
+
+test-cold: $(VENV)/.installed-test
+	$(PY) -m tests.trust.cold_cache
 
 check-dist: $(VENV)/.installed-release
 	$(PY) -m tests.release.distribution

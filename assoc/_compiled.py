@@ -10,23 +10,24 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import hashlib
 import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import caching, event
 
 _PACKAGE = Path(__file__).resolve().parent
 
 
-@cache
+@functools.cache
 def _source_stamp(solvers: bool) -> str:
     """Digest of names and contents of all files with kernels, of the solvers or of the other rooms.
 
@@ -96,10 +97,20 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
 
 
 def njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``."""
+    """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``.
+
+    With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
+    """
+    if _CONFIG.DISABLE_JIT:
+
+        @functools.wraps(function)
+        def silent(*arguments: Any) -> Any:
+            with np.errstate(all="ignore"):
+                return function(*arguments)
+
+        return silent
     kernel: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    if not _CONFIG.DISABLE_JIT:
-        kernel._cache = _KernelCache(function)
+    kernel._cache = _KernelCache(function)
     return kernel
 
 

@@ -1,0 +1,213 @@
+"""Trackers and solvers that run for weeks: is memory flat, does nothing become slower, do covariances stay sound?
+
+    python -m experiments.long_runs [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+10^5 scans of three radars, four targets that circle on and false alarms, for the multi-sensor tracker, a fifth of
+that for a tracker of each other family, and 10^5 solves of problems that are drawn anew, most of them by `exact`, one
+in fifty by another solver. All in one process, one after the other, as a program that runs on and on would have it.
+Watched a hundred times on the way: the resident memory, the objects that Python's collector knows, processor time a
+step, the least eigenvalue of the correlation matrix of every track (above 0: positive definite), its asymmetry, and
+how far confirmed tracks are from the targets.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from assoc.problem import AssignmentProblem
+from assoc.sensors.base import Sensor
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import on_circle, radar_over
+from assoc.solvers.front import assign
+from assoc.solvers.kbest import kbest
+from assoc.tracking import TRACKERS, Tracker
+from experiments.claims import Claim
+from experiments.filters.command import main
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+REGION = np.array([[-40e3, 40e3], [-40e3, 40e3], [0.0, 12e3]])
+RADII = np.array([10e3, 15e3, 20e3, 25e3])
+SPEEDS = np.array([200.0, -220.0, 240.0, -260.0])
+WATCHED = 100
+"""How often one looks."""
+KINDS = {"multi-sensor": 1.0, "mht": 0.2, "nearest-neighbour": 0.2}
+"""Trackers, and their shares of the steps."""
+OTHERS = ("greedy", "lagrangian", "tabu", "genetic", "aco", "milp", "kbest")
+SHARE = 50
+"""One solve in so many is by one of the others."""
+
+
+@dataclass
+class Watch:
+    """What is seen on the way; one entry for each look."""
+
+    steps: list[int] = field(default_factory=list)
+    resident: list[float] = field(default_factory=list)
+    objects: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    def look(self, step: int, seconds: float) -> None:
+        """Note the memory and the processor time (s) of a step since the last look."""
+        gc.collect()
+        with open("/proc/self/statm", encoding="ascii") as file:
+            self.resident.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20)
+        self.objects.append(len(gc.get_objects()))
+        self.steps.append(step)
+        self.seconds.append(seconds)
+
+    def claims(self, name: str) -> list[Claim]:
+        """Memory at the end against that after a tenth, and the pace of the last tenth against the first."""
+        tenth = len(self.steps) // 10
+        first, last = np.median(self.seconds[1 : tenth + 1]), np.median(self.seconds[-tenth:])
+        grown = np.median(self.resident[-tenth:]) - np.median(self.resident[tenth : 2 * tenth])
+        more = np.median(self.objects[-tenth:]) - np.median(self.objects[tenth : 2 * tenth])
+        return [
+            Claim(f"{name}: processor time of a step", "ms", None, 1e3 * float(np.median(self.seconds))),
+            Claim(f"{name}: growth of resident memory from the second tenth to the last", "MB", None, grown, None,
+                  (None, 5.0)),
+            Claim(f"{name}: growth of Python's objects", "", None, more, None, (None, 1_000.0)),
+            Claim(f"{name}: processor time of a step, last tenth / first", "", None, last / first, None,
+                  (None, 1.15)),
+        ]  # fmt: skip
+
+
+def sensors() -> list[Sensor]:
+    """Return three radars around the region."""
+    options = {"range_noise": 50.0, "angle_noise": 1e-3, "detection_probability": 0.9, "false_alarm_rate": 1.0}
+    places = on_circle(REGION.mean(axis=1), 60e3, 3)
+    return [radar_over(REGION, place, name=f"radar {i}", **options) for i, place in enumerate(places)]  # type: ignore[arg-type]
+
+
+def positions(times: Array) -> Array:
+    """Where the targets are, (K, 4, 3); metres."""
+    angle = times[:, None] * SPEEDS / RADII + np.arange(4)
+    height = np.full_like(angle, 5e3) + 500.0 * np.arange(4)
+    return np.stack([RADII * np.cos(angle), RADII * np.sin(angle), height], axis=-1)
+
+
+def scans(count: int, rng: np.random.Generator) -> Iterator[tuple[float, tuple[Array, ...], Array]]:
+    """Time, measurements and targets of one scan after the other, a second apart; nothing is kept."""
+    radars, at_once = sensors(), 100
+    for begin in range(0, count, at_once):
+        times = np.arange(begin, min(begin + at_once, count), dtype=float)
+        places = positions(times)
+        scene = observe(radars, times, [np.arange(4)] * len(times), list(places), rng, region=REGION)
+        for k, when in enumerate(times):
+            yield float(when), tuple(scene.measurements[k]), places[k]
+
+
+def track(kind: str, steps: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
+    """Let a tracker run, and watch it."""
+    tracker: Tracker = TRACKERS[kind](sensors(), region=REGION, time_limit=None)
+    every, watch, clock = max(steps // WATCHED, 1), Watch(), 0.0
+    least, asymmetry = np.inf, 0.0
+    spread: list[float] = []
+    errors: list[float] = []
+    for number, (when, measurements, targets) in enumerate(scans(steps, rng), start=1):
+        started = time.process_time()
+        tracker.step(when, measurements)
+        clock += time.process_time() - started
+        if number % every:
+            continue
+        watch.look(number, clock / every)
+        clock = 0.0
+        for one in tracker.tracks:
+            scale = np.sqrt(np.diag(one.covariance))
+            unit = one.covariance / np.outer(scale, scale)
+            least = min(least, float(np.linalg.eigvalsh(unit).min()))
+            asymmetry = max(asymmetry, float(np.abs(unit - unit.T).max()))
+        confirmed = [one for one in tracker.tracks if one.confirmed]
+        away = np.array([[np.linalg.norm(one.position - place) for one in confirmed] for place in targets])
+        errors.append(float(np.minimum(away.min(axis=1, initial=1_000.0), 1_000.0).mean()))
+        spread += [float(np.sqrt(np.trace(one.covariance[:3, :3]))) for one in confirmed]
+    half, part = len(spread) // 2, len(errors) // 2
+    last_id = max(one.track_id for one in tracker.tracks)
+    return [
+        *watch.claims(kind),
+        Claim(f"{kind}: least eigenvalue of a correlation matrix", "", None, least, None, (1e-12, None)),
+        Claim(f"{kind}: largest asymmetry", "", None, asymmetry, None, (None, 1e-12)),
+        Claim(f"{kind}: deviation that covariances claim, second half / first", "", None,
+              np.median(spread[half:]) / np.median(spread[:half]), None, (0.9, 1.1)),
+        Claim(f"{kind}: distance of the targets to the next track, second half / first (cut at 1 km)", "", None,
+              np.mean(errors[part:]) / np.mean(errors[:part]), None, (0.5, 1.5)),
+        Claim(f"{kind}: that distance", "m", None, float(np.mean(errors))),
+        Claim(f"{kind}: tracks begun in all", "", None, float(last_id)),
+    ], watch  # fmt: skip
+
+
+def drawn(rng: np.random.Generator) -> AssignmentProblem:
+    """Draw a gated problem of three sensors, as a scan of ten targets makes it."""
+    near = np.arange(1, 11)[:, None] + rng.integers(-1, 2, (10, 8, 3)).reshape(10, -1)
+    tuples = np.clip(near.reshape(-1, 3), 1, 10)
+    tuples[rng.random(tuples.shape) < 0.15] = 0
+    tuples = np.unique(tuples[np.count_nonzero(tuples, axis=1) >= 2], axis=0)
+    return AssignmentProblem(tuples, rng.normal(-3.0, 5.0, len(tuples)), [10, 10, 10])
+
+
+def solve(count: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
+    """Solve one problem after the other, and watch."""
+    others: list[Callable[[AssignmentProblem], object]] = [
+        (lambda problem, name=name: kbest(problem, 3) if name == "kbest" else assign(problem, name)) for name in OTHERS
+    ]
+    for other in others:
+        # what they import and compile is no growth
+        other(drawn(rng))
+    every, watch, clock, wrong = max(count // WATCHED, 1), Watch(), 0.0, 0
+    for number in range(1, count + 1):
+        problem = drawn(rng)
+        started = time.process_time()
+        solution = assign(problem, "exact")
+        clock += time.process_time() - started
+        wrong += solution.status != "optimal"
+        if number % SHARE == 0:
+            others[number // SHARE % len(others)](problem)
+        if number % every == 0:
+            watch.look(number, clock / every)
+            clock = 0.0
+    unproved = Claim("exact: solves that end without a proof", "", None, float(wrong), None, (None, 0.0))
+    return [*watch.claims("exact"), unproved], watch
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Run all, one after the other, in this process."""
+    steps = 2_000 if quick else 100_000
+    claims: list[Claim] = []
+    shown: dict[str, Watch] = {}
+    for kind, share in KINDS.items():
+        found, shown[kind] = track(kind, int(share * steps), rng)
+        claims += found
+    found, shown["exact"] = solve(steps, rng)
+    return claims + found, shown
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw memory and pace over the steps."""
+    above, below = figure.subplots(2, 1, sharex=True)
+    for name, watch in shown.items():
+        above.plot(watch.steps, watch.resident, label=name, linewidth=1.0)
+        below.plot(watch.steps[1:], 1e3 * np.array(watch.seconds[1:]), label=name, linewidth=1.0)
+    above.set(ylabel="resident memory, MB")
+    above.set_ylim(bottom=0.0)
+    below.set(xlabel="steps, solves", ylabel="processor time of one, ms")
+    below.set_ylim(bottom=0.0)
+    above.legend(ncols=4, fontsize=8, loc="lower right")
+
+
+TITLE = "Long runs"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    return main("long_runs", TITLE, experiment, draw, (8, 5.0), arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
