@@ -79,12 +79,13 @@ def complete(problem: AssignmentProblem, run: Run) -> Complete:
     prepared = prepare(problem)
     packing = prepared.packing
     slack = slack_of(problem)
+    # before the ascent, which takes the time that is left
+    rows, weights, origin = distinct_columns(problem)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
     own = dual_bound(packing, run=run)
     hard_pass(packing, own, np.empty(packing.num_columns), 1)
     duals[packing.row_origin] = own
-    rows, weights, origin = distinct_columns(problem)
     return priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
 
 

@@ -76,6 +76,8 @@ class Deepening:
             There is no solution.
         """
         columns = self._columns
+        if self._run.should_stop():
+            return Found([], columns.bound)
         steps = np.concatenate([columns.reduced, columns.slack_reduced[columns.slack]])
         steps = np.unique(steps[steps > self._tolerance])
         # two deviations of a row for each solution wanted are a fair guess of how far one must look

@@ -25,6 +25,9 @@ from assoc.solvers.front import _limit, assign
 from assoc.solvers.planar import rank_planar
 from assoc.solvers.run import Run
 
+# seconds of a greedy solution for each tuple
+_GREEDY = 3e-7
+
 
 def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None) -> list[Solution]:
     """Return the k best solutions, truly ranked.
@@ -92,7 +95,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     k = checked_k(k)
-    run = Run(0, time_limit=_limit(time_limit), started=started)
+    run = Run(0, time_limit=within(problem, time_limit), started=started)
     if problem.num_sensors == 2:
         columns, found = rank_planar(problem, k, run)
     else:
@@ -127,6 +130,12 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
         for place, (cost, indices) in enumerate(answers)
     ]
     return Ranking(solutions, rest, columns)
+
+
+def within(problem: AssignmentProblem, time_limit: object) -> float | None:
+    """Check a time limit, and take off it what the greedy solution of a large problem takes when time is over."""
+    limit = _limit(time_limit)
+    return None if limit is None else limit - min(0.3 * limit, _GREEDY * problem.num_tuples)
 
 
 def checked_k(k: object) -> int:

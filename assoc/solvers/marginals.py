@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.complete import Complete
-from assoc.solvers.front import _limit
-from assoc.solvers.kbest import checked_k, rank
+from assoc.solvers.front import assign
+from assoc.solvers.kbest import checked_k, rank, within
 from assoc.solvers.partition import log_partition
 from assoc.solvers.run import Run
 
@@ -77,7 +77,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     Raises
     ------
     InfeasibleError
-        There is no solution.
+        There is no solution, or none was found in the time.
     InvalidInputError
         ``k`` is not a whole number >= 1, or the time limit is not positive.
 
@@ -102,11 +102,17 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     the least of several.
     """
     checked_k(k)
-    run = Run(0, time_limit=_limit(time_limit))
+    run = Run(0, time_limit=within(problem, time_limit))
     tuples, place = _distinct(problem.tuples)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0
+    waiting = np.ones(problem.num_tuples, dtype=bool)
     for cluster, which in _clusters(problem):
+        if run.should_stop():
+            unseen, listed = 1.0, listed + 1
+            _guess(problem, place[waiting], place, probability, lower, upper)
+            break
+        waiting[which] = False
         left = None if time_limit is None else max(run.remaining(), 1e-3)
         own, share, count = _of_cluster(cluster, k, left)
         listed += count
@@ -118,6 +124,16 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
     return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed)
+
+
+def _guess(
+    problem: AssignmentProblem, waiting: NDArray[np.intp], place: NDArray[np.intp], probability: Floats, lower: Floats,
+    upper: Floats,
+) -> None:  # fmt: skip
+    """Fill in what is known of clusters when time is over: nothing; the greedy solution stands for the best."""
+    chosen = np.zeros(probability.size)
+    chosen[place[assign(problem, "greedy", time_limit=1e-6).indices]] = 1.0
+    probability[waiting], lower[waiting], upper[waiting] = chosen[waiting], 0.0, 1.0
 
 
 def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:

@@ -9,6 +9,8 @@ from tests.release.requirements import Requirement, read
 
 TOOLS = ("lint", "docs", "build", "release")
 """Groups that the tests do not need."""
+COMPANIONS = ("pyparsing<3.3",)
+"""What an old package brings along but cannot be had with in its newest version: matplotlib 3.9 makes it warn."""
 
 
 def constraints(requirements: list[Requirement]) -> list[str]:
@@ -25,7 +27,7 @@ def constraints(requirements: list[Requirement]) -> list[str]:
             continue
         if pinned.setdefault(one.name, one.oldest) != one.oldest:
             raise ValueError(f"{one.name}: oldest versions {pinned[one.name]} and {one.oldest}, expected one")
-    return [f"{name}=={version}" for name, version in pinned.items()]
+    return [*(f"{name}=={version}" for name, version in pinned.items()), *COMPANIONS]
 
 
 if __name__ == "__main__":

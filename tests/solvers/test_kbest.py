@@ -254,9 +254,10 @@ def test_time_limit_returns_only_what_is_proved(shape):
     rng = np.random.default_rng(10)
     problem = AssignmentProblem.from_dense(rng.integers(0, 100, shape).astype(float), dummy=False)
     kbest(axial_problem(rng, (3,) * len(shape)), 2)
-    started = time.perf_counter()
+    started = time.thread_time()
     found = kbest(problem, 50_000, time_limit=0.7)
-    assert time.perf_counter() - started < 4.0
+    # processor time: the machine may be busy with other things
+    assert time.thread_time() - started < 4.0
     assert 1 <= len(found) < 50_000
     assert all(s.stopped_by == "time_limit" for s in found)
     costs = [s.cost for s in found]

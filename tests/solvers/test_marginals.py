@@ -52,6 +52,28 @@ def test_intervals_contain_the_truth():
     assert np.median(widths) < 0.5
 
 
+def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
+    for problem, _ in enumerable(20, 63):
+        truth = oracles.marginals(problem)
+        try:
+            result = marginals(problem, 5, time_limit=1e-9)
+        except InfeasibleError:
+            # a dead end of the greedy choice, which takes time to get out of
+            assert not problem.dummy
+            continue
+        for key, p, low, high in zip(
+            result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
+        ):
+            assert low <= truth[tuple(key)] <= high and low <= p <= high
+        # the probabilities are those of one solution
+        for s, n in enumerate(problem.sizes):
+            if problem.dummy or n == problem.sizes.min():
+                for i in range(1, n + 1):
+                    assert result.probability[result.tuples[:, s] == i].sum() == 1.0
+        # where there was something to decide
+        assert result.unseen == 1.0 or set(truth.values()) <= {1.0}
+
+
 def test_the_unseen_weight_is_bounded_tightly_when_solved_out():
     """On problems this small the partition function comes out exactly, and so does the unseen share."""
     checked = 0
