@@ -73,11 +73,19 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
 
 
 def draw(figure: Any, shown: Any) -> None:
-    """Draw the least eigenvalues over the steps."""
+    """Draw the least eigenvalues over the steps, of each fiftieth part the least."""
+    from matplotlib.ticker import NullLocator
+
     axes = figure.subplots()
     for name, watched in shown.items():
-        axes.semilogy(EVERY * np.arange(1, len(watched) + 1), watched[:, 0], label=name, linewidth=0.9)
-    axes.set(xlabel="corrections", ylabel="least eigenvalue of the correlation")
+        parts = np.array_split(watched[:, 0], min(50, len(watched)))
+        ends = EVERY * np.cumsum([len(part) for part in parts])
+        # EKF, modified EKF and UKF are one line: the later ones are dotted
+        style = {"modified EKF": "--", "UKF": ":"}.get(name, "-")
+        axes.semilogy(ends, [part.min() for part in parts], style, label=name, linewidth=1.4)
+    axes.set(xlabel="corrections", ylabel="least eigenvalue of the correlation", ylim=(0.01, 0.5))
+    axes.set_yticks([0.01, 0.02, 0.05, 0.1, 0.2, 0.5], ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"])
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.legend(ncols=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
 
 

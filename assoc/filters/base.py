@@ -175,17 +175,13 @@ class Filter(ABC, Generic[S]):
             As in `update`, or no steps.
         """
         z, times = self._steps(state, measured, sensor, dt)
-        done: list[Update[S]] = []
-        for one, step in zip(z, times, strict=True):
-            done.append(self.step(state, step, one, sensor))
-            state = done[-1].state
-        return History(
-            np.stack([one.state.mean for one in done]),
-            np.stack([one.state.covariance for one in done]),
-            np.stack([one.nis for one in done]),
-            np.stack([one.log_likelihood for one in done]),
-            state,
-        )
+        K, B, n = len(z), len(state), self.motion.dim
+        means, Ps, nis, ll = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((K, B)), np.empty((K, B))
+        for k in range(K):
+            done = self.step(state, times[k], z[k], sensor)
+            state = done.state
+            means[k], Ps[k], nis[k], ll[k] = state.mean, state.covariance, done.nis, done.log_likelihood
+        return History(means, Ps, nis, ll, state)
 
     def _steps(
         self, state: S, measured: Array, sensor: Measurement, dt: float | Sequence[float]
