@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
+from assoc.filters.motion import LinearMotion, Motion
 from assoc.filters.state import gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -104,6 +106,27 @@ def difference(saved: str, own: str) -> str:
     if not isinstance(before, dict):
         return "they cannot be read"
     for key in now:
-        if before.get(key) != now[key]:
-            return f"{key} was {str(before.get(key))[:80]!r}, is {now[key][:80]!r}"
+        old, new = str(before.get(key)), now[key]
+        if old != new:
+            # long texts from where they part
+            same = len(os.path.commonprefix([old, new]))
+            first = 0 if same < 60 else same - 20
+            return f"{key} was {old[first : first + 80]!r}, is {new[first : first + 80]!r}"
     return "an unknown setting"
+
+
+def described(thing: object) -> str:
+    """A filter, with all that it and its motion model are made of, as text."""
+    if isinstance(thing, (Filter, Motion)):
+        parts = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
+        parts.pop("rng", None)
+        inside = [f"{name}={described(parts[name])}" for name in sorted(parts)]
+        if isinstance(thing, LinearMotion):
+            inside.append(f"noise of a second={described(thing.matrices(1.0)[1])}")
+        return f"{type(thing).__name__}({', '.join(inside)})"
+    if isinstance(thing, np.ndarray):
+        return str(thing.tolist())
+    if isinstance(thing, (tuple, list)):
+        return f"[{', '.join(described(one) for one in thing)}]"
+    plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
+    return repr(thing) if plain else type(thing).__name__

@@ -30,7 +30,7 @@ from assoc.tracking.bank import Bank, empty_bank
 from assoc.tracking.defaults import two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.saving import check_bank, check_progress, difference, rng_state
+from assoc.tracking.saving import check_bank, check_progress, described, difference, rng_state
 from assoc.tracking.track import Decision, Step, Track
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -354,7 +354,7 @@ class Tracker(ABC):
         """What a saved state depends on, as texts."""
         return {
             "tracker": self.name,
-            "filter": f"{type(self.filter).__name__}, {type(self.filter.motion).__name__}",
+            "filter": described(self.filter),
             "sensors": "; ".join(f"{sensor!r}" for sensor in self.sensors),
             "region": str(self._place.region.tolist()),
             "solver": f"{self.solver} {sorted(self.solver_parameters.items())}",

@@ -11,6 +11,7 @@ from assoc._files import save_npz
 from assoc.errors import AssocError, InvalidInputError
 from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
 from assoc.tracking import TRACKERS
+from assoc.tracking.defaults import two_speeds
 from assoc.tracking.tracker import FORMAT, VERSION
 from tests.trust.mutations import MARKER, spoil
 
@@ -156,3 +157,11 @@ def test_settings_that_cannot_be_read(settings, tmp_path):
     save_npz(path, FORMAT, VERSION, tracker._arrays() | {"settings": np.array(settings)})
     with pytest.raises(InvalidInputError, match="was saved by a tracker with other settings"):
         kind.for_scene(SCENE).restore(path)
+
+
+def test_another_process_noise_is_another_setting(tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "state.npz"
+    saved(kind, path, two_speeds(50.0))
+    kind.for_scene(SCENE, two_speeds(50.0)).restore(path)
+    with pytest.raises(InvalidInputError, match=r"other settings: filter was .*sigma=5\.0.*, is .*sigma=6\.0"):
+        kind.for_scene(SCENE, two_speeds(60.0)).restore(path)
