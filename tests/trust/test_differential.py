@@ -36,6 +36,17 @@ def test_faults_that_were_found(number):
     assert judge(draw(1, number), list(WAYS)) == []
 
 
+@pytest.mark.parametrize("temper", ["prices 1e3", "prices 1e6"])
+def test_exact_proves_its_answer_where_costs_cancel(temper):
+    """Gaps were closed to 1e-9 of the weights, which where they cancel is more than a millionth of the cost."""
+    assert assign(draw(1, 2012).problem).status == "optimal"
+    for number, structure in enumerate(("gated", "duplicates", "chain", "axial square")):
+        problem = make(np.random.default_rng([43, number]), structure, temper)
+        answer, optimum = assign(problem), exact_optimum(problem)
+        assert answer.status == "optimal" and answer.cost == pytest.approx(float(optimum), rel=1e-6, abs=1e-6)
+        assert answer.lower_bound <= optimum + 1e-9
+
+
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
 def test_rounding_is_no_improvement(solver):
     """Covers whose weights differ by rounding alone were taken for ever better ones, for 1000 iterations."""

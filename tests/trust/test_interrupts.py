@@ -6,8 +6,6 @@ import json
 import subprocess
 import sys
 
-import pytest
-
 LIBRARY = """
 import _thread, json, os, signal, sys, threading, time
 import numpy as np
