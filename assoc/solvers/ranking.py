@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
-from assoc.solvers.branch_and_bound import _hard, _reduced, _smooth, index_by_row
+from assoc.solvers.branching import doubtful_pairs
 from assoc.solvers.enumeration import NOT_COMPLETE, cut_of, enumerate_solutions, new_store
+from assoc.solvers.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
 from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
@@ -51,32 +52,20 @@ class ComponentRanking:
         self._k = k
         self._limit = limit
         self._tolerance = tolerance
-        num, rows = packing.num_columns, packing.num_rows
-        depth = 64
-        self._store = new_store(rows)
-        self._arena = np.empty(max(8 * num, 1024), dtype=np.int32)
-        self._arena[:num] = np.arange(num)
-        self._first = np.zeros(depth, dtype=np.int64)
-        self._size = np.zeros(depth, dtype=np.int64)
-        self._duals = np.zeros((depth, rows))
-        self._slack = np.zeros((depth, rows), dtype=np.bool_)
-        self._bound = np.full(depth, -np.inf)
-        self._size[0] = num
-        self._duals[0] = duals
-        self._slack[0] = packing.slack
-        self._open = 1
+        self._store = new_store(packing.num_rows)
+        self._open = OpenNodes(packing, duals)
         self.nodes = 0
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to search."""
-        return self._open == 0
+        return self._open.count == 0
 
     @property
     def proven(self) -> float:
         """Every solution that was not found weighs at least this."""
         cut = float(cut_of(self._store, self._k, self._limit, self._tolerance))
-        return min(cut, float(self._bound[: self._open].min())) if self._open else cut
+        return min(cut, self._open.least_bound)
 
     def solutions(self) -> tuple[Floats, list[NDArray[np.int32]]]:
         """Return weights (ascending) and the columns of each solution."""
@@ -86,17 +75,12 @@ class ComponentRanking:
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
-        while self._open and self.nodes < target:
-            self._open, done, self._store = _rank(
+        while not self.done and self.nodes < target:
+            self._open.count, done, self._store = _rank(
                 self._packing.cols,
                 self._packing.weights,
-                self._arena,
-                self._first,
-                self._size,
-                self._duals,
-                self._slack,
-                self._bound,
-                self._open,
+                *self._open.arrays,
+                self._open.count,
                 self._k,
                 self._limit,
                 self._tolerance,
@@ -105,15 +89,8 @@ class ComponentRanking:
                 self._store,
             )
             self.nodes += done
-            if self._open and self.nodes < target:
-                self._grow()
-
-    def _grow(self) -> None:
-        self._arena = np.concatenate([self._arena, np.empty_like(self._arena)])
-        self._first, self._size, self._duals, self._slack, self._bound = (
-            np.concatenate([a, np.zeros_like(a)])
-            for a in (self._first, self._size, self._duals, self._slack, self._bound)
-        )
+            if not self.done and self.nodes < target:
+                self._open.grow()
 
 
 @njit
@@ -152,6 +129,11 @@ def _rank(
     slack_primal = np.empty(num_rows)
     duals = np.empty(num_rows)
     kept_duals = np.empty(num_rows)
+    together = np.zeros(num_rows)
+    partners = np.empty(num_rows, np.int32)
+    pairs = np.zeros((1, 2), np.int32)
+    doubts = np.empty(1)
+    values = np.empty(1)
     nodes = 0
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
@@ -173,9 +155,9 @@ def _rank(
         for level in range(3):
             index_by_row(cols, active, num, row_ptr, row_cols)
             if level > 0:
-                _smooth(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5)
-            _reduced(cols, weights, active, num, duals, reduced)
-            if not _hard(slack, row_ptr, row_cols, duals, reduced, 2):
+                smooth_sweeps(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5)
+            reduced_of(cols, weights, active, num, duals, reduced)
+            if not hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2):
                 closed = True
                 break
             bound = 0.0
@@ -212,68 +194,16 @@ def _rank(
             continue
         index_by_row(cols, active, num, row_ptr, row_cols)
         duals[:] = kept_duals
-        _reduced(cols, weights, active, num, duals, reduced)
-        _smooth(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.0)
-        one, two, value = _doubtful_pair(cols, active, slack, row_ptr, row_cols, primal)
-        place = first[top]
-        for side in range(2):
-            # the more likely answer is pushed last and so searched first
-            joined = (side == 1) == (value >= 0.5)
-            first[num_open] = place
-            for a in range(num):
-                j = active[a]
-                uses = 0
-                for s in range(num_sensors):
-                    if cols[j, s] == one or cols[j, s] == two:
-                        uses += 1
-                if (uses != 1) if joined else (uses != 2):
-                    arena[place] = j
-                    place += 1
-            size[num_open] = place - first[num_open]
-            node_duals[num_open] = kept_duals
-            node_slack[num_open] = slack
-            if joined:
-                node_slack[num_open, one] = False
-                node_slack[num_open, two] = False
-            node_bound[num_open] = lower
-            num_open += 1
+        reduced_of(cols, weights, active, num, duals, reduced)
+        smooth_sweeps(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.0)
+        # with distinct columns there always is one: without an open question enumeration would have been complete
+        doubtful_pairs(cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values)
+        one, two = pairs[0]
+        num_open = push_children(
+            cols, active, num, one, two, values[0], lower, kept_duals, slack, arena, first, size, node_duals,
+            node_slack, node_bound, top,
+        )  # fmt: skip
     return num_open, nodes, store
-
-
-@njit
-def _doubtful_pair(cols: Any, active: Any, slack: Any, row_ptr: Any, row_cols: Any, primal: Floats) -> Any:
-    """Return the pair of rows of which it is least clear whether they belong together, and how much they do.
-
-    With distinct columns there always is one: without an open question enumeration would have been complete.
-    """
-    num_sensors = cols.shape[1]
-    best, first, second, value = -1.0, -1, -1, 0.0
-    together = np.zeros(slack.size)
-    counts = np.zeros(slack.size, np.int64)
-    partners = np.empty(slack.size, np.int32)
-    for r in range(slack.size):
-        num = 0
-        for x in range(row_ptr[r], row_ptr[r + 1]):
-            a = row_cols[x]
-            for s in range(num_sensors):
-                q = cols[active[a], s]
-                if q > r:
-                    if counts[q] == 0:
-                        partners[num] = q
-                        num += 1
-                    counts[q] += 1
-                    together[q] += primal[a]
-        degree = row_ptr[r + 1] - row_ptr[r]
-        for i in range(num):
-            q = partners[i]
-            y = min(together[q], 1.0)
-            # where both rows always appear together and must be covered there is nothing to decide
-            is_open = slack[r] or slack[q] or counts[q] < degree or counts[q] < row_ptr[q + 1] - row_ptr[q]
-            if is_open and y * (1.0 - y) > best:
-                best, first, second, value = y * (1.0 - y), r, q, y
-            together[q] = 0.0
-            counts[q] = 0
-    return first, second, value
 
 
 @njit

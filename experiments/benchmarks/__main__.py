@@ -33,7 +33,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seeds", type=int, metavar="N", help="seeds per size instead of each family's own")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="rows (default docs/benchmarks.csv)")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="report (default: beside the rows)")
-    parser.add_argument("--update", action="store_true", help="keep the rows of what is not run from the CSV")
+    parser.add_argument(
+        "--update",
+        action="store_true",
+        help="keep the rows of what is not run now (with --solvers: of the other solvers) from the CSV",
+    )
     parser.add_argument(
         "--report-only", action="store_true", help="run nothing, write the report from the CSV"
     )
@@ -70,9 +74,9 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     start = time.perf_counter()
     if options.update and table.exists():
-        rows = [r for r in storage.load(table) if not _to_run(r, families, options.sizes)]
+        rows = [r for r in storage.load(table) if not _measured_anew(r, families, options)]
     for found in _measure(families, options):
-        rows += found
+        rows = storage.with_common_reference(rows + found)
         rows.sort(key=lambda row: FAMILIES.index(row.family))
         # After every case, so that an interrupted run keeps what it has measured.
         write((time.perf_counter() - start) / 60 if not options.update else None)
@@ -82,6 +86,12 @@ def main(argv: list[str] | None = None) -> int:
 
 def _to_run(what: Row | Case, families: list[str], sizes: list[str] | None) -> bool:
     return what.family in families and (sizes is None or what.size in sizes)
+
+
+def _measured_anew(row: Row, families: list[str], options: argparse.Namespace) -> bool:
+    """Whether a row of an earlier run is replaced: with --solvers those of the others stay."""
+    solver = row.solver.split("@")[0]
+    return _to_run(row, families, options.sizes) and (not options.solvers or solver in options.solvers)
 
 
 def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[Row]]:

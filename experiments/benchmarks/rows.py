@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 HIT = 1e-6
@@ -74,6 +74,20 @@ class Row:
     def hit(self) -> bool:
         """Whether the cost is the reference, to 1e-6 relative."""
         return self.excess <= HIT
+
+
+def with_common_reference(rows: list[Row]) -> list[Row]:
+    """Rows of several runs with the best reference that any of them has for their instance."""
+    best: dict[tuple[str, str, int, int], tuple[float, bool]] = {}
+    for row in rows:
+        instance = (row.family, row.size, row.seed, row.item)
+        reference, proven = best.get(instance, (math.inf, False))
+        best[instance] = min(reference, row.reference), proven or row.proven
+    result = []
+    for row in rows:
+        reference, proven = best[row.family, row.size, row.seed, row.item]
+        result.append(row if math.isnan(row.reference) else replace(row, reference=reference, proven=proven))
+    return result
 
 
 _DERIVED = ("gap", "excess")

@@ -33,6 +33,15 @@ def test_rows_round_trip(tmp_path: Path) -> None:
     assert path.read_text().splitlines()[0].endswith(",gap,excess")
 
 
+def test_rows_of_several_runs_share_the_best_reference() -> None:
+    known = [replace(ROW, reference=-100.0, proven=False), replace(PEER, reference=-101.0, proven=True)]
+    other = replace(ROW, seed=1001, reference=-90.0, proven=False)
+    ranked = replace(ROW, family="kbest", reference=math.nan)
+    merged = rows.with_common_reference([*known, other, ranked])
+    assert [(row.reference, row.proven) for row in merged[:3]] == [(-101.0, True), (-101.0, True), (-90.0, False)]
+    assert math.isnan(merged[3].reference)
+
+
 def test_gap_excess_and_hit() -> None:
     row = replace(ROW, cost=-99.0, bound=-101.0)
     assert row.gap == pytest.approx(2 / 99)
