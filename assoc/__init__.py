@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from assoc.solvers.front import assign
     from assoc.solvers.kbest import kbest
     from assoc.solvers.marginals import marginals
+    from assoc.solvers.warming import warm_up
 
 __version__ = "0.1.0"
 
@@ -40,6 +41,7 @@ __all__ = [
     "plotting",
     "solvers",
     "sweeps",
+    "warm_up",
 ]
 
 _HOME = {
@@ -52,6 +54,7 @@ _HOME = {
     "build_problem": "assoc.costs",
     "kbest": "assoc.solvers.kbest",
     "marginals": "assoc.solvers.marginals",
+    "warm_up": "assoc.solvers.warming",
 }
 
 

@@ -117,6 +117,9 @@ class Deepening:
         )
         if np.isposinf(lower).any():
             return Found([], np.inf)
+        if np.isneginf(lower).any():
+            # time was over before a component had any bound of its own
+            return Found([], columns.bound)
         total_lower = float(lower.sum())
         unlisted = total_lower + (np.array(lists.proven) - lower)
         rest = min(beyond, float(unlisted.min(initial=np.inf)))
