@@ -311,11 +311,10 @@ def _with_singletons(
     offsets = np.cumsum(sizes) - sizes
     present = np.zeros(int(sizes.sum()), dtype=np.bool_)
     listed = tuples[alone]
-    # one index of each is not 0: the sum is the measurement, the place its sensor
-    present[offsets[np.argmax(listed != 0, axis=1)] + listed.sum(axis=1) - 1] = True
-    missing = np.flatnonzero(~present)
-    if missing.size == 0:
+    present[(listed + (offsets - 1))[listed > 0]] = True
+    if present.all():
         return tuples, costs
+    missing = np.flatnonzero(~present)
     sensor = np.searchsorted(offsets, missing, side="right") - 1
     extra = np.zeros((missing.size, sizes.size), dtype=tuples.dtype)
     extra[np.arange(missing.size), sensor] = missing - offsets[sensor] + 1

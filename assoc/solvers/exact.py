@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.run import Outcome, Parameters, Run
 
 if TYPE_CHECKING:
@@ -59,18 +60,19 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     The parts were searched to 1e-9 of their weights. The incumbent is the optimum to that already, so that a search
     which asks for more has little left to do.
     """
+    last = run.trace[-1]
+    wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(last.cost))
+    if last.cost - last.lower_bound <= 4.0 * wanted:
+        return outcome
     import numpy as np
 
-    from assoc.solution import OPTIMALITY_TOLERANCE
     from assoc.solvers.bounds import dual_bound
     from assoc.solvers.branch_and_bound import Search
 
     chosen = packing.weights[outcome.columns]
     weight, size = float(chosen.sum()), float(np.abs(chosen).sum())
-    wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(weight + run.offset))
-    gap = weight - outcome.lower_bound
     # a gap that another cause has left open, or that rounding alone would leave, is not closed so
-    if not 4.0 * wanted < gap < 1e-8 * size or wanted < 1e-14 * size:
+    if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
         return outcome
     search = Search(packing, dual_bound(packing, run=run), weight, wanted)
     most = max(50, _VISITS // packing.num_columns)
