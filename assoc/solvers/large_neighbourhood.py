@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.branch_and_bound import Search
-from assoc.solvers.local_search import chosen_columns
+from assoc.solvers.local_search import chosen_columns, own
 from assoc.solvers.packing import assemble
 
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ class LargeNeighbourhood:
             self.share = min(self.share + 0.005, _MOST)
         if search.columns is None:
             return 0.0
-        _replace(packing.cols, owner, free, smaller.origin[search.columns])
+        owner[free] = -1
+        own(packing.cols, smaller.origin[search.columns], owner)
         return search.weight - before
 
 
@@ -96,15 +97,3 @@ def _inside(cols: Any, reduced: Any, free: Any, limit: float) -> Any:
             if cols[j, s] >= 0 and not free[cols[j, s]]:
                 keep[j] = False
     return keep
-
-
-@njit
-def _replace(cols: Any, owner: Any, free: Any, columns: Any) -> None:
-    """Cover the free rows by these columns."""
-    for r in range(owner.size):
-        if free[r]:
-            owner[r] = -1
-    for j in columns:
-        for s in range(cols.shape[1]):
-            if cols[j, s] >= 0:
-                owner[cols[j, s]] = j

@@ -44,7 +44,7 @@ class Cover:
     def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
         """Return the cover of columns that share no row."""
         cover = cls.empty(packing)
-        _own(packing.cols, columns, cover.owner)
+        own(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
         return cover
 
     def columns(self) -> NDArray[np.int32]:
@@ -97,7 +97,8 @@ class Cover:
 
 
 @njit
-def _own(cols: Any, columns: Any, owner: Any) -> None:
+def own(cols: Any, columns: Any, owner: Any) -> None:
+    """Make these columns the owners of their rows."""
     for j in columns:
         for s in range(cols.shape[1]):
             if cols[j, s] >= 0:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +19,10 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
 
 # measurements a sensor, and tuples: enough for large parts, few enough for tenths of a second
-_ROWS = 16
-_TUPLES = 900
+_ROWS = 24
+_TUPLES = 2000
+# iterations without improvement, or nodes, after which a search has met all its kernels
+_LIMITS = {"patience": 12, "nodes": 60}
 
 
 def warm_up(solvers: Iterable[str] | None = None) -> float:
@@ -47,11 +51,13 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     started = time.perf_counter()
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:
+        known = {field.name for field in fields(registry.parameters(name))}  # type: ignore[arg-type]
+        limits: dict[str, Any] = {key: value for key, value in _LIMITS.items() if key in known}
         for problem in _problems():
             # with a limit and without: what looks at the clock is asked to look
             for limit in (None, 1e3):
                 with contextlib.suppress(InfeasibleError):
-                    assign(problem, name, time_limit=limit)
+                    assign(problem, name, time_limit=limit, **limits)
                 # what was prepared is made anew
                 problem._prepared = None
     return time.perf_counter() - started
