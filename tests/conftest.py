@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
+
 from hypothesis import settings
 
 # the first example pays for compilation, and machines differ: a deadline would only find that out
 settings.register_profile("assoc", deadline=None)
 settings.load_profile("assoc")
+
+# a job in the background ignores Ctrl-C, and so would the programs that the tests start
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    with contextlib.suppress(ValueError):
+        signal.signal(signal.SIGINT, signal.default_int_handler)

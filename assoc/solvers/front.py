@@ -20,7 +20,7 @@ from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.bounds import certified_bound, dual_bound
 from assoc.solvers.packing import Prepared, prepare
-from assoc.solvers.run import Callback, Outcome, Run
+from assoc.solvers.run import Callback, Outcome, Run, interruptible
 
 
 def assign(
@@ -67,10 +67,11 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     run = Run(_seed(seed), time_limit=_limit(time_limit), callback=callback, started=started)
-    prepared = prepare(problem)
-    run.offset = prepared.offset
-    outcome = solve(prepared.packing, chosen, run)
-    return _certify(problem, prepared, outcome, run, solver, chosen)
+    with interruptible():
+        prepared = prepare(problem)
+        run.offset = prepared.offset
+        outcome = solve(prepared.packing, chosen, run)
+        return _certify(problem, prepared, outcome, run, solver, chosen)
 
 
 def _certify(

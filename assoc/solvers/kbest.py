@@ -23,7 +23,7 @@ from assoc.solvers.complete import Complete, complete
 from assoc.solvers.deepening import Deepening
 from assoc.solvers.front import _limit, assign
 from assoc.solvers.planar import rank_planar
-from assoc.solvers.run import Run
+from assoc.solvers.run import Run, interruptible
 
 # seconds of a greedy solution for each tuple
 _GREEDY = 3e-7
@@ -66,7 +66,8 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     K. G. Murty, "An algorithm for ranking all the assignments in order of increasing cost", Operations
     Research 16, 682-687 (1968).
     """
-    ranking = rank(problem, k, time_limit)
+    with interruptible():
+        ranking = rank(problem, k, time_limit)
     return ranking.solutions
 
 

@@ -67,3 +67,20 @@ def test_an_infeasible_answer_is_caught(registered):
     assoc.solvers.register("all", LastParameters, everything)
     with pytest.raises(InfeasibleError, match="does not use every measurement exactly once"):
         assoc.assign(PROBLEM, "all")
+
+
+def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():
+    def disturbed(packing, parameters, run):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    def broken(packing, parameters, run):
+        raise SystemError("something else")
+
+    problem = assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1])
+    for solve, error in ((disturbed, KeyboardInterrupt), (broken, SystemError)):
+        registry.register("interrupted", LastParameters, solve)
+        try:
+            with pytest.raises(error):
+                assoc.assign(problem, "interrupted")
+        finally:
+            del registry._REGISTERED["interrupted"]
