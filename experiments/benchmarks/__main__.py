@@ -38,6 +38,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="keep the rows of what is not run now (with --solvers: of the other solvers) from the CSV",
     )
+    parser.add_argument("--remark", metavar="TEXT", help="what readers of the report should know of its rows")
     parser.add_argument(
         "--report-only", action="store_true", help="run nothing, write the report from the CSV"
     )
@@ -65,7 +66,7 @@ def main(argv: list[str] | None = None) -> int:
     def write(minutes: float | None) -> None:
         command = "make bench-quick" if options.quick else "make bench"
         storage.save(table, rows)
-        report.write_text(reporting.render(rows, minutes, command), encoding="utf-8")
+        report.write_text(reporting.render(rows, minutes, command, options.remark), encoding="utf-8")
 
     rows: list[Row] = []
     if options.report_only:

@@ -42,7 +42,7 @@ over instances of the fastest peer's time to a proven optimum divided by this so
 the reference in every run."""
 
 
-def render(rows: Sequence[Row], minutes: float | None, command: str) -> str:
+def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str | None = None) -> str:
     """Return the report.
 
     Parameters
@@ -53,8 +53,12 @@ def render(rows: Sequence[Row], minutes: float | None, command: str) -> str:
         How long the run took.
     command : str
         How to repeat it.
+    remark : str, optional
+        What readers should know of these rows.
     """
     parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW]
+    if remark:
+        parts += ["", f"**These rows**: {remark}"]
     missing = _missing(rows)
     if missing:
         parts += ["", f"**Not in these rows** (not run): {missing}."]

@@ -143,3 +143,8 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
     rows.save(path, [ROW, PEER])
     assert main(["--report-only", "--csv", str(path)]) == 0
     assert "## gated" in (tmp_path / "b.md").read_text()
+
+
+def test_report_says_what_its_reader_should_know() -> None:
+    assert "**These rows**: two runs." in report.render([ROW, PEER], None, "make bench", "two runs.")
+    assert "These rows" not in report.render([ROW, PEER], None, "make bench")
