@@ -46,11 +46,15 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     with os.fdopen(handle, "wb") as file:
         pickle.dump(task, file, pickle.HIGHEST_PROTOCOL)
     executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path,))
+    # all at once at the start: the executor loses count when one dies while it starts another on demand
+    executor._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]
     try:
-        waiting: list[Future[Any]] = [executor.submit(_run, item) for item in items]
+        waiting = _submit(executor, items)
         for future in waiting:
             yield future.result()
     except BrokenProcessPool:
+        # those that the executor did not know yet when one died
+        _end(before)
         raise LimitExceededError(
             "a worker process died: it was killed, ran out of memory, or could not start (a script that uses several "
             'processes must guard its start by if __name__ == "__main__"); fewer processes take less memory'
@@ -58,12 +62,26 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     except BaseException:
         # interrupted, or one item failed: nobody wants the rest, which may take long
         executor.shutdown(wait=False, cancel_futures=True)
-        for child in set(multiprocessing.active_children()) - before:
-            child.terminate()
+        _end(before)
         raise
     finally:
         executor.shutdown()
         os.unlink(path)
+
+
+def _submit(executor: ProcessPoolExecutor, items: Sequence[Any]) -> list[Future[Any]]:
+    """Hand in all items, which starts the processes."""
+    try:
+        return [executor.submit(_run, item) for item in items]
+    except OSError as error:
+        # the system has no room for a process; or one died, and the queue was closed while another was started
+        raise BrokenProcessPool(str(error)) from error
+
+
+def _end(before: set[multiprocessing.process.BaseProcess]) -> None:
+    """End all processes that were started since; a second signal does the ended no harm."""
+    for child in set(multiprocessing.active_children()) - before:
+        child.terminate()
 
 
 def _start(path: str) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._interrupts import interruptible
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.solution import Solution
@@ -250,6 +251,7 @@ class Association:
         return f"<p>{lines}</p>{table(headers, cells, numbers=numbers)}{more}"
 
 
+@interruptible()
 def associate(
     scene: Scene,
     solver: str = "exact",

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._interrupts import interruptible
 from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates, make_gates
@@ -24,6 +25,7 @@ GATE_PROBABILITY = 0.999
 """Default share of true tuples that each chi-square gate lets through."""
 
 
+@interruptible()
 def build_problem(
     scene: Scene,
     scan: int | Scan,

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc._interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.bounds import certified_bound, dual_bound
 from assoc.solvers.packing import Prepared, prepare
-from assoc.solvers.run import Callback, Outcome, Run, interruptible
+from assoc.solvers.run import Callback, Outcome, Run
 
 
 def assign(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._interrupts import interruptible
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
@@ -23,7 +24,7 @@ from assoc.solvers.complete import Complete, complete
 from assoc.solvers.deepening import Deepening
 from assoc.solvers.front import _limit, assign
 from assoc.solvers.planar import rank_planar
-from assoc.solvers.run import Run, interruptible
+from assoc.solvers.run import Run
 
 # seconds of a greedy solution for each tuple
 _GREEDY = 3e-7

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._interrupts import interruptible
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.complete import Complete
@@ -61,6 +62,7 @@ class Marginals:
         return frame[frame["upper"] > 0.0].reset_index(drop=True)
 
 
+@interruptible()
 def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
     """Return the association probability of every tuple, from the k best solutions.
 

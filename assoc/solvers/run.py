@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -18,20 +17,6 @@ if TYPE_CHECKING:
     from assoc.solvers.packing import Packing
 
 Callback = Callable[[TracePoint], object]
-
-
-@contextlib.contextmanager
-def interruptible() -> Iterator[None]:
-    """Let Ctrl-C be a KeyboardInterrupt where it comes while a kernel's arguments or results are converted.
-
-    Python then sees a function that returns a result and has an exception set, and says SystemError.
-    """
-    try:
-        yield
-    except SystemError as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):
-            raise error.__cause__ from None
-        raise
 
 
 @dataclass(slots=True)

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from assoc._files import Field, load_npz, save_npz
+from assoc._interrupts import interruptible
 from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances, single_positions
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.track_scores import score_terms
@@ -213,7 +214,8 @@ class Tracker(ABC):
         if dt > 0:
             # a running mean that forgets: scans may change their pace
             self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
-        step = self._step(when, checked, stamps)
+        with interruptible():
+            step = self._step(when, checked, stamps)
         self._time = when
         self._scan += 1
         return step

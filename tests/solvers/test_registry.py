@@ -71,7 +71,10 @@ def test_an_infeasible_answer_is_caught(registered):
 
 def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():
     def disturbed(packing, parameters, run):
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        try:
+            raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        except SystemError as inner:
+            raise SystemError("returned a result with an exception set") from inner
 
     def broken(packing, parameters, run):
         raise SystemError("something else")

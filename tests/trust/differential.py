@@ -33,6 +33,7 @@ Way = Callable[[AssignmentProblem], list[Solution]]
 
 _SLOW = 5.0  # seconds; problems of this size take milliseconds, but first calls compile
 _FIRST_CALLS = 20
+_PROGRESS = 60.0  # seconds between two lines that say how far one is
 
 
 def _by(solver: str, **parameters: object) -> Way:
@@ -188,7 +189,7 @@ def main(arguments: list[str] | None = None) -> int:
     names = chosen.ways.split(",")
     kinds: Counter[str] = Counter()
     shapes: Counter[str] = Counter()
-    started = time.perf_counter()
+    started = said = time.perf_counter()
     for number in range(chosen.start, chosen.start + chosen.count):
         case = draw(chosen.seed, number)
         shapes[case.structure] += 1
@@ -202,6 +203,10 @@ def main(arguments: list[str] | None = None) -> int:
             kinds[kind] += 1
             if kinds[kind] <= chosen.show:
                 print(f"seed {chosen.seed} number {number} ({case.structure}, {case.temper}): {line}", flush=True)
+        if time.perf_counter() - said > _PROGRESS:
+            said = time.perf_counter()
+            done, faulty = number + 1 - chosen.start, sum(kinds.values())
+            print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults", flush=True)
     print(
         f"{chosen.count} problems, {chosen.count * len(names)} answers, {time.perf_counter() - started:.0f} s:"
         f" {sum(kinds.values())} faults"

@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -168,3 +169,29 @@ def test_a_worker_that_dies_is_an_error_of_the_library():
 
     with pytest.raises(LimitExceededError, match="worker process died"):
         list(ordered_map(os._exit, [1, 1], 2))
+
+
+def test_a_worker_that_dies_while_another_is_started(monkeypatch):
+    """The executor on its own then waits without end, or says that a handle is closed."""
+    from assoc import _workers
+
+    class Slow(_workers.ProcessPoolExecutor):
+        def _spawn_process(self):
+            if self._processes:
+                os.kill(next(iter(self._processes)), signal.SIGKILL)
+                time.sleep(1.0)
+            super()._spawn_process()
+
+    said = []
+
+    def work():
+        try:
+            list(_workers.ordered_map(abs, [1, 2], 2))
+        except LimitExceededError as error:
+            said.append(str(error))
+
+    monkeypatch.setattr(_workers, "ProcessPoolExecutor", Slow)
+    worker = threading.Thread(target=work, daemon=True)
+    worker.start()
+    worker.join(30.0)
+    assert not worker.is_alive() and "worker process died" in said[0]

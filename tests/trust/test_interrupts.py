@@ -30,13 +30,16 @@ for name in sys.argv[1].split(","):
     def interrupt():
         sent.append(time.process_time())
         os.kill(os.getpid(), signal.SIGINT)
-    timer = threading.Timer(0.5, interrupt)
-    timer.start()
-    try:
-        ways[name](30.0)
-        late[name] = None
-    except KeyboardInterrupt:
-        late[name] = time.process_time() - sent[0]
+    late[name] = None
+    # Python drops an interrupt that comes in a destructor (while a kernel is compiled, say): once more then
+    for attempt in range(3):
+        timer = threading.Timer(0.5, interrupt)
+        timer.start()
+        try:
+            ways[name](15.0)
+        except KeyboardInterrupt:
+            late[name] = time.process_time() - sent[-1]
+            break
 print(json.dumps(late), flush=True)
 # a MIP that was left behind may still be at work
 os._exit(0)

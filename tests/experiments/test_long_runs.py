@@ -1,0 +1,55 @@
+"""Does the watch of long runs see what it watches for?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments import long_runs
+
+
+def watched(monkeypatch, seconds=lambda place: 1.0, unchanging=lambda place: 1.0):
+    """Return a watch of a hundred looks, with the times of a step and of the unchanging work by the look's number."""
+    monkeypatch.setattr(long_runs.gc, "collect", lambda: 0)
+    watch = long_runs.Watch()
+    for place in range(100):
+        watch.look(place + 1, seconds(place), unchanging(place))
+    return watch
+
+
+def held(watch, words):
+    (claim,) = [claim for claim in watch.claims("x") if words in claim.quantity]
+    return claim.holds
+
+
+def test_a_slow_machine_is_no_fault_of_ours(monkeypatch):
+    slower = watched(monkeypatch, lambda place: 1.0 + place / 50, lambda place: 1.0 + place / 50)
+    assert held(slower, "over that of unchanging work") is True
+
+
+def test_steps_that_become_slower_are_seen(monkeypatch):
+    assert held(watched(monkeypatch, lambda place: 1.0 + place / 400), "over that of unchanging work") is False
+
+
+def test_memory_that_grows_is_seen(monkeypatch):
+    watch = watched(monkeypatch)
+    assert held(watch, "resident memory") is True
+    watch.resident = [100.0 + 0.1 * place for place in range(100)]
+    assert held(watch, "resident memory") is False
+    watch.objects = list(range(0, 10_000, 100))
+    assert held(watch, "Python's objects") is False
+
+
+@pytest.mark.parametrize("kind", list(long_runs.KINDS))
+def test_a_short_run_of_each_tracker(kind):
+    claims, watch = long_runs.track(kind, 100, np.random.default_rng(1))
+    sound = {claim.quantity: claim for claim in claims}
+    assert sound[f"{kind}: least eigenvalue of a correlation matrix"].holds
+    assert sound[f"{kind}: largest asymmetry"].holds
+    assert 1.0 < sound[f"{kind}: that distance"].ours < 200.0
+    assert len(watch.steps) == 100 and min(watch.unchanging) > 0.0
+
+
+def test_a_short_run_of_the_solvers():
+    claims, watch = long_runs.solve(350, np.random.default_rng(1))
+    assert claims[-1].holds and len(watch.steps) == 116
