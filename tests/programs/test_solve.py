@@ -14,6 +14,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
+from tests.programs.terminal import shown
 
 
 def content(path):
@@ -147,23 +148,7 @@ def test_interrupt_is_clean(tmp_path, solver):
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 def test_on_a_terminal_the_table_is_drawn(scene_file):
-    main, side = os.openpty()
-    command = [sys.executable, "-m", "assoc.solve", str(scene_file), "--solver", "greedy"]
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
-    process = subprocess.Popen(command, stdout=side, stderr=side, env=environment)
-    os.close(side)
-    shown = b""
-    while True:
-        try:
-            part = os.read(main, 4096)
-        except OSError:  # Linux says so that the other side is closed
-            break
-        if not part:
-            break
-        shown += part
-    os.close(main)
-    assert process.wait(60) == 0
-    text = shown.decode()
+    text = shown(["assoc.solve", scene_file, "--solver", "greedy"])
     assert "─" in text and "associating" in text and "lower bound" in text
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from assoc.simulation import simulate
 from assoc.sweeps import load
+from tests.programs.terminal import shown
 
 GRID = ["--solver", "aco", "--grid", "mode=paper", "alpha=1,2", "rho=0.3,0.9"]
 
@@ -131,23 +132,8 @@ def test_interrupt_says_how_to_go_on(long_scene, tmp_path, jobs):
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 def test_on_a_terminal_there_is_a_rate_and_the_time_left(long_scene, tmp_path):
-    main, side = os.openpty()
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "160"}
-    words = [long_scene, *GRID, "--repeats", 4, "-o", "study"]
-    process = start(words, tmp_path, stdout=subprocess.DEVNULL, stderr=side, env=environment)
-    os.close(side)
-    shown = b""
-    while True:
-        try:
-            part = os.read(main, 4096)
-        except OSError:  # Linux says so that the other side is closed
-            break
-        if not part:
-            break
-        shown += part
-    os.close(main)
-    assert process.wait(60) == 0
-    text = shown.decode()
+    words = ["assoc.sweep", long_scene, *GRID, "--repeats", 4, "-o", "study"]
+    text = shown(words, only_errors=True, cwd=tmp_path)
     assert "/640" in text and "runs/s" in text and "left" in text
 
 
