@@ -12,9 +12,18 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from assoc import _memory
 from assoc.errors import LimitExceededError
 
+# bytes of a process with numpy, scipy and compiled kernels, and a small task
+_PROCESS = 100e6
+
 _task: Callable[[Any], Any] | None = None
+
+
+def require_processes(jobs: int) -> None:
+    """Refuse more processes than there is memory for."""
+    _memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
 
 
 def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[Any]:
@@ -32,13 +41,14 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     Raises
     ------
     LimitExceededError
-        A process died.
+        A process died, or there is no memory for so many.
     """
     jobs = min(jobs, len(items))
     if jobs <= 1:
         for item in items:
             yield task(item)
         return
+    require_processes(jobs)
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     # a process that dies before it has read a large task from its pipe would leave this one writing for ever

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assoc import _memory
 from assoc.errors import InvalidInputError, LimitExceededError
 
 FORMAT = "assoc.problem"
@@ -46,7 +47,8 @@ class AssignmentProblem:
     InvalidInputError
         Wrong shape, an index out of range, the all-dummy tuple, or a cost that is NaN or -inf.
     LimitExceededError
-        More measurements than there should be memory for (ten million of four sensors, say).
+        More measurements than there should be memory for (ten million of four sensors, say), or more tuples
+        than there is memory for.
 
     Notes
     -----
@@ -83,6 +85,12 @@ class AssignmentProblem:
             raise InvalidInputError(f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}")
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
+        # by columns to be checked, and what is kept, at first without and then with the singletons
+        _memory.require(
+            tuples_.size * (tuples_.itemsize + 1 + 2 * 4.0) + 40.0 * costs_.size,
+            f"tuples: {tuples_.shape[0]} of {sizes_.size} sensors",
+            "split the problem",
+        )
         alone = _check_indices(tuples_, sizes_, dummy)
         if not _finite(costs_):
             keep = _allowed(costs_)
@@ -140,15 +148,22 @@ class AssignmentProblem:
         ------
         InvalidInputError
             The tensor has no dimension, an empty dummy dimension, NaN or -inf.
+        LimitExceededError
+            The problem would take more memory than there is.
         """
         dense = _numbers(tensor, "tensor")
         if dense.ndim == 0:
             raise InvalidInputError("tensor: expected one dimension per sensor, got a scalar")
         if dummy and min(dense.shape) == 0:
             raise InvalidInputError(f"tensor: each dimension needs its dummy at index 0, got {dense.shape}")
+        advice = "list the allowed tuples instead"
+        _memory.require(2.0 * dense.size, f"tensor: {dense.size} elements", advice)
         keep = ~np.isposinf(dense)
         if dummy:
             keep[(0,) * dense.ndim] = False
+        count = np.count_nonzero(keep)
+        # numpy's list of indices and the stacked one; then what a problem of them takes
+        _memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
         index = np.stack(np.nonzero(keep), axis=1)
         offset = 0 if dummy else 1
         sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
@@ -160,7 +175,7 @@ class AssignmentProblem:
         Raises
         ------
         LimitExceededError
-            The tensor would have more than 2e8 elements.
+            The tensor would have more than 2e8 elements, or take more memory than there is.
         """
         shape = tuple(int(n) + (1 if self.dummy else 0) for n in self.sizes)
         elements = float(np.prod(np.array(shape, dtype=float)))
@@ -168,6 +183,9 @@ class AssignmentProblem:
             raise LimitExceededError(
                 f"a dense tensor of {elements:.3g} elements exceeds {_MAX_DENSE_ELEMENTS:.0e}: use .tuples, .costs"
             )
+        # the tensor, and indices that numpy widens
+        needed = 8.0 * elements + 32.0 * self.tuples.size
+        _memory.require(needed, f"a dense tensor of {elements:.3g} elements", "use .tuples, .costs")
         dense = np.full(shape, np.inf)
         index = self.tuples if self.dummy else self.tuples - 1
         np.minimum.at(dense, tuple(index.T), self.costs)

@@ -53,12 +53,13 @@ class Solution:
     runtime : float
         Seconds from the problem to this solution.
     stopped_by : str
-        Why the solver stopped: "gap", "iterations", "converged", "time_limit" or "callback".
+        Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", or "memory_limit": what
+        was left needed more memory than there was.
     duals : tuple of float arrays
         One multiplier per measurement of each sensor, from which the bound can be checked: with them
         every tuple's reduced cost is >= 0 up to rounding. Empty where the proof was by enumeration.
     trace : tuple of TracePoint
-        History of cost and bound.
+        History of cost and bound, thinned out beyond 100,000 points.
     parameters : mapping
         The solver's parameters.
     """

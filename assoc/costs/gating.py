@@ -67,9 +67,13 @@ def make_gates(sensors: SensorArrays, probability: float) -> Gates:
     gain = np.maximum(sensors.gain, 0.0)
     future = np.zeros(count + 1)
     future[:count] = np.cumsum(gain[::-1])[::-1]
-    eye = np.eye(count, dtype=np.bool_)
-    both = eye[:, None, :] | eye[None, :, :]
-    freedom = degrees_of_freedom(sensors, both.reshape(-1, count)).reshape(count, count)
+    # two at a time: arrays of all pairs times all sensors would be too large for thousands of sensors
+    first, second = np.triu_indices(count)
+    full = sensors.full[first] | sensors.full[second]
+    measured = sensors.dim[first] + np.where(first == second, 0, sensors.dim[second])
+    freedom = np.zeros((count, count), dtype=np.int64)
+    freedom[first, second] = np.maximum(measured - np.where(full, 3, 2), 0)
+    freedom[second, first] = freedom[first, second]
     # a tuple with these two costs at least chi / 2 + base - all gains that it can have
     most = gain.sum() - (gain - sensors.gain)[:, None] - (gain - sensors.gain)[None, :] - sensors.base
     return Gates(joint, np.minimum(joint[freedom], 2.0 * np.maximum(most, 0.0) + SLACK), future)

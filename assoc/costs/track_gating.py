@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 
 from assoc._compiled import njit
+from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
 from assoc.filters.measurement import Measurement
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+MOST_PAIRS = 20_000_000
+"""The most pairs of tracks and measurements: more would only mean that the tracks know nothing."""
 
 _TURN = 2.0 * math.pi
 
@@ -34,11 +38,23 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
     -------
     track, measurement : int arrays (K,)
         Ordered by track, then measurement.
+
+    Raises
+    ------
+    LimitExceededError
+        More than `MOST_PAIRS` pairs.
     """
     h, z = expected.mean, measurements
     if not len(h) or not len(z):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate)
+    tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate, MOST_PAIRS)
+    if len(tracks) > MOST_PAIRS:
+        # ordered by track: what is left would go on like this
+        expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
+        raise LimitExceededError(
+            f"about {expected_pairs:.3g} pairs of {len(h)} tracks and {len(z)} measurements in their gates, at most "
+            f"{MOST_PAIRS} are looked at; lower gate_probability, or end uncertain tracks sooner"
+        )
     return tracks, found
 
 
@@ -48,8 +64,8 @@ def _turning(angular: tuple[bool, ...]) -> Array:
 
 
 @njit
-def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float) -> Any:
-    """Pairs whose components are all within reach; the measurements are sorted by one component."""
+def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int) -> Any:
+    """Pairs whose components are all within reach, no more than one above ``most``; sorted by one component."""
     num, dim = h.shape
     reach = np.empty((num, dim))
     for t in range(num):
@@ -70,7 +86,8 @@ def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float) -> Any:
         for t in range(num):
             low[t] = np.searchsorted(along, h[t, axis] - reach[t, axis], side="left")
             high[t] = np.searchsorted(along, h[t, axis] + reach[t, axis], side="right")
-    tracks = np.empty((high - low).sum(), np.int64)
+    # in a wide gate there are many more than are within reach
+    tracks = np.empty(min((high - low).sum(), 64 + 8 * num), np.int64)
     found = np.empty(tracks.size, np.int64)
     count = 0
     for t in range(num):
@@ -86,9 +103,14 @@ def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float) -> Any:
                     inside = False
                     break
             if inside:
+                if count == tracks.size:
+                    tracks = np.concatenate((tracks, np.empty(count, np.int64)))
+                    found = np.concatenate((found, np.empty(count, np.int64)))
                 tracks[count] = t
                 found[count] = order[k]
                 count += 1
+                if count > most:
+                    return tracks[:count].copy(), found[:count].copy()
         found[first:count] = np.sort(found[first:count])
     return tracks[:count].copy(), found[:count].copy()
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from assoc import _memory
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.guard import MAX_TUPLES
 from assoc.costs.track_gating import angular_components, near_pairs, within
@@ -62,11 +63,24 @@ def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: M
     return _corrected(filter, states, measurements, sensor, gate, track, found)
 
 
+def require_states(states: Any, count: int) -> None:
+    """Refuse to correct more tracks than there is memory for."""
+    own = [value for value in vars(states).values() if isinstance(value, np.ndarray)] if len(states) else []
+    each = sum(array.nbytes for array in own) / max(len(states), 1)
+    # picked, corrected, and what a filter needs in between
+    _memory.require(
+        4.0 * each * count,
+        f"{count} pairs of {len(states)} tracks and measurements",
+        "lower gate_probability, or end uncertain tracks sooner",
+    )
+
+
 def _corrected(
     filter: Filter[Any], states: Any, measurements: Array, sensor: Measurement, gate: float, track: Array, found: Array
 ) -> TrackPairs:
     if not len(track):
         return TrackPairs(track, found, np.zeros(0), states[track])
+    require_states(states, len(track))
     done = filter.update(states[track], np.ascontiguousarray(measurements[found]), sensor)
     inside = done.nis <= gate
     if inside.all():

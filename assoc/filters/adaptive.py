@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from assoc import _memory
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update
 from assoc.filters.inference import FuzzyRules, FuzzyVariable
@@ -227,6 +228,10 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         """Begin with q = 1 and no innovations."""
         state = self._ekf.start(state)
         B = len(state)
+        # innovations of up to three components and turns, those of the last step and those of this one
+        _memory.require(
+            8.0 * 2 * 4 * B * self.window, f"window = {self.window}: innovations of {B} targets", "shorten the window"
+        )
         return Adaptive(
             state.mean, state.covariance, state.covariance, np.zeros((1, *state.covariance.shape[1:])),
             np.zeros((B, self.window, 0)), np.zeros((B, self.window)), np.ones((B, self.motion.dim)),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc import _memory
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
 from assoc.filters.kernels import GOOD
@@ -88,6 +89,8 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         """Draw ensembles from Gaussians."""
         check_dimension(state, self.motion.dim)
         B, n = state.mean.shape
+        # the members, their noise, and the next ones
+        _memory.require(24.0 * B * n * self.size, f"size = {self.size}: {B} ensembles", "take fewer members")
         factors = np.linalg.cholesky(state.covariance)
         shocks = self.rng.standard_normal((B, self.size, n))
         return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))

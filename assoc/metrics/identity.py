@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import check_cutoff, distances
@@ -143,13 +145,21 @@ def _idf1(together: dict[tuple[int, int], int], targets: int, tracks: int) -> fl
         return float("nan")
     if not together:
         return 0.0
-    rows = {key: i for i, key in enumerate(sorted({target for target, _ in together}))}
-    columns = {key: j for j, key in enumerate(sorted({track for _, track in together}))}
-    count = np.zeros((len(rows), len(columns)))
-    for (target, track), times in together.items():
-        count[rows[target], columns[track]] = times
-    agreed = count[linear_sum_assignment(-count)].sum()
-    return float(2.0 * agreed / (targets + tracks))
+    pairs = np.array(list(together), dtype=np.int64)
+    rows, columns = (np.unique(side, return_inverse=True)[1] for side in pairs.T)
+    times = np.array(list(together.values()), dtype=np.float64)
+    # over weeks there are many identities, each of which met only few others: one matrix of all would be too large
+    nodes = int(rows.max()) + 1 + int(columns.max()) + 1
+    graph = coo_array((np.ones(len(times), np.int8), (rows, int(rows.max()) + 1 + columns)), shape=(nodes, nodes))
+    label = connected_components(graph, directed=False)[1][rows]
+    order = np.argsort(label, kind="stable")
+    agreed = 0.0
+    for group in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
+        own = [np.unique(side[group], return_inverse=True) for side in (rows, columns)]
+        count = np.zeros((len(own[0][0]), len(own[1][0])))
+        count[own[0][1], own[1][1]] = times[group]
+        agreed += float(count[linear_sum_assignment(-count)].sum())
+    return 2.0 * agreed / (targets + tracks)
 
 
 def label_switches(sources: Array, labels: Array) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
+from assoc import _memory
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
 
@@ -92,6 +93,10 @@ def distances(x: Array, y: Array) -> Array:
     """All distances (m, n) between two sets of points, of which either may be empty."""
     if not len(x) or not len(y):
         return np.zeros((len(x), len(y)))
+    # the distances, their powers, and the assignment's own copies
+    _memory.require(
+        40.0 * len(x) * len(y), f"all distances of {len(x)} and {len(y)} points", "compare fewer points at a time"
+    )
     between: Array = cdist(x, y)
     return between
 

@@ -13,11 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from assoc import _memory
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array
 from assoc.simulation.dubins_kernels import SENSES, WORDS, advance, distance, pieces, turn
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+# bytes of a sample, measured
+_SAMPLE = 500
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,9 @@ class Path:
             if not (math.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} must be a number above 0, got {value!r}")
         duration = self.length / speed
+        _memory.require(
+            _SAMPLE * duration / interval, f"{duration / interval:.3g} samples of a path", "lengthen the interval"
+        )
         times = np.arange(0.0, duration, interval)
         if not len(times) or duration - times[-1] > 1e-9 * duration:
             times = np.append(times, duration)

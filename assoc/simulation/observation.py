@@ -8,6 +8,7 @@ import numpy as np
 
 from assoc.scene import Scene, Truth
 from assoc.sensors.base import Array, Sensor, wrap_angle
+from assoc.simulation.room import require_room
 
 
 def observe(
@@ -43,7 +44,15 @@ def observe(
     -------
     Scene
         With truth: ids, positions, and the source of each measurement.
+
+    Raises
+    ------
+    LimitExceededError
+        The scene would take more memory than there is.
     """
+    rate = max((float(sensor.false_alarm_rate) for sensor in sensors), default=0.0)
+    present = max((len(ids) for ids in target_ids), default=0)
+    require_room(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
     measurements: list[list[Array]] = []
     sources: list[list[Array]] = []
     for ids, places in zip(target_ids, positions, strict=True):

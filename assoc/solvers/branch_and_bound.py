@@ -49,8 +49,13 @@ class Search:
 
     @property
     def done(self) -> bool:
-        """Whether nothing is left to search: the incumbent is optimal to within the tolerance."""
+        """Whether nothing is left to search: the incumbent is optimal to within the tolerance, or memory is short."""
         return self._open.count == 0
+
+    @property
+    def out_of_memory(self) -> bool:
+        """Whether nodes were given up that could hold something better."""
+        return self._open.given_up < self.weight - self.tolerance
 
     @property
     def lower_bound(self) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc import _memory
 from assoc._compiled import njit
 from assoc.solvers.local_search import _improve, penalised
 from assoc.solvers.max_min_ants import random_cover
@@ -32,6 +33,12 @@ class Breeding:
 
     def __init__(self, part: Part, parameters: GeneticParameters) -> None:
         self.parameters = parameters
+        # the members in a list, and again as an array
+        _memory.require(
+            8.0 * parameters.population * part.packing.num_rows,
+            f"population = {parameters.population} on {part.packing.num_rows} measurements",
+            "take a smaller population",
+        )
         self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
         self.members = np.empty((0, part.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)

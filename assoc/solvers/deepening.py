@@ -178,6 +178,8 @@ class Deepening:
         while not ranking.done and not self._run.should_stop():
             ranking.run(turn)
         self._nodes += ranking.nodes
+        if ranking.out_of_memory:
+            self._run.stopped_by = self._run.stopped_by or "memory_limit"
         first = int(packing.col_start[c])
         found, chosen = ranking.solutions()
         lists.weights[c] = found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.errors import InfeasibleError
+from assoc.errors import InfeasibleError, LimitExceededError
 from assoc.solvers.bounds import dual_bound
 from assoc.solvers.branch_and_bound import Search
 from assoc.solvers.packing import Packing
@@ -23,6 +23,8 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
         while search.columns is None and not search.done and not run.should_stop():
             search.run(20)
         if search.columns is None:
+            if search.out_of_memory:
+                raise LimitExceededError("no memory to find out whether there is a solution; split the problem")
             return None
         chosen.append(part.origin[search.columns])
     return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)

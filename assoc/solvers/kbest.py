@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc import _memory
 from assoc._interrupts import interruptible
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
@@ -28,6 +29,8 @@ from assoc.solvers.run import Run
 
 # seconds of a greedy solution for each tuple
 _GREEDY = 3e-7
+# bytes of a solution and for each measurement in it: in the search's stores while they grow, and as an answer
+_SOLUTION, _MEASUREMENT = 2_000, 130
 
 
 def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None) -> list[Solution]:
@@ -38,7 +41,8 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     problem : AssignmentProblem
         What to solve; any number of sensors, with or without dummies.
     k : int
-        How many; if the problem has fewer solutions, all of them are returned.
+        How many; if the problem has fewer solutions, all of them are returned. If there is memory for fewer (some
+        2 kB and 150 bytes for each measurement of the problem), so many are, and ``stopped_by`` says "memory_limit".
     time_limit : float, optional
         Seconds. When they are over, the list is cut after the last rank that is proved. If not even the
         best is, the best solution known is returned alone; its ``status`` is then "feasible".
@@ -98,11 +102,15 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     k = checked_k(k)
     run = Run(0, time_limit=within(problem, time_limit), started=started)
+    each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
+    most = _memory.at_most(k, each)
     if problem.num_sensors == 2:
-        columns, found = rank_planar(problem, k, run)
+        columns, found = rank_planar(problem, most, run)
     else:
         columns = complete(problem, run)
-        found = Deepening(columns, k, run).run()
+        found = Deepening(columns, most, run).run()
+    if len(found.chosen) == most < k and found.rest < np.inf:
+        run.stopped_by = run.stopped_by or "memory_limit"
     # weights are differences of costs: what they lose to rounding is taken off the bounds
     rounding = 8.0 * float(
         np.finfo(float).eps

@@ -17,6 +17,7 @@ behind in a thread of its own.
 
 from __future__ import annotations
 
+import atexit
 import datetime
 import math
 import threading
@@ -27,6 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc import _memory
 from assoc.solvers.run import Outcome, Parameters, Run
 
 if TYPE_CHECKING:
@@ -39,6 +41,10 @@ _LARGEST_COST = 7  # costs for the float backends are below 2^7
 _ROUNDING = 1e-7
 # CP-SAT's sums must stay below 2^63, and its presolve, which substitutes equations, needs room for some more
 _LARGEST_SUM = 57
+# bytes for each tuple of three sensors, measured on 1e5 tuples (docs/reliability.md)
+_MODEL = {"scip": 7_000.0, "cp_sat": 6_000.0, "highs": 2_300.0}
+# seconds that CP-SAT is given to stop when Python ends
+_FAREWELL = 10.0
 # seconds that a model takes for each entry of its matrix, at the least (measured: 1.3e-6 and 2.8e-6)
 _ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
 
@@ -90,6 +96,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         if packing.is_axial:
             raise infeasible(packing)
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
+    _require_memory(packing, parameters)
     bound, duals = -math.inf, None
     columns: NDArray[np.integer] | None = None
     if run.time_limit is None:
@@ -115,6 +122,19 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     return Outcome(columns, answer.nodes, bound, duals)
 
 
+def _require_memory(packing: Packing, parameters: MilpParameters) -> None:
+    """Refuse a model that would take more memory than there is."""
+    workers = parameters.workers if parameters.backend == "cp_sat" else 1
+    # with each worker come a stack and a copy of the model
+    needed = _MODEL[parameters.backend] * packing.num_columns * (1.0 + 0.5 * (workers - 1)) + 10e6 * (workers - 1)
+    _memory.require(
+        needed,
+        f"milp: backend {parameters.backend} on {packing.num_columns} tuples"
+        + (f" with workers = {workers}" if workers > 1 else ""),
+        "take fewer workers" if workers > 1 else "take solver exact, which needs less",
+    )
+
+
 class _Stop:
     """What ends a backend that is at work in another thread."""
 
@@ -132,6 +152,26 @@ class _Stop:
         self._over = True
         if self._stop is not None:
             self._stop()
+
+
+_left: list[threading.Thread] = []
+
+
+def _leave(thread: threading.Thread) -> None:
+    """Leave a thread behind that was told to stop; when Python ends, it is given some seconds to do so.
+
+    CP-SAT would take the whole process with it (SIGABRT, whatever the program's exit code was to be).
+    """
+    if not _left:
+        # registered once more where all have ended: that does no harm
+        atexit.register(_take_leave)
+    _left[:] = [one for one in _left if one.is_alive()]
+    _left.append(thread)
+
+
+def _take_leave() -> None:
+    for one in _left:
+        one.join(_FAREWELL)
 
 
 def _backend(packing: Packing, parameters: MilpParameters, seconds: float, stop: _Stop) -> _Answer:
@@ -167,6 +207,8 @@ def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
     thread.join(max(run.remaining(), 0.0))
     if not answers:
         stop()
+        if parameters.backend == "cp_sat":
+            _leave(thread)
         run.stopped_by = run.stopped_by or "time_limit"
         return nothing
     if isinstance(answers[0], BaseException):

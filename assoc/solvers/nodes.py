@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc import _memory
 from assoc._compiled import njit
 from assoc.solvers.packing import Packing
 
@@ -35,6 +36,8 @@ class OpenNodes:
         No solution of the node weighs less.
     count : int
         Number of open nodes.
+    given_up : float
+        No solution of the nodes that were given up for want of memory weighs less; ``inf``: none was.
     """
 
     def __init__(self, packing: Packing, duals: Floats) -> None:
@@ -50,11 +53,12 @@ class OpenNodes:
         self.duals[0] = duals
         self.slack[0] = packing.slack
         self.count = 1
+        self.given_up = math.inf
 
     @property
     def least_bound(self) -> float:
-        """No solution of any open node weighs less; ``inf`` where none is open."""
-        return float(self.bound[: self.count].min()) if self.count else math.inf
+        """No solution of any node that is open or was given up weighs less; ``inf`` where there is none."""
+        return min(self.given_up, float(self.bound[: self.count].min()) if self.count else math.inf)
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -62,7 +66,17 @@ class OpenNodes:
         return self.arena, self.first, self.size, self.duals, self.slack, self.bound
 
     def grow(self) -> None:
-        """Double the room."""
+        """Double the room; where there is no memory for that, give up the deepest node and keep its bound.
+
+        The search is depth first: its nodes are few, but on problems of a million columns each is large, and it may
+        go down for hours. Without the deepest node it goes on, beside and above that, in the memory that it has.
+        """
+        grown = sum(array.nbytes for array in self.arrays)
+        # the old arrays beside the new ones
+        if not _memory.fits(3.0 * grown):
+            self.count -= 1
+            self.given_up = min(self.given_up, float(self.bound[self.count]))
+            return
         self.arena = np.concatenate([self.arena, np.empty_like(self.arena)])
         self.first, self.size, self.duals, self.slack, self.bound = (
             np.concatenate([a, np.zeros_like(a)]) for a in (self.first, self.size, self.duals, self.slack, self.bound)

@@ -73,6 +73,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     weight, bound = reduction.closed_weight, reduction.closed_bound
     _record(run, nodes, weight, bound, settled + tasks)
     tasks = settled + _improve(tasks, patience, run)
+    short = False
     while tasks:
         task = tasks.pop(0)
         part = task.part
@@ -103,15 +104,16 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             if better:
                 _record(run, nodes, weight, bound, [task, *tasks])
         if part.best is None:
-            if task.search is not None and task.search.done:
+            if task.search is not None and task.search.done and not task.search.out_of_memory:
                 raise infeasible(part.packing)
             complete(part, run)
         assert part.best is not None
+        short = short or (task.search is not None and task.search.out_of_memory)
         columns.append(part.origin[chosen_columns(part.packing.cols, part.best)])
         weight += part.weight
         bound += task.bound
-    if nodes >= node_limit and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
-        run.stopped_by = "iterations"
+    if (short or nodes >= node_limit) and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
+        run.stopped_by = "memory_limit" if short else "iterations"
     _record(run, nodes, weight, bound, [])
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     return Outcome(chosen, nodes, bound, None if parts else reduction.proof)

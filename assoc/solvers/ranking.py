@@ -62,6 +62,11 @@ class ComponentRanking:
         return self._open.count == 0
 
     @property
+    def out_of_memory(self) -> bool:
+        """Whether nodes were given up that could hold one of the k lightest."""
+        return self._open.given_up < float(cut_of(self._store, self._k, self._limit, self._tolerance))
+
+    @property
     def proven(self) -> float:
         """Every solution that was not found weighs at least this."""
         cut = float(cut_of(self._store, self._k, self._limit, self._tolerance))

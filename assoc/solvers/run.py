@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Callback = Callable[[TracePoint], object]
 
+# points of a trace at the most
+_TRACE = 100_000
+
 
 @dataclass(slots=True)
 class Run:
@@ -76,6 +79,9 @@ class Run:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""
         point = TracePoint(iteration, self.elapsed(), weight + self.offset, bound + self.offset)
         self.trace.append(point)
+        if len(self.trace) > _TRACE:
+            # a search that improves for days: every second point is enough to see how, the first and last stay
+            self.trace[1:-1] = self.trace[2:-1:2]
         if self.callback is not None and self.callback(point):
             self.stopped_by = self.stopped_by or "callback"
 

@@ -12,6 +12,7 @@ from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from assoc._workers import require_processes
 from assoc.errors import InvalidInputError
 from assoc.sweeps.work import Batch, Job, Result, run_batch
 
@@ -40,6 +41,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     with _shared(job, folder) as path:
+        require_processes(jobs)
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
             with _interrupts_ignored():

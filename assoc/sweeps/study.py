@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -109,11 +108,12 @@ class Study:
     def all_runs(self) -> Iterator[RunNumbers]:
         """All runs, as (setting, source, repeat, scan): first all settings once, so that a part tells something."""
         assert self.scans is not None and isinstance(self.repeats, range)
-        for repeat, (source, scans), setting in itertools.product(
-            self.repeats, enumerate(self.scans), range(len(self.settings))
-        ):
-            for scan in scans:
-                yield setting, source, repeat, scan
+        # loops, not itertools.product, which would first write down all repeats, however many they are
+        for repeat in self.repeats:
+            for source, scans in enumerate(self.scans):
+                for setting in range(len(self.settings)):
+                    for scan in scans:
+                        yield setting, source, repeat, scan
 
     def missing(self, store: Store) -> Iterator[RunNumbers]:
         """Those runs that the store does not have."""

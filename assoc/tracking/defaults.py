@@ -15,6 +15,9 @@ PROCESS_NOISE = 30.0
 MANOEUVRE_NOISE = 50.0
 """Process noise of the manoeuvring model of `two_speeds`: turns of 5 g at a scan a second."""
 
+MOST_SCANS = 1000
+"""The most scans that a decision may be put off: every branch carries its history with it."""
+
 _QUIET = 0.1
 _CHANGE = 0.1
 

@@ -23,12 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from assoc import _memory
 from assoc.costs.track_tuples import TrackPairs
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.solvers.kbest import kbest
 from assoc.tracking.bank import Bank
+from assoc.tracking.defaults import MOST_SCANS
 from assoc.tracking.frames import look
 from assoc.tracking.saving import check_window, demand
 from assoc.tracking.track import Decision, Step, decision
@@ -48,7 +50,7 @@ class HypothesisOrientedMHT(Tracker):
     max_hypotheses : int
         m.
     depth : int
-        Scans after which a decision is final, n.
+        Scans after which a decision is final, n; at most 1000.
     hypothesis_drop : float
         A hypothesis whose log-probability is this far below the best is dropped.
     **options
@@ -64,6 +66,8 @@ class HypothesisOrientedMHT(Tracker):
         for value, what in ((depth, "depth"), (max_hypotheses, "max_hypotheses")):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise InvalidInputError(f"{what} must be a whole number above 0, got {value!r}")
+        if depth > MOST_SCANS:
+            raise InvalidInputError(f"depth must be at most {MOST_SCANS} scans, got {depth}")
         if not isinstance(hypothesis_drop, (int, float)) or not hypothesis_drop > 0:
             raise InvalidInputError(f"hypothesis_drop must be a number above 0, got {hypothesis_drop!r}")
         self.max_hypotheses, self.depth = int(max_hypotheses), int(depth)
@@ -154,6 +158,11 @@ class HypothesisOrientedMHT(Tracker):
                     heapq.heapreplace(children, entry)
                 else:
                     break
+            _memory.require(
+                len(children) * (16.0 * len(self._members[h]) + 400.0),
+                f"max_hypotheses = {self.max_hypotheses}: {len(children)} hypotheses",
+                "keep fewer",
+            )
         children.sort(key=lambda one: (-one[0], one[2], one[3].tolist()))
         best = children[0][0]
         children = [one for one in children if one[0] >= best - self.hypothesis_drop]

@@ -10,7 +10,7 @@ from assoc.costs.build import build_problem
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.track_gating import near_pairs
 from assoc.costs.track_scores import doubted_gain
-from assoc.costs.track_tuples import gate_of
+from assoc.costs.track_tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan
@@ -69,6 +69,7 @@ class StaticFusionTracker(SingleScanTracker):
             track, which = np.append(track, near[0]), np.append(which, mine[near[1]])
         order = np.lexsort((which, track))
         track, which = track[order], which[order]
+        require_states(states, len(track))
         corrected, costs = states[track], np.full(len(track), 0.0)
         nis, freedom = np.zeros(len(track)), np.zeros(len(track), dtype=np.int64)
         for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):

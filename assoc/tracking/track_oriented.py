@@ -19,10 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from assoc.costs.track_tuples import require_states
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
 from assoc.tracking.bank import Bank
+from assoc.tracking.defaults import MOST_SCANS
 from assoc.tracking.few_trees import choose
 from assoc.tracking.frames import look
 from assoc.tracking.growing import Hits, Roots, Tables, count_scan, extend
@@ -61,6 +63,8 @@ class TrackOrientedMHT(Tracker):
         for value, what in ((depth, "depth"), (max_branches, "max_branches")):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise InvalidInputError(f"{what} must be a whole number above 0, got {value!r}")
+        if depth > MOST_SCANS:
+            raise InvalidInputError(f"depth must be at most {MOST_SCANS} scans, got {depth}")
         if not isinstance(branch_drop, (int, float)) or not branch_drop > 0:
             raise InvalidInputError(f"branch_drop must be a number above 0, got {branch_drop!r}")
         self.depth, self.max_branches, self.branch_drop = int(depth), int(max_branches), float(branch_drop)
@@ -111,6 +115,7 @@ class TrackOrientedMHT(Tracker):
                 tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, frame.when), roots,
                 s, self._scan, self.max_branches, self.branch_drop,
             )  # fmt: skip
+            require_states(states, len(kept))
             states = concatenate([frame.predicted, pairs.states, begun])[kept]
             before = time
             if len(kept) > self.max_tuples:

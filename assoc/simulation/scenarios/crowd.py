@@ -13,6 +13,7 @@ from assoc.sensors.base import Array, Sensor
 from assoc.sensors.position import PositionSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radar_over
+from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 REFERENCE_TARGETS = 100
@@ -63,6 +64,8 @@ class CrowdParameters(ScenarioParameters):
 def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
+    rate = p.false_alarms_per_target * p.targets
+    require_room(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
     width = p.width * (np.sqrt(p.targets / REFERENCE_TARGETS) if p.constant_density else 1.0)
     box = np.array([[0.0, width], [0.0, width], [0.0, p.height]])
     start = rng.uniform(box[:, 0], box[:, 1], size=(p.targets, 3))

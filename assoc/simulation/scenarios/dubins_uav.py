@@ -18,6 +18,7 @@ from assoc.simulation.dubins import Path, Pose
 from assoc.simulation.dubins_obstacles import around
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 _TRIES = 200
@@ -63,6 +64,9 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
     p = parameters
     zones = no_fly_zones(p, rng)
     flights = [_flight(p, zones, rng) for _ in range(p.targets)]
+    beats = max(path.length for path in flights) / p.speed / p.interval + 1
+    names = "1/interval radars targets false_alarms"
+    require_room(beats, p.radars, p.targets, p.false_alarms, names)
     heights = rng.uniform(p.height / 3, p.height, p.targets)
     tracks = [path.sample(p.speed, p.interval)[1] for path in flights]
     scans = max(len(track) for track in tracks)

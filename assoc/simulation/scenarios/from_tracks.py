@@ -19,6 +19,7 @@ from assoc.sensors.base import Array
 from assoc.simulation.geodesy import east_north_up
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 
@@ -102,6 +103,8 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     origin = (_middle(recording.latitude), _middle(recording.longitude), 0.0)
     reports = east_north_up(recording.latitude, recording.longitude, recording.height, origin)
     times = _epochs(p, recording)
+    targets = len(np.unique(recording.target))
+    require_room(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
     ids, positions = resample(recording, reports, times, p.max_gap)
     region = around(reports, 0.01)
     diagonal = float(np.hypot(*(region[:2, 1] - region[:2, 0])))

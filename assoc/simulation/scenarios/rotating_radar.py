@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from assoc import _memory
 from assoc.errors import InvalidInputError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.sensors.base import Array
 from assoc.simulation.antenna import bearings_in_steps, in_steps, looks, slant_range_and_bearing
-from assoc.simulation.flights import Flight, random_flight
+from assoc.simulation.flights import STEP, Flight, random_flight
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 Traffic = Literal["random", "crossing", "parallel", "head-on"]
 
 BEARING_STEP = 1440 / 4095
+# bytes, measured (tests/trust/test_memory.py): of a step of one path, of a plot
+_STEP, _PLOT = 300, 250
 PARALLEL_SEPARATION = 5.0
 """Nautical miles: what air traffic control keeps between aircraft en route."""
 
@@ -101,6 +104,13 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
     from assoc.metrics.trajectories import Trajectories
 
     p = parameters
+    turns = p.duration / p.rotation
+    _memory.require(
+        _STEP * p.duration / STEP + _PLOT * turns * (p.aircraft + p.false_plots),
+        f"plots with duration = {p.duration:g}, rotation = {p.rotation:g}, aircraft = {p.aircraft}, "
+        f"false_plots = {p.false_plots:g}",
+        "shorten the recording, or lower the number of plots",
+    )
     flights = _random_traffic(p, rng) if p.traffic == "random" else _pair(p, rng)
     codes = rng.choice(np.arange(1, 4096), len(flights), replace=False)
     seen = [_seen(p, flight) for flight in flights]
@@ -115,7 +125,6 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
     wrong = rng.random(hit.sum()) < p.garbled
     level[wrong] = rng.choice(GARBLED_CODES, int(wrong.sum()))
 
-    turns = p.duration / p.rotation
     count = int(rng.poisson(p.false_plots * turns))
     false_turn = rng.uniform(0.0, turns, count)
     columns = [

@@ -16,6 +16,7 @@ from assoc.scene import Scene
 from assoc.sensors.base import Array
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 
@@ -67,6 +68,8 @@ REFERENCE_RANGE = 50_000.0
 
 def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
+    p = parameters
+    require_room(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
     times = parameters.interval * np.arange(parameters.scans)
     paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
     region = around(paths, parameters.margin)

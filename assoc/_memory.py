@@ -1,0 +1,161 @@
+"""How much memory there is, and a refusal in one line of work that would take more.
+
+The limit is what the process can still have: what the machine has left, what its control group (a container) has
+left, and what is left of its address space (``ulimit -v``), whichever is least. A constant would be too small for a
+server and too large for a laptop. Where the system does not say, nothing is refused.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from assoc.errors import LimitExceededError
+
+# less than this is not worth asking the system for
+_SMALL = 64 * 1024**2
+# the kernel's way of saying that a control group has no limit
+_ENDLESS = 1 << 60
+# what remains for everything that no estimate knows of
+_SHARE = 0.9
+
+
+def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
+    """Refuse work that would take more memory than there is.
+
+    Parameters
+    ----------
+    needed : float
+        Bytes at the peak.
+    what : str
+        What they are for, naming the argument that causes it; the message begins with it.
+    advice : str
+        What to change.
+    own : bool
+        Whether this process takes it, whose address space may be limited, and not others.
+
+    Raises
+    ------
+    LimitExceededError
+        There is less.
+    """
+    if needed <= _SMALL:
+        return
+    free = available(own)
+    if not needed <= free:
+        raise LimitExceededError(
+            f"{what} would take about {in_words(needed)} of memory, {in_words(free)} are available; {advice}"
+        )
+
+
+def fits(needed: float) -> bool:
+    """Whether there is memory for so many bytes more: for searches that grow, and can do without."""
+    return needed <= _SMALL or needed <= available()
+
+
+def at_most(count: int, each: float) -> int:
+    """How many of ``count`` things of ``each`` bytes there is memory for; at least one."""
+    if count * each <= _SMALL:
+        return count
+    return min(count, int(max(1.0, min(available() / each, 2.0**31))))
+
+
+def available(own: bool = True) -> float:
+    """Bytes that this process (or others that it starts) may still take; infinite where the system does not say."""
+    return _SHARE * max(min(_of_machine(), _of_group(), _of_address_space() if own else math.inf), 0.0)
+
+
+def in_words(count: float) -> str:
+    """Bytes for a message: 3.2 GB."""
+    if not count < 1e18:
+        return "more than 1e18 bytes"
+    for unit, size in (("TB", 1e12), ("GB", 1e9)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count / 1e6:.0f} MB"
+
+
+def _of_machine() -> float:
+    try:
+        with open("/proc/meminfo", "rb") as file:
+            for line in file:
+                if line.startswith(b"MemAvailable:"):
+                    return 1024.0 * int(line.split()[1])
+    except (OSError, ValueError, IndexError):
+        pass
+    try:
+        # not what is free, but no more than this can be
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return math.inf
+
+
+def _of_group() -> float:
+    return min(_left_in_groups(), default=math.inf)
+
+
+def _left_in_groups() -> Iterator[float]:
+    """What is left in the control group of this process and in those that it is part of."""
+    for root, path, limit, usage, cache in _groups():
+        folder = root + path
+        while True:
+            most = _number(f"{folder}/{limit}")
+            used = _number(f"{folder}/{usage}")
+            if most is not None and used is not None and most < _ENDLESS:
+                yield most - used + _reclaimable(f"{folder}/memory.stat", cache)
+            if len(folder) <= len(root):
+                break
+            folder = folder.rpartition("/")[0]
+
+
+def _groups() -> Iterator[tuple[str, str, str, str, bytes]]:
+    """Folder of the hierarchy, path within, names of limit and usage, and of the cache that can be given back."""
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, _, rest = line.partition(":")
+        names, _, path = rest.partition(":")
+        path = path.rstrip("/")
+        if not names:
+            yield "/sys/fs/cgroup", path, "memory.max", "memory.current", b"inactive_file"
+        elif "memory" in names.split(","):
+            yield (
+                "/sys/fs/cgroup/memory", path, "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file",
+            )  # fmt: skip
+
+
+def _number(path: str) -> float | None:
+    try:
+        return float(Path(path).read_bytes())
+    except (OSError, ValueError):  # no such file, or "max"
+        return None
+
+
+def _reclaimable(path: str, name: bytes) -> float:
+    try:
+        for line in Path(path).read_bytes().splitlines():
+            key, _, value = line.partition(b" ")
+            if key == name:
+                return float(value)
+    except (OSError, ValueError):
+        pass
+    return 0.0
+
+
+def _of_address_space() -> float:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return math.inf
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return math.inf
+    try:
+        pages = int(Path("/proc/self/statm").read_bytes().split()[0])
+    except (OSError, ValueError, IndexError):
+        return float(limit)
+    return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
