@@ -160,7 +160,7 @@ def test_repeats_are_not_written_down() -> None:
 
 
 def test_wide_gates_of_many_tracks() -> None:
-    """Thousands of tracks that know nothing have too many pairs with thousands of plots; a wide gate alone is none of them."""
+    """Tracks that know nothing have too many pairs with thousands of plots; a wide gate alone is no pair."""
     many = 6_000
     wide = Expected(np.zeros((many, 2)), np.broadcast_to(np.eye(2), (many, 2, 2)).copy())
     with pytest.raises(LimitExceededError, match=r"about 3\.6e\+07 pairs of 6000 tracks and 6000 measurements"):
