@@ -41,7 +41,7 @@ docs: $(VENV)/.installed-docs
 
 fuzz: $(VENV)/.installed-test
 	$(PY) -m tests.trust.fuzzing --count 20000 --processes 2
-	$(PY) -m tests.trust.differential --count 3000
+	$(PY) -m tests.trust.differential --count 3000 --processes 2
 
 # numba keeps the kernels of one version only: they must not take the place of the others
 test-oldest: $(OLDEST)/.installed-test

@@ -1,6 +1,6 @@
 """Every way to an answer on the same random problems, against exact arithmetic and against each other.
 
-    python -m tests.trust.differential --count 5000 --seed 1 [--ways exact,aco] [--verbose]
+    python -m tests.trust.differential --count 5000 --seed 1 [--ways exact,aco] [--processes 2]
 
 prints the faults found (none, one hopes), each with the seed and number that make it again.
 """
@@ -15,12 +15,14 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from assoc._workers import ordered_map
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
@@ -177,6 +179,29 @@ def judge(case: Case, names: list[str]) -> list[str]:
     return [f"{name} {text}" for name in names for text in faults(case.problem, optimum, name, WAYS[name])]
 
 
+@dataclass
+class Judge:
+    """Judges cases by their numbers; one for each process, so that it can count them.
+
+    Answers the structure and temper of the case, and the faults.
+    """
+
+    seed: int
+    names: list[str]
+    done: int = 0
+
+    def __call__(self, number: int) -> tuple[str, str, list[str]]:
+        """Draw a case and judge it."""
+        case = draw(self.seed, number)
+        before = time.process_time()
+        lines = judge(case, self.names)
+        seconds = time.process_time() - before
+        self.done += 1
+        if seconds > _SLOW and self.done > _FIRST_CALLS:
+            lines.append(f"all ways together take {seconds:.1f} s")
+        return case.structure, case.temper, lines
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the program; exit code 1 if there were faults."""
     parser = argparse.ArgumentParser(description="All solvers on random problems, against exact arithmetic.")
@@ -185,24 +210,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--start", type=int, default=0)
     parser.add_argument("--ways", default=",".join(WAYS))
     parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
+    parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args(arguments)
     names = chosen.ways.split(",")
     kinds: Counter[str] = Counter()
-    shapes: Counter[str] = Counter()
+    numbers = range(chosen.start, chosen.start + chosen.count)
     started = said = time.perf_counter()
-    for number in range(chosen.start, chosen.start + chosen.count):
-        case = draw(chosen.seed, number)
-        shapes[case.structure] += 1
-        before = time.process_time()
-        lines = judge(case, names)
-        seconds = time.process_time() - before
-        if seconds > _SLOW and number >= chosen.start + _FIRST_CALLS:
-            lines.append(f"all ways together take {seconds:.1f} s")
+    judged = ordered_map(Judge(chosen.seed, names), numbers, chosen.processes)
+    for number, (structure, temper, lines) in zip(numbers, judged, strict=True):
         for line in lines:
-            kind = f"[{case.temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
+            kind = f"[{temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
             kinds[kind] += 1
             if kinds[kind] <= chosen.show:
-                print(f"seed {chosen.seed} number {number} ({case.structure}, {case.temper}): {line}", flush=True)
+                print(f"seed {chosen.seed} number {number} ({structure}, {temper}): {line}", flush=True)
         if time.perf_counter() - said > _PROGRESS:
             said = time.perf_counter()
             done, faulty = number + 1 - chosen.start, sum(kinds.values())
