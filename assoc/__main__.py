@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from assoc._program import run, steady_streams
+
 _PROGRAMS = {
     "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
     "assoc.solve": "associate its measurements: python -m assoc.solve scene.npz --solver aco",
@@ -12,12 +14,16 @@ _PROGRAMS = {
 
 def main() -> int:
     """Print the programs and what each is for."""
+    return run(_list, "assoc")
+
+
+def _list() -> None:
     print("assoc: which measurements, from several sensors, came from the same target?")
     print("\nPrograms (each has --help):")
     for name, purpose in _PROGRAMS.items():
         print(f"  python -m {name:<16} {purpose}")
-    return 0
 
 
 if __name__ == "__main__":
+    steady_streams()
     raise SystemExit(main())

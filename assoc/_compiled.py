@@ -3,17 +3,16 @@
 numba keeps a compiled kernel as long as the kernel's own file is unchanged, so an edited helper in another
 file, or an upgrade that leaves one file as it was, would leave stale code. Here the stamp of every kernel
 is that of all files with kernels that it could call. Where no cache folder can be written (a read-only installation
-and home), numba would fail at import; the cache then goes to a temporary folder.
+and home), numba would fail at import; the cache then goes to a temporary folder, and where there is none of
+these either, nothing is kept.
 """
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import functools
 import hashlib
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -23,6 +22,8 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import caching, event
+
+from assoc import _temporary
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -63,7 +64,7 @@ class _PackageCacheLocator:
         else:
             # for the processes that this one starts, too; it goes when this process ends
             folder = tempfile.mkdtemp(prefix="assoc-numba-")
-            atexit.register(shutil.rmtree, folder, ignore_errors=True)
+            _temporary.add(folder)
             _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
             locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
         stamp = _source_stamp(path.parent.name == "solvers")
@@ -109,8 +110,10 @@ def njit(function: Callable[..., Any]) -> Any:
                 return function(*arguments)
 
         return silent
-    kernel: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    kernel._cache = _KernelCache(function)
+    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    # nowhere to keep it, not even for a while: each process compiles for itself
+    with contextlib.suppress(OSError):
+        kernel._cache = _KernelCache(function)
     return kernel
 
 

@@ -1,19 +1,19 @@
-"""Files that are written whole or not at all, and npz files that are read without trusting them."""
+"""npz files: written whole or not at all, and read without trusting them."""
 
 from __future__ import annotations
 
 import lzma
 import math
 import os
-import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from assoc._outputs import write_atomically
 from assoc.errors import InvalidInputError
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -47,54 +47,6 @@ class Field(NamedTuple):
     kind: str
     ndim: int
     required: bool = True
-
-
-def write_atomically(path: str | os.PathLike[str], writer: Callable[[IO[bytes]], object]) -> None:
-    """Write a file so that readers see the old one or the whole new one, never a part.
-
-    Parameters
-    ----------
-    path : path-like
-        Where the file goes.
-    writer : callable
-        Called with a binary file object; it writes the content. If it raises, nothing is left behind.
-
-    Raises
-    ------
-    InvalidInputError
-        The path is a folder, its folder does not exist, or it cannot be written.
-    """
-    target = Path(path)
-    if target.is_dir():
-        raise InvalidInputError(f"{target}: is a folder, expected a file name to write")
-    if not target.parent.is_dir():
-        raise InvalidInputError(f"{target}: the folder {target.parent} does not exist")
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
-    except OSError as error:
-        raise InvalidInputError(f"{target}: cannot be written ({error.strerror})") from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            writer(file)
-            # on the disk before it takes the name: a crash of the machine must not leave an empty file under it
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes private files; give the file the mode that a plain open() would have given
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except BaseException as error:
-        Path(name).unlink(missing_ok=True)
-        # an archive that cannot be closed on a full disk complains of that, and has the disk's complaint as context
-        cause: BaseException | None = error
-        while cause is not None and not isinstance(cause, OSError):
-            cause = cause.__context__
-        if cause is not None and isinstance(error, Exception):
-            raise InvalidInputError(
-                f"{target}: cannot be written ({cause.strerror or cause}); what was there before is unchanged"
-            ) from error
-        raise
 
 
 def save_npz(

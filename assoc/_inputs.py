@@ -6,9 +6,9 @@ import io
 import os
 import zipfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from assoc._outputs import check_writable, is_stream
 from assoc._program import one_line
 from assoc.errors import InvalidInputError
 
@@ -113,19 +113,24 @@ def check_output(path: str, folder_to_come: str | None = None) -> None:
     Raises
     ------
     InvalidInputError
-        It is a folder, or would be in one that does not exist and is not ``folder_to_come``.
+        It is a folder, or would be in one that takes no files, or does not exist and is not ``folder_to_come``.
     """
-    if Path(path).is_dir():
-        raise InvalidInputError(f"{path}: is a folder, expected a file name to write")
-    parent = Path(path).parent
-    if not parent.is_dir() and (folder_to_come is None or parent != Path(folder_to_come)):
-        raise InvalidInputError(f"{path}: the folder {parent} does not exist")
+    check_writable(path, folder_to_come=folder_to_come)
 
 
 def check_distinct(outputs: Sequence[str], inputs: Sequence[str]) -> None:
     """Refuse outputs that would overwrite what is read, or each other."""
-    taken = {os.path.realpath(path) for path in inputs}
+    taken = {_place(path) for path in inputs}
     for path in outputs:
-        if os.path.realpath(path) in taken:
+        if is_stream(path):
+            continue
+        if _place(path) in taken:
             raise InvalidInputError(f"{path}: is given twice, or would overwrite what is read")
-        taken.add(os.path.realpath(path))
+        taken.add(_place(path))
+
+
+def _place(path: str) -> str:
+    try:
+        return os.path.realpath(path)
+    except ValueError:  # a NUL, which TOML can hold: reading or writing will say so
+        return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import multiprocessing
 import os
 import signal
@@ -13,14 +14,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from typing import Any, Literal, NoReturn, Union, cast, get_args, get_origin, get_type_hints
 
+from assoc import _temporary
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
 DONE, BAD_INPUT, NOTHING_FEASIBLE, INTERRUPTED = 0, 2, 3, 130
 """Exit codes; the last one is the shell's own for Ctrl-C."""
-
-
-writing = threading.Lock()
-"""Held while files are written: an interrupt waits for it and leaves no half-written file behind."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -32,8 +30,13 @@ class Parser(argparse.ArgumentParser):
 
 
 def one_line(message: object) -> str:
-    """Return a message with its line breaks taken out."""
-    return " ".join(str(message).split())
+    """Return a message with its line breaks taken out, and nothing in it that a terminal would obey."""
+    return printable(" ".join(str(message).split()))
+
+
+def printable(text: str) -> str:
+    """Return text on one line that shows as it is; the names of files may hold anything."""
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 def run(program: Callable[[], None], name: str) -> int:
@@ -65,25 +68,81 @@ def run(program: Callable[[], None], name: str) -> int:
     return DONE
 
 
-def leave_on_interrupt(name: str) -> None:
-    """Let Ctrl-C end the program at once, with one line, also while a library solves without Python.
+def each(*outputs: Callable[[], None]) -> None:
+    """Do every one of several outputs, also if one cannot be written: what was worked out must not be lost with it.
+
+    Raises
+    ------
+    InvalidInputError
+        The first that was raised.
+    """
+    complaints = []
+    for output in outputs:
+        try:
+            output()
+        except InvalidInputError as error:
+            complaints.append(error)
+    if complaints:
+        raise complaints[0]
+
+
+def begin(name: str) -> None:
+    """Make a process ready to run a program: its streams, and what happens on signals."""
+    steady_streams()
+    leave_on_signals(name)
+
+
+def steady_streams() -> None:
+    """Give stdout and stderr somewhere to go where they are closed, and a way to print any name of a file."""
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            # takes the lowest number that is free: no file of ours must get it, and be printed into
+            os.open(os.devnull, os.O_RDWR)
+    if sys.stdout is None:
+        sys.stdout = open(1, "w", closefd=False)
+    if sys.stderr is None:
+        sys.stderr = open(2, "w", closefd=False)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def ending_signals() -> dict[int, str]:
+    """Signals that end a program, with what is said of them; not those that it was started to ignore (nohup)."""
+    words = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
+    if not hasattr(signal, "pthread_sigmask"):
+        return {}
+    numbers = {getattr(signal, name): text for name, text in words.items()}
+    return {number: text for number, text in numbers.items() if signal.getsignal(number) is not signal.SIG_IGN}
+
+
+def leave_on_signals(name: str) -> None:
+    """Let Ctrl-C and its kin end the program at once, with one line, also while a library solves without Python.
 
     A Python handler would run only when the library returns, which can take minutes, and some MIP solvers
-    put a handler of their own in its place. So the signal is blocked, and a thread waits for it.
+    put a handler of their own in its place. So the signals are blocked, and a thread waits for them. The exit
+    code is the shell's own: 128 and the number of the signal.
     """
-    if not hasattr(signal, "pthread_sigmask") or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    ending = ending_signals()
+    if not ending:
         return
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+
+    def leave(number: int, frame: object = None) -> None:
+        for child in multiprocessing.active_children():
+            child.kill()
+        _temporary.end(128 + number, f"{name}: {ending[number]}\n")
 
     def watch() -> None:
-        signal.sigwait({signal.SIGINT})
-        for child in multiprocessing.active_children():
-            child.terminate()
-        with writing:
-            os.write(2, f"{name}: interrupted\n".encode())
-            os._exit(INTERRUPTED)
+        leave(signal.sigwait(ending))
 
-    threading.Thread(target=watch, name="interrupt", daemon=True).start()
+    for number in ending:
+        # where a library lets one through
+        signal.signal(number, leave)
+
+    threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 class Option:

@@ -7,6 +7,7 @@ import io
 import sys
 from collections.abc import Iterator, Sequence
 
+from assoc._program import printable
 from assoc.association import ScanAssociation
 
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
@@ -31,7 +32,7 @@ def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[s
     cells = []
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
-        row = [file] if several else []
+        row = [printable(file)] if several else []
         row += [
             str(scan.scan),
             *([str(rank)] if ranked else []),

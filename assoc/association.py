@@ -302,10 +302,10 @@ def associate(
 
 def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
     """Write plain data as JSON; the file appears whole or not at all."""
-    from assoc._files import write_atomically
+    from assoc._outputs import write_text
 
     text = json.dumps(content, allow_nan=False) + "\n"
-    write_atomically(path, lambda file: file.write(text.encode()))
+    write_text(path, text)
 
 
 def _plain(value: Any) -> Any:

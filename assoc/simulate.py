@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from assoc._program import Option, Parser, given, leave_on_interrupt, options, run, whole_number, writing
+from assoc._inputs import check_distinct, check_output
+from assoc._program import Option, Parser, begin, given, options, printable, run, whole_number
 from assoc.errors import InvalidInputError
 
 _PURPOSE = {
@@ -41,13 +42,17 @@ def _simulate(words: list[str]) -> None:
     choices = options(simulation.parameters(scenario))
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
     seed = whole_number(parsed["seed"], "--seed", 0)
+    values = given(choices, parsed)
+    outputs = [path for path in (parsed["output"], parsed.get("truth")) if path is not None]
+    check_distinct(outputs, [value for value in values.values() if isinstance(value, str)])
+    for path in outputs:
+        check_output(path)
     if scenario in _PLOTS:
-        _write_plots(scenario, seed, parsed, given(choices, parsed))
+        _write_plots(scenario, seed, parsed, values)
         return
-    scene = simulation.simulate(scenario, seed, **given(choices, parsed))
-    with writing:
-        scene.save(parsed["output"])
-    print(f"{parsed['output']}: {scene!r}")
+    scene = simulation.simulate(scenario, seed, **values)
+    scene.save(parsed["output"])
+    print(f"{printable(parsed['output'])}: {scene!r}")
 
 
 def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[str, Any]) -> None:
@@ -58,14 +63,13 @@ def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[
     if Path(output).suffix.lower() != ".csv":
         raise InvalidInputError(f"--output: {scenario} writes plots as CSV, expected a name that ends in .csv")
     simulated = simulation.simulate_recording(scenario, seed, **values)
-    with writing:
-        write_plots(output, simulated.recording)
-        if truth is not None:
-            rows = simulated.truth
-            write_tracks(truth, rows.ids, rows.times, rows.positions, simulated.velocities)
-    print(f"{output}: {simulated.recording!r}")
+    write_plots(output, simulated.recording)
     if truth is not None:
-        print(f"{truth}: {simulated.truth!r}")
+        rows = simulated.truth
+        write_tracks(truth, rows.ids, rows.times, rows.positions, simulated.velocities)
+    print(f"{printable(output)}: {simulated.recording!r}")
+    if truth is not None:
+        print(f"{printable(truth)}: {simulated.truth!r}")
 
 
 def _list_parser() -> Parser:
@@ -99,5 +103,5 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
 
 
 if __name__ == "__main__":
-    leave_on_interrupt("assoc.simulate")
+    begin("assoc.simulate")
     raise SystemExit(main())

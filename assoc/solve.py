@@ -14,17 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._extras import check_extra
 from assoc._inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
-from assoc._program import (
-    Option,
-    Parser,
-    given,
-    leave_on_interrupt,
-    options,
-    run,
-    seconds,
-    whole_number,
-    writing,
-)
+from assoc._program import Option, Parser, begin, each, given, options, run, seconds, whole_number
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -56,7 +46,7 @@ def _solve(words: list[str]) -> None:
         raise InvalidInputError("--kbest: ranks by itself and takes no --solver and no parameters of solvers")
     files = parsed["files"]
     outputs = [path for path in (parsed["json"], parsed["csv"], parsed["report"]) if path]
-    check_distinct(outputs, files)
+    check_distinct(outputs, [*files, *([parsed["config"]] if parsed["config"] else [])])
     for path in outputs:
         check_output(path)
     if parsed["report"]:
@@ -68,20 +58,13 @@ def _solve(words: list[str]) -> None:
     association = plan.gather(_with_progress(plan.run(items, settings.get("jobs", 1)), len(items)))
     elapsed = time.perf_counter() - started
     names = [files[number] for number, _ in items]
-    with writing:
-        _write(association, names, parsed["json"], parsed["csv"])
-    if parsed["report"]:
-        from assoc.plotting.report import write_association_report
-
-        each = [sources[number] for number, _ in items]
-        write_association_report(parsed["report"], association, each, names, words=words)
-
-    from assoc._tables import print_table
-
-    print_table(association.scans, names)
-    print()
-    print(association.summary())
-    print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")
+    of_items = [sources[number] for number, _ in items]
+    each(
+        lambda: _write_json(parsed["json"], association, names),
+        lambda: _write_csv(parsed["csv"], association, names),
+        lambda: _write_report(parsed["report"], association, of_items, names, words),
+        lambda: _print(association, names, elapsed),
+    )
 
 
 def _solver(words: list[str]) -> tuple[str, bool, dict[str, Any]]:
@@ -229,23 +212,48 @@ def _with_progress(scans: Iterator[ScanAssociation], count: int) -> Iterator[Sca
     )
 
 
-def _write(association: Association, names: list[str], json_path: str | None, csv_path: str | None) -> None:
-    if json_path:
-        from assoc.association import write_json
+def _write_json(path: str | None, association: Association, names: list[str]) -> None:
+    from assoc.association import write_json
 
-        content = association.to_dict()
-        if len(set(names)) > 1:
-            for scan, name in zip(content["scans"], names, strict=True):
-                scan["file"] = name
-        write_json(json_path, content)
-    if csv_path:
-        from assoc._files import write_atomically
-        from assoc._tables import to_csv
+    if path is None:
+        return
+    content = association.to_dict()
+    if len(set(names)) > 1:
+        for scan, name in zip(content["scans"], names, strict=True):
+            scan["file"] = name
+    write_json(path, content)
 
-        text = to_csv(association.scans, names)
-        write_atomically(csv_path, lambda file: file.write(text.encode()))
+
+def _write_csv(path: str | None, association: Association, names: list[str]) -> None:
+    from assoc._outputs import write_text
+    from assoc._tables import to_csv
+
+    if path is not None:
+        write_text(path, to_csv(association.scans, names))
+
+
+def _write_report(
+    path: str | None,
+    association: Association,
+    sources: list[Scene | AssignmentProblem],
+    names: list[str],
+    words: list[str],
+) -> None:
+    if path is not None:
+        from assoc.plotting.report import write_association_report
+
+        write_association_report(path, association, sources, names, words=words)
+
+
+def _print(association: Association, names: list[str], elapsed: float) -> None:
+    from assoc._tables import print_table
+
+    print_table(association.scans, names)
+    print()
+    print(association.summary())
+    print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")
 
 
 if __name__ == "__main__":
-    leave_on_interrupt("assoc.solve")
+    begin("assoc.solve")
     raise SystemExit(main())

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from assoc import _temporary
 from assoc._extras import check_extra
-from assoc._program import Parser, run
+from assoc._program import INTERRUPTED, Parser, ending_signals, printable, run, steady_streams
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def _sweep(words: list[str]) -> None:
     from assoc.sweeps.options import check_outputs, read
 
     options = read(given)
-    check_outputs(options.output, given.get("csv"), given.get("report"))
+    inputs = [*options.values["files"], *([options.config] if options.config else [])]
+    check_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
     if options.tune is not None:
         _tune(options, given)
         return
@@ -46,7 +47,7 @@ def _sweep(words: list[str]) -> None:
         counts = study.run(options.output, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     _report(options.output, given, study)
     spread = f", {1e3 * counts.solving / counts.new:.3g} ms a run in the solver" if counts.new else ""
-    print(f"{counts.total} runs in {options.output}: {counts.new} new, {counts.before} there before{spread}")
+    print(f"{counts.total} runs in {printable(options.output)}: {counts.new} new, {counts.before} there before{spread}")
 
 
 def _parser() -> Parser:
@@ -99,7 +100,7 @@ def _summary(given: dict[str, Any]) -> None:
         )
     from assoc.sweeps.options import check_outputs
 
-    check_outputs(None, given.get("csv"), given.get("report"))
+    check_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
     _report(given["summary"], given, None)
 
 
@@ -119,15 +120,14 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     if damaged and study is None:
         print(f"{damaged} unfinished lines of the log are passed over; the same sweep again does their runs")
     if "csv" in given:
-        from assoc._files import write_atomically
+        from assoc._outputs import write_text
 
-        text = table.to_csv(index=False, lineterminator="\n")
-        write_atomically(given["csv"], lambda file: file.write(text.encode()))
+        write_text(given["csv"], table.to_csv(index=False, lineterminator="\n"))
     if "plot" in given:
         from assoc.sweeps.plots import draw
 
         for path in draw(folder, frame):
-            print(f"drawn: {path}")
+            print(f"drawn: {printable(str(path))}")
     if "report" in given:
         from assoc.plotting.report import write_sweep_report
 
@@ -162,51 +162,70 @@ def _watched(folder: str) -> Iterator[Any]:
             yield progress
         except BaseException as error:
             # a library may meet the interrupt with an error of its own
-            if not (isinstance(error, KeyboardInterrupt) or _state["interrupted"]):
+            if not (isinstance(error, KeyboardInterrupt) or _state["code"]):
                 raise
             bar.close()
-            print(_state["message"], file=sys.stderr)
+            print(_goodbye(), file=sys.stderr)
             sys.stderr.flush()
-            raise SystemExit(130) from None
+            raise SystemExit(_state["code"] or INTERRUPTED) from None
 
 
 def _farewell(folder: str, last: list[Counts]) -> str:
     kept = f"{last[0].done} of {last[0].total} runs are" if last else "finished runs are"
-    return f"assoc.sweep: interrupted; {kept} kept in {folder}; the same command goes on from there"
+    return f"{kept} kept in {printable(folder)}; the same command goes on from there"
 
 
-_state: dict[str, str] = {"message": "assoc.sweep: interrupted", "interrupted": ""}
+_state: dict[str, Any] = {"message": "", "word": "interrupted", "code": 0}
 
 
-def _stop_on_interrupt() -> None:
-    """Turn Ctrl-C into an orderly end, also while a library solves without Python; worker processes do not see it."""
+def _goodbye() -> str:
+    return "; ".join(filter(None, [f"assoc.sweep: {_state['word']}", _state["message"]]))
+
+
+def _stop_on_signals() -> None:
+    """Turn Ctrl-C and its kin into an orderly end, also while a library solves without Python.
+
+    Worker processes do not see them.
+    """
     import _thread
     import signal
     import threading
     import time
 
-    if not hasattr(signal, "pthread_sigmask") or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    ending = ending_signals()
+    if not ending:
         return
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
 
-    def interrupt(*_: object) -> None:
-        # once: a second one would come in the middle of cleaning up
-        if not _state["interrupted"]:
-            _state["interrupted"] = "yes"
-            raise KeyboardInterrupt
+    def interrupt(number: int, frame: object) -> None:
+        if not _state["code"]:
+            # a library let the signal through to this thread
+            _state.update(word=ending[number], code=128 + number)
+        raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, interrupt)
+    def unraisable(problem: Any) -> None:
+        # compilers call Python in places that swallow what it raises
+        if _state["code"] and problem.exc_type is KeyboardInterrupt:
+            _thread.interrupt_main()
+        else:
+            sys.__unraisablehook__(problem)
+
+    sys.unraisablehook = unraisable
+    for one in ending:
+        signal.signal(one, interrupt)
 
     def watch() -> None:
-        signal.sigwait({signal.SIGINT})
+        # once: a second one would come in the middle of cleaning up
+        number = signal.sigwait(ending)
+        _state.update(word=ending[number], code=128 + number)
         _thread.interrupt_main()
         time.sleep(5.0)
-        os.write(2, f"{_state['message']}\n".encode())
-        os._exit(130)
+        _temporary.end(128 + number, f"{_goodbye()}\n")
 
-    threading.Thread(target=watch, name="interrupt", daemon=True).start()
+    threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 if __name__ == "__main__":
-    _stop_on_interrupt()
+    steady_streams()
+    _stop_on_signals()
     raise SystemExit(main())

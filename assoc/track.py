@@ -14,17 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._extras import check_extra
 from assoc._inputs import check_distinct, check_output, number
-from assoc._program import (
-    Option,
-    Parser,
-    given,
-    leave_on_interrupt,
-    options,
-    run,
-    seconds,
-    whole_number,
-    writing,
-)
+from assoc._program import Option, Parser, begin, each, given, options, printable, run, seconds, whole_number
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -103,15 +93,20 @@ def _track(words: list[str]) -> None:
     else:
         count, tracker, table, scene = _of_plots(file, parsed, settings)
     elapsed = time.perf_counter() - started
-    with writing:
-        table.to_csv(parsed["output"])
-    if parsed["report"]:
-        from assoc.plotting.report import write_tracking_report
 
-        used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
-        more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
-        write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
-    _report(parsed["output"], count, tracker, table, scene, elapsed)
+    def write_report() -> None:
+        if parsed["report"]:
+            from assoc.plotting.report import write_tracking_report
+
+            used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
+            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+            write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
+
+    each(
+        lambda: table.to_csv(parsed["output"]),
+        write_report,
+        lambda: _report(parsed["output"], count, tracker, table, scene, elapsed),
+    )
 
 
 def _named(words: list[str], flag: str) -> str | None:
@@ -280,7 +275,7 @@ def _with_progress(items: Sequence[Any], count: int) -> Iterator[Any]:
 
 def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float) -> None:
     _, ids, _ = table.arrays()
-    print(f"{output}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
+    print(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {1e3 * elapsed / max(count, 1):.3g} ms a scan")
     if scene is None or scene.truth is None:
         return
@@ -296,5 +291,5 @@ def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene:
 
 
 if __name__ == "__main__":
-    leave_on_interrupt("assoc.track")
+    begin("assoc.track")
     raise SystemExit(main())

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import io
 import os
 import sys
 import tempfile
@@ -28,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._outputs import write_atomically, write_text
 from experiments import claims as forms
 from experiments.claims import Claim
 
@@ -300,10 +302,11 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
 
 
 def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def draw(measured: dict[str, Measured], path: Path) -> None:
@@ -329,7 +332,7 @@ def draw(measured: dict[str, Measured], path: Path) -> None:
         ax.legend(loc="lower right", fontsize=8)
     axes[-1].set_xticks(places, labels, rotation=90)
     axes[-1].set_xlabel("alpha, beta, rho")
-    figure.savefig(path, dpi=130)
+    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=130))
 
 
 if __name__ == "__main__":

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
+
+from assoc._outputs import write_text
 
 FORMAT = "assoc.claims"
 VERSION = 1
@@ -85,8 +88,7 @@ def to_dict(claims: Iterable[Claim], experiment: str, seed: int) -> dict[str, An
 
 def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int) -> None:
     """Write the claims as JSON (infinities are refused: they are not JSON)."""
-    text = json.dumps(to_dict(claims, experiment, seed), indent=2, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    write_text(path, json.dumps(to_dict(claims, experiment, seed), indent=2, allow_nan=False) + "\n")
 
 
 def load_json(path: str | Path) -> list[Claim]:
@@ -111,15 +113,16 @@ def save_csv(path: str | Path, claims: Iterable[Claim]) -> None:
     for field in fields(Claim):
         pair = field.name in ("interval", "band")
         columns += [f"{field.name}_low", f"{field.name}_high"] if pair else [field.name]
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for claim in claims:
-            row: list[object] = []
-            for field in fields(Claim):
-                value = getattr(claim, field.name)
-                row += list(value or (None, None)) if field.name in ("interval", "band") else [value]
-            writer.writerow(["" if value is None else value for value in row])
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    for claim in claims:
+        row: list[object] = []
+        for field in fields(Claim):
+            value = getattr(claim, field.name)
+            row += list(value or (None, None)) if field.name in ("interval", "band") else [value]
+        writer.writerow(["" if value is None else value for value in row])
+    write_text(path, text.getvalue())
 
 
 def print_table(claims: Sequence[Claim], title: str) -> None:

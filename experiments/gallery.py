@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import assoc
-from assoc._files import write_atomically
+from assoc._outputs import write_atomically
 from assoc.simulation import simulate
 from assoc.sweeps.plots import new_figure
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from assoc import _files
-from assoc._files import Field, load_npz, save_npz, write_atomically
+from assoc._files import Field, load_npz, save_npz
+from assoc._outputs import write_atomically
 from assoc.errors import InvalidInputError
 
 FIELDS = {

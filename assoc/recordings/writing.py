@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._files import write_atomically
+from assoc._outputs import write_text
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
 
@@ -42,7 +42,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     if recording.sources is not None:
         columns.append(recording.sources.tolist())
     writer.writerows(zip(*columns, strict=True))
-    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+    write_text(path, text.getvalue())
 
 
 def write_tracks(
@@ -62,7 +62,7 @@ def write_tracks(
     writer.writerow(["track_id", "time", "x", "y", "z", "vx", "vy", "vz"])
     for one, time, place, velocity in zip(ids.tolist(), times, positions, velocities, strict=True):
         writer.writerow([one, _short(time, 6), *(_short(value, 3) for value in (*place, *velocity))])
-    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+    write_text(path, text.getvalue())
 
 
 def _short(value: float, digits: int) -> str:

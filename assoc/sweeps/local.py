@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 import signal
 import threading
-import time
 import uuid
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
-from assoc._workers import require_processes
+from assoc import _temporary
+from assoc._workers import end_with, require_processes, signals_as_they_are
 from assoc.errors import InvalidInputError
 from assoc.sweeps.work import Batch, Job, Result, run_batch
 
@@ -40,13 +41,13 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
-    with _shared(job, folder) as path:
+    with _shared(job, folder) as (path, digest):
         require_processes(jobs)
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
-            with _interrupts_ignored():
+            with signals_as_they_are(), _interrupts_ignored():
                 # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
-                results = parallel(delayed(_run)(str(path), os.getpid(), batch) for batch in batches)
+                results = parallel(delayed(_run)(str(path), digest, os.getpid(), batch) for batch in batches)
             yield from results
         except BrokenProcessPool:
             raise InvalidInputError(
@@ -58,20 +59,22 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
 
 
 @contextmanager
-def _shared(job: Job, folder: Path) -> Iterator[Path]:
-    """A file of the job in the study's folder, which only one sweep at a time has open."""
+def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
+    """A file of the job, and its digest, in the study's folder, which only one sweep at a time has open."""
     # what a sweep that was killed together with its workers could not take away
     for stale in folder.glob(_JOB + "*"):
         stale.unlink(missing_ok=True)
     path = folder / f"{_JOB}{uuid.uuid4().hex}"
+    content = pickle.dumps(job)
+    _temporary.add(str(path))
     try:
         try:
-            path.write_bytes(pickle.dumps(job))
+            path.write_bytes(content)
         except OSError as error:
             raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        yield path
+        yield path, _digest(content)
     finally:
-        path.unlink(missing_ok=True)
+        _temporary.remove(str(path))
 
 
 @contextmanager
@@ -98,24 +101,17 @@ def stop_workers() -> None:
 _job: tuple[str, Job] | None = None
 
 
-def _run(path: str, parent: int, batch: Batch) -> Result:
+def _run(path: str, digest: str, parent: int, batch: Batch) -> Result:
     global _job
     if _job is None or _job[0] != path:
-        _watch(parent, Path(path))
-        _job = path, pickle.loads(Path(path).read_bytes())
+        end_with(parent, path)
+        content = Path(path).read_bytes()
+        # others may be allowed to write in the study's folder, and a pickle can do anything
+        if _digest(content) != digest:
+            raise InvalidInputError(f"{path}: was changed by someone else")
+        _job = path, pickle.loads(content)
     return run_batch(_job[1], batch)
 
 
-def _watch(parent: int, path: Path) -> None:
-    """End with the parent, also when it was killed and could not say so or clean up."""
-    if os.getppid() != parent:
-        return
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="parent", daemon=True).start()
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from assoc._inputs import check_kind, check_output, number, read_toml, scan_range
+from assoc._inputs import check_distinct, check_kind, check_output, number, read_toml, scan_range
 from assoc._program import seconds, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from
+from assoc.sweeps.store import LOG, MANIFEST, REPORT
 
 if TYPE_CHECKING:
     from assoc.sweeps.setting import Setting
@@ -207,10 +208,11 @@ def _of_file(file: str, key: str, value: Any) -> Any:
     return float(value) if key in _NUMBERS else value
 
 
-def check_outputs(folder: str | None, *files: str | None) -> None:
-    """Refuse before the work what could not be written after it."""
-    if folder is not None and os.path.exists(folder) and not os.path.isdir(folder):
+def check_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
+    """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
+    if os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
-    for file in files:
-        if file is not None:
-            check_output(file, folder)
+    outputs = [file for file in files if file is not None]
+    check_distinct(outputs, [*inputs, *(os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT))])
+    for file in outputs:
+        check_output(file, folder)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._extras import load_extra
-from assoc._files import write_atomically
+from assoc._outputs import write_atomically
 from assoc.errors import InvalidInputError
 from assoc.sweeps.frame import load, load_traces
 from assoc.sweeps.summary import measured, summarize, varied

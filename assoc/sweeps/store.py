@@ -11,11 +11,12 @@ import json
 import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from assoc._files import write_atomically
+from assoc._outputs import write_text
 from assoc.errors import InvalidInputError
 from assoc.sweeps.setting import Setting
 
@@ -23,6 +24,11 @@ FORMAT = "assoc.study"
 VERSION = 1
 MANIFEST = "study.json"
 LOG = "runs.jsonl"
+REPORT = "tuning.json"
+
+_NEW_MANIFEST = (
+    f"the runs in {LOG} are unharmed: begin the same sweep in a new folder, and put the {MANIFEST} of that one here"
+)
 
 COLUMNS = (
     "setting",
@@ -125,8 +131,11 @@ class Store:
         self.folder = Path(folder)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InvalidInputError(f"{self.folder}: cannot be made ({error.strerror or error})") from None
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InvalidInputError(f"{self.folder}: cannot be made ({reason})") from None
+        if not (self.folder / MANIFEST).exists() and (self.folder / LOG).exists():
+            raise InvalidInputError(f"{self.folder}: {MANIFEST} is missing; {_NEW_MANIFEST}")
         if not (self.folder / MANIFEST).exists() and any(self.folder.glob("[!.]*")):
             raise InvalidInputError(f"{self.folder}: holds other files and no study; take a new or an empty folder")
         self._lock = _lock(self.folder)
@@ -134,8 +143,7 @@ class Store:
             if (self.folder / MANIFEST).exists():
                 read_manifest(self.folder).check_same(manifest, self.folder)
             else:
-                text = json.dumps(manifest.to_dict(), indent=1) + "\n"
-                write_atomically(self.folder / MANIFEST, lambda file: file.write(text.encode()))
+                write_text(self.folder / MANIFEST, json.dumps(manifest.to_dict(), indent=1) + "\n")
             self.settings: set[str] = set()
             self.done: set[RunKey] = set()
             self.damaged = 0
@@ -196,11 +204,17 @@ class Store:
         ]
         data = memoryview(b"".join(_line(entry) for entry in [*entries, batch]))
         path = self.folder / LOG
+        before = os.fstat(self._log.fileno()).st_size
         try:
             while data:
                 data = data[self._log.write(data) :]
             os.fsync(self._log.fileno())
-        except OSError as error:
+        except BaseException as error:
+            # half a line would spoil the one that is written after it when there is room again
+            with suppress(OSError):
+                os.ftruncate(self._log.fileno(), before)
+            if not isinstance(error, OSError):
+                raise
             raise InvalidInputError(
                 f"{path}: cannot be written ({error.strerror or error}); {len(self.done)} finished runs are kept, "
                 "and the same command goes on from there"
@@ -241,10 +255,12 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InvalidInputError(f"{folder}: holds no study ({MANIFEST} is missing)") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error}); {_NEW_MANIFEST}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}")
+        raise InvalidInputError(f"{path}: is not of the format {FORMAT!r}; {_NEW_MANIFEST}")
     if content.get("version") != VERSION:
         raise InvalidInputError(f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}")
     try:
@@ -253,7 +269,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
         gating, code = dict(content["gating"]), str(content.get("code", ""))
         return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, gating, code)
     except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
+        raise InvalidInputError(f"{path}: is damaged ({type(error).__name__}: {error}); {_NEW_MANIFEST}") from None
 
 
 def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:

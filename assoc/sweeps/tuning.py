@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._files import write_atomically
+from assoc._outputs import write_text
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers import registry
@@ -21,7 +21,7 @@ from assoc.sweeps.frame import load
 from assoc.sweeps.setting import Setting, parameter
 from assoc.sweeps.sources import Source
 from assoc.sweeps.space import Range, Space, Values
-from assoc.sweeps.store import RunKey, Store, read_log, read_manifest, run_keys
+from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
 from assoc.sweeps.study import Counts, Study
 from assoc.sweeps.summary import by_problem
 from assoc.sweeps.work import Result
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 TARGETS = ("gap", "time")
-REPORT = "tuning.json"
 PENALTY = 10.0
 """A run that missed the optimum counts as so many times the cutoff in "time" (PAR10)."""
 
@@ -343,8 +342,7 @@ def _save(path: Path, report: Report) -> None:
         "table": [plain(row) for row in report.table.to_dict("records")],
         "difference": dict(zip(("mean", "low", "high"), report.difference, strict=True)),
     }
-    text = json.dumps(content, indent=1) + "\n"
-    write_atomically(path, lambda file: file.write(text.encode()))
+    write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def print_report(report: Report) -> None:

@@ -73,10 +73,10 @@ class TrackTable:
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV; the file appears whole or not at all."""
-        from assoc._files import write_atomically
+        from assoc._outputs import write_text
 
         text = self.to_frame().to_csv(index=False)
-        write_atomically(path, lambda file: file.write(text.encode()))
+        write_text(path, text)
 
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
         """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take."""

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from assoc._outputs import write_text
+
 if TYPE_CHECKING:
     from experiments.benchmarks.families import Case
     from experiments.benchmarks.rows import Row
@@ -66,7 +68,7 @@ def main(argv: list[str] | None = None) -> int:
     def write(minutes: float | None) -> None:
         command = "make bench-quick" if options.quick else "make bench"
         storage.save(table, rows)
-        report.write_text(reporting.render(rows, minutes, command, options.remark), encoding="utf-8")
+        write_text(report, reporting.render(rows, minutes, command, options.remark))
 
     rows: list[Row] = []
     if options.report_only:

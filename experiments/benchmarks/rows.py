@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+
+from assoc._outputs import write_text
 
 HIT = 1e-6
 
@@ -96,12 +99,13 @@ _DERIVED = ("gap", "excess")
 def save(path: Path, rows: Iterable[Row]) -> None:
     """Write rows as CSV, with gap and excess as columns for readers."""
     names = [field.name for field in fields(Row)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*names, *_DERIVED])
-        for row in rows:
-            values = [*asdict(row).values(), *(getattr(row, name) for name in _DERIVED)]
-            writer.writerow([f"{value:.10g}" if isinstance(value, float) else value for value in values])
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow([*names, *_DERIVED])
+    for row in rows:
+        values = [*asdict(row).values(), *(getattr(row, name) for name in _DERIVED)]
+        writer.writerow([f"{value:.10g}" if isinstance(value, float) else value for value in values])
+    write_text(path, text.getvalue())
 
 
 def load(path: Path) -> list[Row]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._outputs import write_atomically
 from experiments.claims import Claim, print_table, save_json
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -66,7 +67,7 @@ def save_figure(path: Path, draw: Draw, shown: Any, size: tuple[float, float]) -
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     draw(figure, shown)
-    figure.savefig(path, dpi=130)
+    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=130))
 
 
 def mean_interval(values: Array) -> tuple[float, float]:

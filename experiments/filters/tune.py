@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._outputs import write_text
 from assoc.errors import AssocError
 from assoc.filters import tuned_data
 from assoc.filters.base import Filter
@@ -149,7 +150,7 @@ def main(arguments: list[str] | None = None) -> int:
         f"{chosen.evaluations} evaluations each: {'; '.join(told)}"
     )
     text = json.dumps({"about": about, **fuzzy_data(rules, like), "imm": imm_data(mixed)}, indent=2)
-    chosen.output.write_text(text + "\n", encoding="utf-8")
+    write_text(chosen.output, text + "\n")
     print(f"{chosen.output}: written")
     return 0
 

@@ -221,3 +221,22 @@ def test_no_scheduler_is_one_clear_line(study, tmp_path, monkeypatch):
         with pytest.raises(InvalidInputError, match="--scheduler: no scheduler answers at") as raised:
             study.run(tmp_path / "s", scheduler=address)
         assert "\n" not in str(raised.value)
+
+
+def test_a_job_that_someone_changed_is_not_loaded(slow, tmp_path):
+    """Others may be allowed to write in the folder, and a pickle can do anything."""
+    import os
+    import pickle
+
+    from assoc.sweeps.local import _digest, _run
+    from assoc.sweeps.work import Batch
+
+    class Trap:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "executed"),)
+
+    path = tmp_path / "job"
+    path.write_bytes(pickle.dumps(Trap()))
+    with pytest.raises(InvalidInputError, match="was changed by someone else"):
+        _run(str(path), _digest(b"the job"), os.getpid(), Batch(tuple(slow.settings[:1]), [(0, 0, 0, 0)]))
+    assert not (tmp_path / "executed").exists()

@@ -205,3 +205,43 @@ def test_a_damaged_manifest_is_one_clear_line(tmp_path, content):
     (tmp_path / MANIFEST).write_text(content)
     with pytest.raises(InvalidInputError, match=MANIFEST):
         load(tmp_path)
+
+
+def test_without_its_manifest_the_runs_can_be_had_again(study, whole, tmp_path):
+    """The message says how; and it works."""
+    lost = (whole / MANIFEST).read_text()
+    for spoil in (lambda: (whole / MANIFEST).unlink(), lambda: (whole / MANIFEST).write_text(lost[:40])):
+        spoil()
+        with pytest.raises(InvalidInputError, match="begin the same sweep in a new folder, and put the study.json"):
+            study.run(whole)
+        with Store(tmp_path / "new", study.manifest):
+            pass
+        (whole / MANIFEST).write_bytes((tmp_path / "new" / MANIFEST).read_bytes())
+        assert study.run(whole).new == 0
+
+
+def test_half_a_line_on_a_full_disk_is_taken_back(study, whole, tmp_path):
+    """The same open store can go on once there is room."""
+
+    class Full:
+        def __init__(self, log):
+            self.log, self.room = log, 100
+
+        def write(self, data):
+            if self.room == 0:
+                raise OSError(28, "No space left on device")
+            self.room = 0
+            return self.log.write(data[:100])
+
+        def __getattr__(self, name):
+            return getattr(self.log, name)
+
+    entries = [json.loads(line[9:]) for line in (whole / LOG).read_bytes().splitlines()]
+    batches = [entry for entry in entries if "scan" in entry]
+    with Store(tmp_path / "new", study.manifest) as store:
+        log, store._log = store._log, Full(store._log)
+        with pytest.raises(InvalidInputError, match="No space left on device"):
+            store.append(study.settings, batches[0])
+        store._log = log
+        assert sum(store.append(study.settings, batch) for batch in batches) == study.size
+    assert damaged_lines(tmp_path / "new") == 0 and same(load(tmp_path / "new"), load(whole))

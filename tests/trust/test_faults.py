@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from assoc import _files
-from assoc._files import save_npz, write_atomically
+from assoc._files import save_npz
+from assoc._outputs import write_atomically
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
@@ -116,7 +117,7 @@ def test_killed_in_the_middle_of_saving_the_old_file_stays(tmp_path):
     before = path.read_bytes()
     script = f"""
 import time
-from assoc._files import write_atomically
+from assoc._outputs import write_atomically
 def writer(file):
     file.write(b"half of the new")
     file.flush()

@@ -72,7 +72,7 @@ def copied(folder: Path) -> Path:
     """A copy of what a kernel needs of the package, without compiled code."""
     package = folder / "assoc"
     package.mkdir(parents=True)
-    for name in ("_compiled.py", "errors.py"):
+    for name in ("_compiled.py", "_temporary.py", "errors.py"):
         shutil.copy(Path(assoc.__file__).parent / name, package / name)
     (package / "__init__.py").write_text("")
     (package / "kernel.py").write_text(KERNEL)
@@ -139,3 +139,14 @@ def test_an_installation_that_cannot_be_written(tmp_path):
     one = first_run(folder, script, PYTHONDONTWRITEBYTECODE="1", **home)
     assert (one.communicate(timeout=60)[1], one.returncode) == ("", 0)
     assert os.listdir(temporary) == []
+
+
+def test_no_folder_for_temporary_files_either(tmp_path):
+    """A kernel is compiled all the same where nothing at all can be written."""
+    folder = copied(tmp_path / "site")
+    (folder / "assoc" / "__pycache__").write_text("")
+    (tmp_path / "home").write_text("")
+    (folder / "sitecustomize.py").write_text("import tempfile\ntempfile.tempdir = '/missing'\n")
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
+    one = first_run(folder, "assert not double.stats.cache_path", PYTHONDONTWRITEBYTECODE="1", **home)
+    assert (one.communicate(timeout=60)[1], one.returncode) == ("", 0)

@@ -16,8 +16,8 @@ from typing import Any
 
 import assoc
 from assoc._extras import check_extra, load_extra
-from assoc._files import write_atomically
 from assoc._html import escape, script_json
+from assoc._outputs import write_text
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
@@ -63,8 +63,7 @@ class Page:
         InvalidInputError
             The file cannot be written.
         """
-        content = self.html().encode()
-        write_atomically(path, lambda file: file.write(content))
+        write_text(path, self.html())
 
     def html(self) -> str:
         """Return the whole page."""

@@ -1,0 +1,53 @@
+"""Temporary files and folders of this process, on one list: a process that must end at once takes them away first."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import threading
+from contextlib import suppress
+
+lock = threading.RLock()
+"""Held while a temporary file is made and listed, or takes its name and leaves the list."""
+
+_paths: dict[str, int] = {}
+
+
+def add(path: str) -> None:
+    """List a file or folder of this process."""
+    with lock:
+        # a forked child has a copy of the list, and no business with what is on it
+        _paths[path] = os.getpid()
+
+
+def forget(path: str) -> None:
+    """Take a path off the list: it is gone, or it has got its final name."""
+    with lock:
+        _paths.pop(path, None)
+
+
+def remove(path: str) -> None:
+    """Remove a file or folder, whatever may be wrong with it, and take it off the list."""
+    with suppress(OSError):
+        os.unlink(path) if not os.path.isdir(path) else shutil.rmtree(path, ignore_errors=True)
+    forget(path)
+
+
+def end(code: int, message: str = "") -> None:
+    """End the process now: what is half written goes, no other thread makes more of it, nothing else is waited for."""
+    # a thread that holds the lock may hang in a file system that does not answer
+    lock.acquire(timeout=2.0)
+    for path, owner in [*_paths.items()]:
+        if owner == os.getpid():
+            remove(path)
+    with suppress(OSError):
+        os.write(2, message.encode(errors="backslashreplace"))
+    os._exit(code)
+
+
+@atexit.register
+def _at_exit() -> None:
+    for path, owner in [*_paths.items()]:
+        if owner == os.getpid():
+            remove(path)
