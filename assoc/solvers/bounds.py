@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc.solvers.clock import is_over
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Run
 
@@ -35,7 +36,8 @@ PASSES = 1000
 RELAXATION = 1.5
 # columns of a reduced cost of more temperatures than this weigh less than 1e-5
 NEAR = 12.0
-# columns visited between two looks at the clock: some fifty milliseconds
+# columns visited between two looks at the clock: about a millisecond in a kernel, and some fifty between kernels
+_LOOK = 200_000
 _VISITS = 10_000_000
 
 
@@ -63,12 +65,13 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     reduced, primal, slack_primal = work_arrays(packing)
     hard_pass(packing, duals, reduced, 1)
     size = packing.row_cols.size
+    deadline = math.inf if run is None else run.deadline()
     for _ in range(levels):
         left = passes
         while left > 0 and (run is None or run.remaining() > 0.0):
             # under a time limit large problems come back for a look at the clock
             turn = left if run is None or run.time_limit is None else min(left, max(6, _VISITS // max(size, 1)))
-            visits = smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, turn)
+            visits = smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, turn, deadline)
             left = left - turn if visits == turn * size else 0
         temperature *= COOLING
     hard_pass(packing, duals, reduced, 2)
@@ -99,6 +102,7 @@ def smooth_pass(
     slack_primal: Floats,
     temperature: Floats,
     passes: int,
+    deadline: float = math.inf,
 ) -> int:
     """Move ``duals`` by smoothed passes at one temperature per component; return the column visits made."""
     return int(
@@ -116,6 +120,7 @@ def smooth_pass(
             slack_primal,
             temperature,
             passes,
+            deadline,
         )
     )
 
@@ -225,18 +230,23 @@ def _smooth_passes(
     slack_primal: Floats,
     temperature: Floats,
     passes: int,
+    deadline: float,
 ) -> int:
     scale = np.empty(slack.size)
     near_ptr = np.empty(slack.size + 1, np.int64)
     near_cols = np.empty(row_cols.size, np.int32)
     place = np.empty(weights.size, np.int32)
     visits = 0
+    unseen = 0
+    over = False
     for c in range(row_start.size - 1):
+        if over:
+            break
         t = temperature[c]
         top, end = row_start[c], row_start[c + 1]
         done = 0
         worst = 1.0
-        while done < passes and worst >= 0.01:
+        while done < passes and worst >= 0.01 and not over:
             # columns far above the minimum weigh nothing: they are left out and looked at again now and then
             _near(
                 cols, weights, row_ptr, row_cols, duals, reduced, top, end, col_start[c], col_start[c + 1],
@@ -249,7 +259,7 @@ def _smooth_passes(
                 slack_primal[r] = math.exp(min(duals[r] / t, 500.0)) if slack[r] else 0.0
             scale[top:end] = 1.0
             stop = min(passes, max(10, 2 * done))
-            while done < stop and worst >= 0.01:
+            while done < stop and worst >= 0.01 and not over:
                 # the first passes at a new temperature are plain: over-relaxing far from the fixed point can diverge
                 plain = done < 5
                 worst = 0.0
@@ -269,8 +279,13 @@ def _smooth_passes(
                     for k in range(first, last):
                         primal[near_cols[k]] *= factor
                 visits += near_ptr[end] - near_ptr[top]
+                unseen += near_ptr[end] - near_ptr[top]
                 done += 1
+                if unseen > _LOOK:
+                    unseen = 0
+                    over = is_over(deadline)
             visits += row_ptr[end] - row_ptr[top]
+            unseen += row_ptr[end] - row_ptr[top]
             for r in range(top, end):
                 if scale[r] != 1.0:
                     duals[r] += t * math.log(scale[r])

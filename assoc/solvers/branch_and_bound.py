@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.branching import child_bound, doubtful_pairs
+from assoc.solvers.clock import is_over
 from assoc.solvers.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
 from assoc.solvers.packing import Packing
 
@@ -37,12 +38,17 @@ class Search:
         Only solutions of less weight are looked for; ``inf`` if none is known.
     tolerance : float
         How much better a solution must be to count.
+    deadline : float
+        When time is over, by the kernels' clock (clock.py): the node at work stays open.
     """
 
-    def __init__(self, packing: Packing, duals: Floats, incumbent: float, tolerance: float) -> None:
+    def __init__(
+        self, packing: Packing, duals: Floats, incumbent: float, tolerance: float, deadline: float = np.inf
+    ) -> None:
         self._packing = packing
         self.tolerance = tolerance
         self.weight = incumbent
+        self.deadline = deadline
         self.columns: NDArray[np.int32] | None = None
         self.nodes = 0
         self._open = OpenNodes(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
@@ -68,7 +74,7 @@ class Search:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
         found = np.empty(self._packing.num_rows, dtype=np.int32)
-        while not self.done and self.nodes < target:
+        while not self.done and self.nodes < target and not is_over(self.deadline):
             self._open.count, self.weight, count, done = _search(
                 self._packing.cols,
                 self._packing.weights,
@@ -78,11 +84,12 @@ class Search:
                 self.tolerance,
                 target - self.nodes,
                 found,
+                self.deadline,
             )
             self.nodes += done
             if count >= 0:
                 self.columns = found[:count].copy()
-            if not self.done and self.nodes < target:
+            if not self.done and self.nodes < target and not is_over(self.deadline):
                 self._open.grow()
 
 
@@ -133,10 +140,11 @@ def _search(
     tolerance: float,
     node_limit: int,
     found: Any,
+    deadline: float,
 ) -> Any:
     """Search depth first; the number of open nodes, the incumbent's weight, its columns, the nodes done.
 
-    Stops early with nodes open when there is no room left for two children.
+    Stops early with nodes open when there is no room left for two children, or time is over.
     """
     num_sensors = cols.shape[1]
     num_rows = node_duals.shape[1]
@@ -176,11 +184,17 @@ def _search(
         slack = node_slack[top].copy()
         lower = node_bound[top]
         pruned = False
+        over = False
         temperature = 0.0
         for level in range(3):
+            over = is_over(deadline)
+            if over:
+                break
             index_by_row(cols, active, num, row_ptr, row_cols)
             if level > 0:
-                smooth_sweeps(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5)
+                smooth_sweeps(
+                    slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5, deadline
+                )
             reduced_of(cols, weights, active, num, duals, reduced)
             if not hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2):
                 pruned = True
@@ -209,12 +223,19 @@ def _search(
             num = kept
             gap = incumbent - lower if incumbent < np.inf else max(1.0, 0.1 * abs(lower))
             temperature = max(gap * (0.1 if level == 0 else 0.03), 1e-3 * tolerance)
+        if over:
+            # the node's columns and multipliers are as they were
+            num_open = top + 1
+            nodes -= 1
+            break
         if pruned or lower >= incumbent - tolerance:
             continue
         index_by_row(cols, active, num, row_ptr, row_cols)
         branch_duals[:] = duals
         reduced_of(cols, weights, active, num, duals, reduced)
-        smooth_sweeps(slack, row_ptr, row_cols, num, branch_duals, reduced, primal, slack_primal, temperature, 60, 1.0)
+        smooth_sweeps(
+            slack, row_ptr, row_cols, num, branch_duals, reduced, primal, slack_primal, temperature, 60, 1.0, deadline
+        )
         candidates = doubtful_pairs(
             cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values
         )
@@ -232,6 +253,9 @@ def _search(
             reduced_of(cols, weights, active, num, duals, reduced)
             best_score = -1.0
             for i in range(candidates):
+                # as good a pair as any when time is over
+                if is_over(deadline):
+                    break
                 one, two = pairs[i]
                 score = 1.0
                 for joined in range(2):

@@ -101,6 +101,7 @@ class Breeding:
             part.temperature,
             self.parameters.mutation,
             rng,
+            part.deadline,
         )
 
     def _admit(self, part: Part, owner: NDArray[np.int32], weight: float) -> None:
@@ -124,6 +125,7 @@ def _cross(
     temperature: float,
     mutation: float,
     rng: Any,
+    deadline: float,
 ) -> Any:
     num_sensors = cols.shape[1]
     num_rows = slack.size
@@ -165,5 +167,5 @@ def _cross(
             for s in range(num_sensors):
                 if cols[j, s] >= 0:
                     owner[cols[j, s]] = -1
-    _improve(cols, weights, row_ptr, row_cols, owner, np.arange(num_rows).astype(np.int32))
+    _improve(cols, weights, row_ptr, row_cols, owner, np.arange(num_rows).astype(np.int32), deadline)
     return owner

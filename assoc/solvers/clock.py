@@ -38,3 +38,9 @@ else:
     def now() -> float:
         """Return 0: without a clock that kernels can read, time limits are kept between kernels alone."""
         return 0.0
+
+
+@njit
+def is_over(deadline: float) -> bool:
+    """Whether the time is over."""
+    return bool(deadline < np.inf and now() > deadline)

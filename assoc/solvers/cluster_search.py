@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc.solvers.clock import is_over
 from assoc.solvers.cluster_solution import collect, depth_first, tighten
+from assoc.solvers.ordering import ascending
 from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
@@ -58,12 +60,10 @@ class ClusterSearch:
 
         free = np.where(packing.slack, np.minimum(duals, 0.0), duals)
         reduced = np.maximum(reduced_costs(packing, free), 0.0)
-        rows = np.repeat(np.arange(packing.num_rows), np.diff(packing.row_ptr))
-        order = np.lexsort((reduced[packing.row_cols], rows))
         largest = float(np.abs(packing.weights).max(initial=0.0))
         whole = largest < 1e9 and bool((packing.weights == np.rint(packing.weights)).all())
         step = 1.0 if whole else 1e-9 * max(1.0, largest)
-        return cls(packing, reduced, free, packing.row_cols[order], step)
+        return cls(packing, reduced, free, _by_row(packing.cols, packing.row_ptr, ascending(reduced)), step)
 
     def run(
         self,
@@ -74,6 +74,7 @@ class ClusterSearch:
         *,
         node_limit: int = 1000,
         sideways: float = 0.3,
+        deadline: float = np.inf,
     ) -> tuple[float, float]:
         """Try some clusters.
 
@@ -92,6 +93,8 @@ class ClusterSearch:
             Nodes of the depth-first search for one cluster.
         sideways : float
             Share of clusters in which another choice of the same weight is taken too.
+        deadline : float
+            No cluster is begun after this (clock.py).
 
         Returns
         -------
@@ -113,8 +116,23 @@ class ClusterSearch:
             self.step,
             node_limit,
             sideways,
+            deadline,
         )
         return float(change), float(cut) / max(steps, 1)
+
+
+@njit
+def _by_row(cols: Any, row_ptr: Any, order: Any) -> Any:
+    """The columns of each row, in the order given."""
+    place = row_ptr[:-1].copy()
+    result = np.empty(row_ptr[-1], np.int32)
+    for j in order:
+        for s in range(cols.shape[1]):
+            r = cols[j, s]
+            if r >= 0:
+                result[place[r]] = j
+                place[r] += 1
+    return result
 
 
 @njit
@@ -170,7 +188,7 @@ def _grow(
 @njit
 def _search_clusters(
     cols: Any, slack: Any, row_ptr: Any, by_row: Any, reduced: Floats, duals: Floats, owner: Any, rng: Any,
-    steps: int, size: int, step: float, node_limit: int, sideways: float
+    steps: int, size: int, step: float, node_limit: int, sideways: float, deadline: float
 ) -> Any:  # fmt: skip
     num_rows, num_sensors = owner.size, cols.shape[1]
     local = np.full(num_rows, -1, np.int32)
@@ -188,6 +206,8 @@ def _search_clusters(
     change = 0.0
     cut = 0
     for _ in range(steps):
+        if is_over(deadline):
+            break
         num = _grow(cols, row_ptr, by_row, reduced, duals, owner, rng, size, local, rows)
         excess = 0.0
         for i in range(num):

@@ -29,11 +29,13 @@ class ClusterSteps:
         self._most = min(_MOST, max(6, 2 * packing.num_rows // 3))
         self._size = min(_START, self._most)
 
-    def improve(self, owner: NDArray[np.int32], rng: np.random.Generator, steps: int) -> float:
-        """Improve a complete cover in place; return the change of its weight (<= 0)."""
+    def improve(
+        self, owner: NDArray[np.int32], rng: np.random.Generator, steps: int, deadline: float = np.inf
+    ) -> float:
+        """Improve a complete cover in place, until time is over; return the change of its weight (<= 0)."""
         if steps == 0:
             return 0.0
-        change, cut = self._search.run(owner, rng, steps, self._size)
+        change, cut = self._search.run(owner, rng, steps, self._size, deadline=deadline)
         if cut > 0.2:
             self._size = max(self._size - 6, min(_LEAST, self._most))
         elif change == 0.0:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assoc._compiled import njit
 from assoc.problem import AssignmentProblem
 from assoc.solvers.bounds import dual_bound, hard_pass
+from assoc.solvers.fallback import provide
 from assoc.solvers.packing import Packing, assemble, prepare
 from assoc.solvers.run import Run
 
@@ -81,6 +82,9 @@ def complete(problem: AssignmentProblem, run: Run) -> Complete:
     slack = slack_of(problem)
     # before the ascent, which takes the time that is left
     rows, weights, origin = distinct_columns(problem)
+    if run.time_limit is not None:
+        # what stands for the best when time is over: the ascent would leave no time for it
+        provide(packing, run)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
     own = dual_bound(packing, run=run)
@@ -117,19 +121,31 @@ def priced(
 ) -> Complete:
     """Put columns and multipliers together; what is negative in the reduced costs must be rounding."""
     duals = np.where(slack, np.minimum(duals, 0.0), duals)
-    reduced = weights - np.concatenate([duals, [0.0]])[rows].sum(axis=1)
     return Complete(
         rows,
         weights,
         origin,
         slack,
         duals,
-        np.maximum(reduced, 0.0),
+        _reduced(rows, weights, duals),
         np.where(slack, -duals, np.inf),
         float(duals.sum()),
         offset,
         single,
     )
+
+
+@njit
+def _reduced(rows: Any, weights: Floats, duals: Floats) -> Floats:
+    """Reduced costs; what is negative must be rounding."""
+    reduced = np.empty(weights.size)
+    for j in range(weights.size):
+        total = 0.0
+        for s in range(rows.shape[1]):
+            if rows[j, s] >= 0:
+                total += duals[rows[j, s]]
+        reduced[j] = max(weights[j] - total, 0.0)
+    return reduced
 
 
 @njit

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from assoc.solvers.complete import Complete
 from assoc.solvers.feasibility import infeasible
+from assoc.solvers.head_start import HeadStart
 from assoc.solvers.merging import merge
 from assoc.solvers.packing import Packing
 from assoc.solvers.ranking import FIRST_BUDGET, ComponentRanking, rank_components
@@ -30,11 +31,14 @@ class Found:
         No other solution weighs less.
     nodes : int
         Nodes of branch and bound.
+    known : int32 array or None
+        Columns of the lightest solution that was met, where none is proved to be the lightest.
     """
 
     chosen: list[Columns]
     rest: float
     nodes: int = 0
+    known: Columns | None = None
 
 
 @dataclass(slots=True)
@@ -57,15 +61,20 @@ class Deepening:
         Solutions wanted.
     run : Run
         Clock.
+    ahead : HeadStart
+        Taken before the first branching.
     """
 
-    def __init__(self, columns: Complete, k: int, run: Run) -> None:
+    def __init__(self, columns: Complete, k: int, run: Run, ahead: HeadStart) -> None:
         self._columns = columns
         self._k = k
         self._run = run
+        self._ahead = ahead
         self._nodes = 0
         scale = max(float(np.abs(columns.weights).max(initial=0.0)), abs(columns.bound))
         self._tolerance = 1e-12 * scale
+        self._known: Columns | None = None
+        self._known_weight = np.inf
 
     def run(self) -> Found:
         """Return the k lightest solutions, or as many as are proved when time is over.
@@ -84,17 +93,25 @@ class Deepening:
         place = 2 * self._k
         best = Found([], columns.bound)
         while True:
-            excess = float(steps[place]) if place < steps.size else np.inf
+            excess = self._excess(steps, place)
             found = self._round(excess)
             if (len(found.chosen), found.rest) > (len(best.chosen), best.rest):
                 best = found
-            best.nodes = self._nodes
+            best.nodes, best.known = self._nodes, self._known
             if len(best.chosen) >= self._k or excess == np.inf or self._run.should_stop():
                 break
-            place *= 2
+            # a head start may have gone further than twice as many deviations
+            place = 2 * max(place, int(np.searchsorted(steps, excess)) if self._ahead.weight < np.inf else 0)
         if not best.chosen and best.rest == np.inf:
             raise infeasible(columns.keep(np.inf))
         return best
+
+    def _excess(self, steps: Floats, place: int) -> float:
+        """Return the excess of a round: so many deviations, and no less than a solution is known to have."""
+        if place >= steps.size:
+            return np.inf
+        known = self._ahead.weight - self._columns.bound + 4.0 * self._tolerance
+        return max(float(steps[place]), known) if known < np.inf else float(steps[place])
 
     def _round(self, excess: float) -> Found:
         """Rank all solutions of at most this excess; fewer than k if there are fewer."""
@@ -109,6 +126,8 @@ class Deepening:
         if room <= 0.0:
             return Found([], beyond)
         lists = self._rank_components(packing, duals, room)
+        if lists is None:
+            return Found([], columns.bound)
         lower = np.array(
             [
                 min(own[0], proven) if own.size else proven
@@ -117,9 +136,6 @@ class Deepening:
         )
         if np.isposinf(lower).any():
             return Found([], np.inf)
-        if np.isneginf(lower).any():
-            # time was over before a component had any bound of its own
-            return Found([], columns.bound)
         total_lower = float(lower.sum())
         unlisted = total_lower + (np.array(lists.proven) - lower)
         rest = min(beyond, float(unlisted.min(initial=np.inf)))
@@ -128,19 +144,16 @@ class Deepening:
         start = np.concatenate([[0], np.cumsum([own.size for own in lists.weights])]).astype(np.int64)
         weights = np.concatenate([*lists.weights, np.zeros(0)])
         total, choice = merge(start, weights, self._k + 1)
+        if total[0] < self._known_weight:
+            self._known, self._known_weight = _origins(packing, lists, choice[0]), float(total[0])
         # a full list excludes what is lighter than its last by more than a tie
         proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance, side="right")), self._k)
         if proved < total.size:
             rest = min(rest, float(total[proved]))
-        chosen = [
-            packing.origin[
-                np.concatenate([np.zeros(0, np.int32), *(own[i] for own, i in zip(lists.columns, pick, strict=True))])
-            ]
-            for pick in choice[:proved]
-        ]
-        return Found(chosen, rest)
+        return Found([_origins(packing, lists, pick) for pick in choice[:proved]], rest)
 
-    def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists:
+    def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists | None:
+        """Rank every component; None where the head start says that more excess is needed anyway."""
         reduced = self._columns.reduced[packing.origin]
         start, weights, pointer, columns, proven = rank_components(
             packing.cols,
@@ -154,6 +167,7 @@ class Deepening:
             self._k,
             room,
             self._tolerance,
+            self._run.deadline(),
         )
         lists = _Lists()
         for c in range(packing.num_components):
@@ -161,18 +175,30 @@ class Deepening:
             lists.weights.append(weights[own])
             lists.columns.append([columns[pointer[i] : pointer[i + 1]] for i in range(start[c], start[c + 1])])
             lists.proven.append(float(proven[c]))
-        for index in np.flatnonzero(np.isneginf(proven)):
-            self._branch(packing, duals, int(index), room, lists)
+        hard = np.flatnonzero(np.isneginf(proven))
+        if hard.size and not self._ahead.taken:
+            self._ahead.take()
+            if np.inf > self._ahead.weight - self._columns.bound > room:
+                return None
+        bounds = np.add.reduceat(duals, packing.row_start[:-1]) if hard.size else np.zeros(0)
+        # what the components done need above their bounds the others cannot use
+        used = sum(own[0] - bound for own, bound in zip(lists.weights, bounds, strict=False) if own.size)
+        for index in hard:
+            # its multipliers bound a component that there was no time for
+            lists.proven[index] = float(bounds[index])
+            if not self._run.should_stop():
+                self._branch(packing, duals, int(index), float(bounds[index] + room - used), lists)
+                if lists.weights[index].size:
+                    used += lists.weights[index][0] - bounds[index]
         return lists
 
-    def _branch(self, packing: Packing, duals: Floats, c: int, room: float, lists: _Lists) -> None:
+    def _branch(self, packing: Packing, duals: Floats, c: int, limit: float, lists: _Lists) -> None:
         """Rank a component that was too much for enumeration; the lists are filled in."""
         piece = packing.component(c)
         own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
-        bounds = np.add.reduceat(duals, packing.row_start[:-1])
-        # what the components done need above their bounds this one cannot use
-        used = sum(own[0] - bound for own, bound in zip(lists.weights, bounds, strict=True) if own.size)
-        ranking = ComponentRanking(piece, own_duals, self._k, float(bounds[c] + room - used), self._tolerance)
+        ranking = ComponentRanking(
+            piece, own_duals, self._k, limit, self._tolerance, deadline=self._run.deadline()
+        )
         # about ten milliseconds of work between two looks at the clock
         turn = max(1, 100_000 // max(piece.num_columns, 1))
         while not ranking.done and not self._run.should_stop():
@@ -184,4 +210,11 @@ class Deepening:
         found, chosen = ranking.solutions()
         lists.weights[c] = found
         lists.columns[c] = [own + np.int32(first) for own in chosen]
-        lists.proven[c] = ranking.proven
+        # before its first node is done the search has no bound of its own
+        lists.proven[c] = max(ranking.proven, lists.proven[c])
+
+
+def _origins(packing: Packing, lists: _Lists, pick: NDArray[np.int32]) -> Columns:
+    """Return the columns of one solution from each component's list."""
+    own = [columns[i] for columns, i in zip(lists.columns, pick, strict=True)]
+    return packing.origin[np.concatenate([np.zeros(0, np.int32), *own])]

@@ -18,11 +18,15 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.assignment2d import _pop, _push
+from assoc.solvers.clock import is_over
 
 Floats = NDArray[np.float64]
 
 NOT_COMPLETE = -1
 _ALONE = -1
+# columns of a row that insertion would take too long to sort; decisions between two looks at the clock
+_LONG = 40
+_LOOK = 8
 
 
 @njit
@@ -112,7 +116,8 @@ def _keep(store: Any, k: int, weight: float, columns: Any, count: int, check: bo
 @njit
 def enumerate_solutions(
     cols: Any, names: Any, reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, top: int, end: int,
-    base: float, k: int, limit: float, tolerance: float, budget: int, check: bool, store: Any
+    base: float, k: int, limit: float, tolerance: float, budget: int, check: bool, store: Any, blocked: Any,
+    deadline: float
 ) -> Any:  # fmt: skip
     """Search rows ``top:end`` for solutions lighter than ``limit``.
 
@@ -144,15 +149,24 @@ def enumerate_solutions(
         Whether solutions may have been found before.
     store : tuple of arrays
         See ``new_store``.
+    blocked : int32 array, shape (N,)
+        Room for work.
+    deadline : float
+        When time is over (clock.py).
 
     Returns
     -------
     steps, store
-        Decisions made, ``NOT_COMPLETE`` if the budget did not suffice.
+        Decisions made, ``NOT_COMPLETE`` if the budget or the time did not suffice.
     """
     num_rows = end - top
     for r in range(top, end):
-        # insertion sort: the lists are short, or nearly in order from the level above
+        if is_over(deadline):
+            return NOT_COMPLETE, store
+        if row_ptr[r + 1] - row_ptr[r] > _LONG:
+            _sort_row(reduced, row_cols[row_ptr[r] : row_ptr[r + 1]])
+            continue
+        # insertion sort: the lists are short
         for x in range(row_ptr[r] + 1, row_ptr[r + 1]):
             a = row_cols[x]
             y = x
@@ -162,7 +176,8 @@ def enumerate_solutions(
             row_cols[y] = a
     done = np.zeros(num_rows, np.bool_)
     # how many of a column's rows are decided: it can be taken while there are none
-    blocked = np.zeros(reduced.size, np.int32)
+    for x in range(row_ptr[top], row_ptr[end]):
+        blocked[row_cols[x]] = 0
     row_at = np.empty(num_rows, np.int64)
     cursor = np.empty(num_rows, np.int64)
     taken = np.empty(num_rows, np.int64)
@@ -219,8 +234,20 @@ def enumerate_solutions(
         depth += 1
         forward = True
         steps += 1
-        if steps > budget:
+        if steps > budget or (steps % _LOOK == 0 and is_over(deadline)):
             return NOT_COMPLETE, store
+
+
+@njit
+def _sort_row(reduced: Floats, own: Any) -> None:
+    """Put columns in order of reduced cost, in place; ties stay in their order."""
+    ordered = True
+    for x in range(1, own.size):
+        if reduced[own[x - 1]] > reduced[own[x]]:
+            ordered = False
+            break
+    if not ordered:
+        own[:] = own[np.argsort(reduced[own], kind="mergesort")]
 
 
 @njit

@@ -74,7 +74,7 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     # a gap that another cause has left open, or that rounding alone would leave, is not closed so
     if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
         return outcome
-    search = Search(packing, dual_bound(packing, run=run), weight, wanted)
+    search = Search(packing, dual_bound(packing, run=run), weight, wanted, run.deadline())
     most = max(50, _VISITS // packing.num_columns)
     while not search.done and search.nodes < most and not run.should_stop():
         search.run(max(1, 20_000 // packing.num_columns))

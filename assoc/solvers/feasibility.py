@@ -19,7 +19,7 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
     chosen = []
     for c in range(packing.num_components):
         part = packing.component(c)
-        search = Search(part, dual_bound(part), np.inf, 1e-9)
+        search = Search(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline())
         while search.columns is None and not search.done and not run.should_stop():
             search.run(20)
         if search.columns is None:
@@ -30,9 +30,11 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
     return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)
 
 
-def infeasible(packing: Packing) -> InfeasibleError:
-    """Return the error for a problem without dummies in which no solution was found."""
+def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
+    """Return the error for a problem without dummies in which no solution was found (in the time of a run)."""
     uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
     if uncovered:
         return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+    if run is not None and run.should_stop():
+        return InfeasibleError("no complete solution was found in the time limit")
     return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import accumulate, pairwise
 from numbers import Real
 from typing import Any
@@ -20,7 +20,8 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.bounds import certified_bound, dual_bound
-from assoc.solvers.packing import Prepared, prepare
+from assoc.solvers.fallback import best_of, provide
+from assoc.solvers.packing import Packing, Prepared, prepare
 from assoc.solvers.run import Callback, Outcome, Run
 
 
@@ -71,8 +72,28 @@ def assign(
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset
-        outcome = solve(prepared.packing, chosen, run)
+        packing = prepared.packing
+        if solver != "greedy":
+            provide(packing, run)
+        try:
+            outcome = solve(packing, chosen, run)
+        except InfeasibleError:
+            if run.fallback is None:
+                raise
+            outcome = Outcome(run.fallback, 0)
+        if run.stopped_by == "time_limit":
+            outcome = _not_worse(packing, outcome, run)
         return _certify(problem, prepared, outcome, run, solver, chosen)
+
+
+def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
+    """Take the greedy choice where the solver's is worse when time is over."""
+    columns = np.asarray(outcome.columns, dtype=np.int64)
+    better = best_of(packing, columns, run)
+    if better is columns:
+        return outcome
+    run.record(outcome.iterations, float(packing.weights[better].sum()), outcome.lower_bound)
+    return replace(outcome, columns=better)
 
 
 def _certify(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,16 +28,15 @@ def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
     InfeasibleError
         No complete choice was found.
     """
-    import numpy as np
-
     from assoc.solvers.feasibility import infeasible
     from assoc.solvers.local_search import Cover
+    from assoc.solvers.ordering import ascending
 
     cover = Cover.empty(packing)
-    cover.add_greedily(np.argsort(packing.weights, kind="stable"))
+    cover.add_greedily(ascending(packing.weights))
     if not cover.complete(run):
-        raise infeasible(packing)
-    run.record(packing.num_columns, cover.weight, -np.inf)
+        raise infeasible(packing, run)
+    run.record(packing.num_columns, cover.weight, -math.inf)
     return Outcome(cover.columns(), packing.num_columns)
 
 

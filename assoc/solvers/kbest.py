@@ -9,6 +9,7 @@ merged. Nothing is sampled or guessed: a solution that is not listed has been ex
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from dataclasses import dataclass, replace
@@ -18,17 +19,20 @@ from numpy.typing import NDArray
 
 from assoc import _memory
 from assoc._interrupts import interruptible
-from assoc.errors import InvalidInputError
+from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.complete import Complete, complete
 from assoc.solvers.deepening import Deepening
-from assoc.solvers.front import _limit, assign
+from assoc.solvers.fallback import greedy_choice
+from assoc.solvers.feasibility import infeasible
+from assoc.solvers.front import _certify, _limit
+from assoc.solvers.greedy import GreedyParameters
+from assoc.solvers.head_start import HeadStart
+from assoc.solvers.packing import prepare
 from assoc.solvers.planar import rank_planar
-from assoc.solvers.run import Run
+from assoc.solvers.run import Outcome, Run
 
-# seconds of a greedy solution for each tuple
-_GREEDY = 3e-7
 # bytes of a solution and for each measurement in it: in the search's stores while they grow, and as an answer
 _SOLUTION, _MEASUREMENT = 2_000, 130
 
@@ -95,20 +99,21 @@ class Ranking:
     columns: Complete
 
 
-def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Ranking:
-    """Return the k best together with a bound on the rest."""
+def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
+    """Return the k best together with a bound on the rest; a run that is under way has its own time limit."""
     started = time.perf_counter()
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     k = checked_k(k)
-    run = Run(0, time_limit=within(problem, time_limit), started=started)
+    run = run or Run(0, time_limit=_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = _memory.at_most(k, each)
+    ahead = HeadStart(prepare(problem).packing, run)
     if problem.num_sensors == 2:
         columns, found = rank_planar(problem, most, run)
     else:
         columns = complete(problem, run)
-        found = Deepening(columns, most, run).run()
+        found = Deepening(columns, most, run, ahead).run()
     if len(found.chosen) == most < k and found.rest < np.inf:
         run.stopped_by = run.stopped_by or "memory_limit"
     # weights are differences of costs: what they lose to rounding is taken off the bounds
@@ -122,7 +127,8 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
     )
     rest = found.rest + columns.offset - rounding
     if not found.chosen:
-        return Ranking([_unproved(problem, rest, k, run)], rest, columns)
+        rest = max(rest, ahead.bound + columns.offset - rounding)
+        return Ranking([_unproved(problem, rest, k, run, columns, found.known)], rest, columns)
     answers = _in_order(problem, [columns.indices(own) for own in found.chosen])
     runtime = run.elapsed()
     solutions = [
@@ -140,12 +146,6 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None) -> Rankin
         for place, (cost, indices) in enumerate(answers)
     ]
     return Ranking(solutions, rest, columns)
-
-
-def within(problem: AssignmentProblem, time_limit: object) -> float | None:
-    """Check a time limit, and take off it what the greedy solution of a large problem takes when time is over."""
-    limit = _limit(time_limit)
-    return None if limit is None else limit - min(0.3 * limit, _GREEDY * problem.num_tuples)
 
 
 def checked_k(k: object) -> int:
@@ -179,13 +179,34 @@ def _in_order(problem: AssignmentProblem, chosen: list[NDArray[np.intp]]) -> lis
     return [(cost, indices) for cost, _, indices in answers]
 
 
-def _unproved(problem: AssignmentProblem, bound: float, k: int, run: Run) -> Solution:
-    """Return a solution when time was over before the best was proved."""
-    # what is left of the time is nothing: the greedy solution, without another ascent for a bound
-    quick = assign(problem, "greedy", time_limit=1e-6)
+def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
+    """Return the greedy solution, which a run on a large problem has made already, with a bound that is known.
+
+    Raises
+    ------
+    InfeasibleError
+        The greedy choice is a dead end (possible only without dummies), and no time is left to get out of it.
+    """
+    prepared = prepare(problem)
+    columns = run.fallback if run.fallback is not None else greedy_choice(prepared.packing, run)
+    if columns is None:
+        raise infeasible(prepared.packing, run)
+    return _certify(problem, prepared, Outcome(columns, 0, bound - prepared.offset), run, "greedy", GreedyParameters())
+
+
+def _unproved(
+    problem: AssignmentProblem, bound: float, k: int, run: Run, columns: Complete, known: NDArray[np.int32] | None
+) -> Solution:
+    """Return the best solution known when time was over before the best was proved."""
+    if known is None:
+        solution = quick(problem, bound, run)
+    else:
+        (cost, indices), = _in_order(problem, [columns.indices(known)])
+        solution = Solution(problem.tuples[indices], indices, cost, min(bound, cost), "kbest", 0, 0.0)
+        with contextlib.suppress(InfeasibleError):
+            solution = min(solution, quick(problem, bound, run), key=lambda one: one.cost)
     return replace(
-        quick,
-        lower_bound=min(max(bound, quick.lower_bound), quick.cost),
+        solution,
         solver="kbest",
         runtime=run.elapsed(),
         stopped_by=run.stopped_by,

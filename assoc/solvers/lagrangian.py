@@ -96,6 +96,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     from assoc.solvers.bounds import certified_bound, dual_bound, hard_pass
     from assoc.solvers.feasibility import infeasible
     from assoc.solvers.local_search import Cover
+    from assoc.solvers.ordering import ascending
 
     if packing.num_columns == 0:
         if packing.is_axial:
@@ -110,16 +111,20 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     bound = certified_bound(packing, duals)
     if bound == math.inf:
         raise infeasible(packing)
+    if run.fallback is not None and run.should_stop():
+        return Outcome(run.fallback, 0, min(bound, float(packing.weights[run.fallback].sum())), duals)
     search = _Search(packing, duals, parameters, run, bound)
     search.iterate()
     if parameters.polish:
         search.polish()
     columns = search.columns
+    if columns is None and run.fallback is not None:
+        columns = run.fallback.astype(np.int64)
     if columns is None:
         cover = Cover.empty(packing)
-        cover.add_greedily(np.argsort(packing.weights, kind="stable"))
+        cover.add_greedily(ascending(packing.weights))
         if not cover.complete(run):
-            raise infeasible(packing)
+            raise infeasible(packing, run)
         columns = cover.columns().astype(np.int64)
     # the proof of a bound over the columns that are left needs the columns that were dropped, too
     proof = search.proof
@@ -168,6 +173,8 @@ class _Search:
                 # the columns left allow no solution better than the best one
                 self._raise_bound(self.weight, None)
                 break
+            if self.run.should_stop() and (self.columns is not None or self.run.fallback is not None):
+                break
             self._recover()
             self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
             if self._gap_closed() or self.run.should_stop():
@@ -203,7 +210,11 @@ class _Search:
             if self.run.should_stop():
                 return
             change, _ = search.run(
-                cover.owner, self.run.rng, _POLISH_STEPS, _POLISH_TUPLES * self.packing.cols.shape[1]
+                cover.owner,
+                self.run.rng,
+                _POLISH_STEPS,
+                _POLISH_TUPLES * self.packing.cols.shape[1],
+                deadline=self.run.deadline(),
             )
             if change == 0.0:
                 return
@@ -254,7 +265,7 @@ class _Search:
             self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
             if self._gap_closed() or self.run.should_stop():
                 return
-        cover.improve()
+        cover.improve(self.run.deadline())
         improve(self.packing, cover.owner, deadline=self.run.deadline())
         self._offer(cover)
 

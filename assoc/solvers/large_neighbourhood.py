@@ -52,7 +52,7 @@ class LargeNeighbourhood:
         )
         old = chosen_columns(packing.cols, np.where(free, owner, -1))
         before = float(packing.weights[old].sum())
-        search = Search(smaller, part.duals[smaller.row_origin], before, part.tolerance)
+        search = Search(smaller, part.duals[smaller.row_origin], before, part.tolerance, part.deadline)
         search.run(_NODES)
         if not search.done:
             self.share = max(self.share - 0.02, _LEAST)

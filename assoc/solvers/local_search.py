@@ -10,16 +10,23 @@ column for every such row, so that covering comes before cost; what the penalty 
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._compiled import njit
+from assoc.solvers.clock import is_over
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Run
 
 Floats = NDArray[np.float64]
+
+# seconds for the way out of a dead end when time is over
+_GRACE = 0.02
+# columns looked at between two looks at the clock: about a millisecond
+_LOOK = 50_000
 
 
 class Cover:
@@ -67,12 +74,12 @@ class Cover:
         packing = self.packing
         _add_greedily(packing.cols, packing.weights, packing.slack, order, self.owner)
 
-    def improve(self) -> None:
-        """Insert with ejection until no insertion improves."""
+    def improve(self, deadline: float = np.inf) -> None:
+        """Insert with ejection until no insertion improves or time is over (clock.py)."""
         packing = self.packing
         weights = packing.weights if not packing.is_axial else penalised(packing)
         rows = np.arange(packing.num_rows, dtype=np.int32)
-        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows)
+        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
         """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
@@ -84,7 +91,8 @@ class Cover:
         """
         if self.complete_already:
             return True
-        self.improve()
+        # a moment beyond the time, if need be: most dead ends are left in less, and there is nothing else to return
+        self.improve(max(run.deadline(), time.monotonic() + _GRACE))
         if self.complete_already:
             return True
         from assoc.solvers.feasibility import first_solution
@@ -204,8 +212,10 @@ def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int
 
 
 @njit
-def _improve(cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any, rows: Any) -> float:
-    """Insert with ejection around ``rows`` and all rows that change; the sum of the gains."""
+def _improve(
+    cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any, rows: Any, deadline: float
+) -> float:
+    """Insert with ejection around ``rows`` and all rows that change, until time is over; the sum of the gains."""
     num_sensors = cols.shape[1]
     queue = np.empty(owner.size, np.int32)
     waiting = np.zeros(owner.size, np.bool_)
@@ -216,8 +226,14 @@ def _improve(cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any
         waiting[r] = True
         count += 1
     total = 0.0
+    unseen = 0
     while count > 0:
         r = queue[head]
+        unseen += row_ptr[r + 1] - row_ptr[r]
+        if unseen > _LOOK:
+            unseen = 0
+            if is_over(deadline):
+                break
         head = (head + 1) % owner.size
         count -= 1
         waiting[r] = False

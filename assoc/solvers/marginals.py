@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 from assoc._interrupts import interruptible
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
+from assoc.solvers.clusters import clusters_of, distinct, numbered
 from assoc.solvers.complete import Complete
-from assoc.solvers.front import assign
-from assoc.solvers.kbest import checked_k, rank, within
+from assoc.solvers.fallback import greedy_choice, provide
+from assoc.solvers.feasibility import infeasible
+from assoc.solvers.front import _limit
+from assoc.solvers.kbest import checked_k, rank
+from assoc.solvers.packing import prepare
 from assoc.solvers.partition import log_partition
 from assoc.solvers.run import Run
 
@@ -104,38 +108,54 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     the least of several.
     """
     checked_k(k)
-    run = Run(0, time_limit=within(problem, time_limit))
-    tuples, place = _distinct(problem.tuples)
+    run = Run(0, time_limit=_limit(time_limit))
+    # what stands for clusters that there is no time for
+    provide(prepare(problem).packing, run)
+    tuples, place = distinct(problem.tuples)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0
     waiting = np.ones(problem.num_tuples, dtype=bool)
     for cluster, which in _clusters(problem):
         if run.should_stop():
             unseen, listed = 1.0, listed + 1
-            _guess(problem, place[waiting], place, probability, lower, upper)
+            _guess(problem, place[waiting], place, probability, lower, upper, run)
             break
         waiting[which] = False
-        left = None if time_limit is None else max(run.remaining(), 1e-3)
-        own, share, count = _of_cluster(cluster, k, left)
+        # a cluster that is the whole problem has its greedy solution already
+        clock = run if cluster is problem else Run(0, time_limit=run.time_limit, started=run.started)
+        own, share, count = _of_cluster(cluster, k, clock)
         listed += count
         unseen = max(unseen, share)
         # tuples that are listed twice are one: each solution has it once, at whichever place
-        total = np.bincount(place[which], own, len(tuples))
-        touched = np.unique(place[which])
-        probability[touched] = np.minimum(total[touched], 1.0)
+        touched, total = _totals(place[which], own, len(tuples))
+        probability[touched] = np.minimum(total, 1.0)
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
     return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed)
 
 
 def _guess(
-    problem: AssignmentProblem, waiting: NDArray[np.intp], place: NDArray[np.intp], probability: Floats, lower: Floats,
-    upper: Floats,
+    problem: AssignmentProblem, waiting: NDArray[np.int64], place: NDArray[np.int64], probability: Floats,
+    lower: Floats, upper: Floats, run: Run,
 ) -> None:  # fmt: skip
     """Fill in what is known of clusters when time is over: nothing; the greedy solution stands for the best."""
     chosen = np.zeros(probability.size)
-    chosen[place[assign(problem, "greedy", time_limit=1e-6).indices]] = 1.0
+    chosen[place[_greedy(problem, run)]] = 1.0
     probability[waiting], lower[waiting], upper[waiting] = chosen[waiting], 0.0, 1.0
+
+
+def _greedy(problem: AssignmentProblem, run: Run) -> NDArray[np.int64]:
+    """Rows of the tuples of the greedy solution."""
+    prepared = prepare(problem)
+    packing = prepared.packing
+    columns = run.fallback if run.fallback is not None else greedy_choice(packing, run)
+    if columns is None:
+        raise infeasible(packing, run)
+    alone = np.ones(prepared.single.size, dtype=bool)
+    if alone.size:
+        used = packing.cols[columns]
+        alone[packing.row_origin[used[used >= 0]]] = False
+    return np.concatenate([packing.origin[columns].astype(np.int64), prepared.single[alone]])
 
 
 def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
@@ -147,24 +167,31 @@ def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, N
     if not problem.dummy:
         yield problem, np.arange(problem.num_tuples)
         return
-    for which in sorted(problem.components(), key=len):
-        tuples = problem.tuples[which]
-        columns, sizes = [], []
-        for column in tuples.T:
-            used, number = np.unique(column, return_inverse=True)
-            number = number.reshape(-1)
-            # index 0 stays the dummy, whether it occurs or not
-            columns.append(number if used[0] == 0 else number + 1)
-            sizes.append(int(np.count_nonzero(used)))
+    clusters = clusters_of(problem)
+    if len(clusters) == 1 and problem.sizes.sum() > 1:
+        yield problem, clusters[0]
+        return
+    for which in sorted(clusters, key=len):
+        columns, sizes = zip(*(numbered(column) for column in problem.tuples[which].T), strict=True)
         if sum(sizes) > 1:
             yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
 
 
-def _of_cluster(problem: AssignmentProblem, k: int, time_limit: float | None) -> tuple[Floats, float, int]:
+def _totals(place: NDArray[np.int64], own: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return which distinct tuples a cluster has, and the sums of what its tuples have."""
+    if 10 * place.size > num:
+        seen = np.zeros(num, dtype=bool)
+        seen[place] = True
+        touched = np.flatnonzero(seen)
+        return touched, np.asarray(np.bincount(place, own, num), dtype=np.float64)[touched]
+    touched, number = np.unique(place, return_inverse=True)
+    return touched, np.asarray(np.bincount(number.reshape(-1), own), dtype=np.float64)
+
+
+def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, float, int]:
     """Each tuple's share in the weight of the k best, the share of the unseen rest, and how many are listed."""
-    run = Run(0, time_limit=time_limit)
     # one more than is listed: its cost bounds all that are not
-    ranking = rank(problem, k + 1, time_limit)
+    ranking = rank(problem, k + 1, None, run)
     solutions = ranking.solutions[:k]
     rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
     best = min(solution.cost for solution in solutions)
@@ -179,18 +206,6 @@ def _of_cluster(problem: AssignmentProblem, k: int, time_limit: float | None) ->
     return np.minimum(own / total, 1.0), share, len(solutions)
 
 
-def _distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-    """Return the different tuples in lexicographic order, and the place of each tuple among them."""
-    sides = tuples.max(axis=0, initial=0).astype(np.int64) + 1
-    if float(np.prod(sides, dtype=float)) < 2.0**62:
-        # one number for each tuple: ten times as quick as comparing rows
-        keys = np.ravel_multi_index(tuple(tuples.astype(np.int64).T), tuple(sides))
-        _, first, place = np.unique(keys, return_index=True, return_inverse=True)
-        return tuples[first], place.reshape(-1)
-    rows, place = np.unique(tuples, axis=0, return_inverse=True)
-    return rows, place.reshape(-1)
-
-
 def _others(problem: AssignmentProblem, columns: Complete, listed: list[Solution], rest: float, run: Run) -> float:
     """Bound the weight, relative to that of the best, of all solutions that are not listed and cost ``rest``."""
     if rest == np.inf:
@@ -198,12 +213,15 @@ def _others(problem: AssignmentProblem, columns: Complete, listed: list[Solution
     bound = columns.bound + columns.offset
     excess = np.maximum(np.array([solution.cost for solution in listed]) - bound, 0.0)
     least = max(rest - bound, 0.0)
-    sensor_of = np.repeat(np.arange(problem.num_sensors), problem.sizes)
     smallest = np.inf
+    if run.should_stop():
+        return smallest
+    sensor_of = np.repeat(np.arange(problem.num_sensors), problem.sizes)
+    packing = columns.keep(np.inf)
     for a in _EXPONENTS:
         if run.should_stop():
             break
-        log_all = log_partition(columns, sensor_of, a, deadline=run.deadline())
+        log_all = log_partition(columns, sensor_of, a, deadline=run.deadline(), packing=packing)
         # all in logarithms: counts of solutions overflow
         seen = float(np.exp(-a * excess - log_all).sum())
         left = max(1.0 - seen, 0.0) + 1e-12

@@ -199,7 +199,7 @@ def _walk(
                 for s in range(num_sensors):
                     if cols[chosen, s] >= 0:
                         owner[cols[chosen, s]] = chosen
-        _improve(cols, weights, row_ptr, row_cols, owner, everything)
+        _improve(cols, weights, row_ptr, row_cols, owner, everything, deadline)
         weight = 0.0
         for r in range(num_rows):
             j = owner[r]

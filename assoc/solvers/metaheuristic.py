@@ -27,6 +27,7 @@ from assoc.solvers.feasibility import infeasible
 from assoc.solvers.large_neighbourhood import LargeNeighbourhood
 from assoc.solvers.linear_program import linear_program_duals
 from assoc.solvers.local_search import Cover, chosen_columns
+from assoc.solvers.ordering import ascending
 from assoc.solvers.packing import Packing
 from assoc.solvers.run import Outcome, Run
 
@@ -120,8 +121,8 @@ class Part:
     def offer_greedy(self) -> None:
         """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
         cover = Cover.empty(self.packing)
-        cover.add_greedily(np.argsort(self.reduced, kind="stable"))
-        cover.improve()
+        cover.add_greedily(ascending(self.reduced))
+        cover.improve(self.deadline)
         self.offer(cover.owner, weight_of(self, cover.owner))
 
     def improve(self, owner: Owner, rng: np.random.Generator, steps: int) -> float:
@@ -130,7 +131,7 @@ class Part:
             return 0.0
         if self.clusters is None:
             self.clusters = ClusterSteps(self.packing, self.duals)
-        return self.clusters.improve(owner, rng, steps)
+        return self.clusters.improve(owner, rng, steps, self.deadline)
 
     def polish(self, owner: Owner) -> float:
         """Improve a complete cover in place by dimensionwise search; return its weight."""
@@ -336,9 +337,9 @@ def _columns(part: Part) -> NDArray[np.int64]:
 def complete(part: Part, run: Run) -> None:
     """Last resort for a part in which no iteration covered all that must be covered."""
     cover = Cover.empty(part.packing)
-    cover.add_greedily(np.argsort(part.reduced, kind="stable"))
+    cover.add_greedily(ascending(part.reduced))
     if not cover.complete(run):
-        raise infeasible(part.packing)
+        raise infeasible(part.packing, run)
     part.offer(cover.owner, cover.weight)
     if part.best is None:
         raise InfeasibleError("no complete solution was found")
@@ -351,7 +352,7 @@ def bound_of_part(part: Part, run: Run) -> float:
         return part.weight if part.packing.granularity else min(part.bound, part.weight)
     if run.should_stop():
         return part.bound
-    search = Search(part.packing, part.duals, part.weight, part.tolerance)
+    search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)
     return min(max(part.bound, search.lower_bound), part.weight)

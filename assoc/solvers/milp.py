@@ -115,7 +115,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         run.should_stop()
     columns = _better(packing, answer.columns, columns)
     if columns is None:
-        raise infeasible(packing)
+        raise infeasible(packing, run)
     if answer.bound > bound:
         bound, duals = answer.bound, None
     run.record(answer.nodes, float(packing.weights[columns].sum()), bound)
@@ -219,10 +219,14 @@ def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
 def _quick(packing: Packing, run: Run) -> NDArray[np.integer] | None:
     """Return a greedy solution improved by insertion; None if there is none."""
     from assoc.solvers.local_search import Cover
+    from assoc.solvers.ordering import ascending
 
-    cover = Cover.empty(packing)
-    cover.add_greedily(np.argsort(packing.weights, kind="stable"))
-    cover.improve()
+    if run.fallback is None:
+        cover = Cover.empty(packing)
+        cover.add_greedily(ascending(packing.weights))
+    else:
+        cover = Cover.of(packing, run.fallback)
+    cover.improve(run.deadline())
     return cover.columns() if cover.complete(run) else None
 
 

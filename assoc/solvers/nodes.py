@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from assoc import _memory
 from assoc._compiled import njit
+from assoc.solvers.clock import is_over
 from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
 
 _DEPTH = 64
+# columns swept between two looks at the clock: about a millisecond
+_LOOK = 50_000
 
 
 class OpenNodes:
@@ -182,13 +185,20 @@ def smooth_sweeps(
     temperature: float,
     passes: int,
     relaxation: float,
+    deadline: float,
 ) -> None:
     """Smoothed passes (bounds.py) from multipliers whose reduced costs are given."""
     for a in range(num):
         primal[a] = math.exp(min(-reduced[a] / temperature, 500.0))
     for r in range(slack.size):
         slack_primal[r] = math.exp(min(duals[r] / temperature, 500.0)) if slack[r] else 0.0
+    unseen = 0
     for sweep in range(passes):
+        unseen += num
+        if unseen > _LOOK:
+            unseen = 0
+            if is_over(deadline):
+                break
         omega = relaxation if sweep >= 5 else 1.0
         worst = 0.0
         for r in range(slack.size):

@@ -19,7 +19,6 @@ one of its rows. With time enough nothing but solutions is left and the sum is e
 from __future__ import annotations
 
 import math
-import time
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,9 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.assignment2d import _pop, _push
+from assoc.solvers.clock import is_over
 from assoc.solvers.complete import Complete
+from assoc.solvers.packing import Packing
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +37,12 @@ WORK = 20_000_000
 
 
 def log_partition(
-    columns: Complete, sensor_of: NDArray[np.int64], a: float, work: int = WORK, deadline: float = math.inf
+    columns: Complete,
+    sensor_of: NDArray[np.int64],
+    a: float,
+    work: int = WORK,
+    deadline: float = math.inf,
+    packing: Packing | None = None,
 ) -> float:
     """Return an upper bound on ln Z(a).
 
@@ -52,8 +58,10 @@ def log_partition(
         Column visits spent on each component.
     deadline : float
         After it, in seconds of `time.monotonic`, no component is sharpened: the bound holds, but is wide.
+    packing : Packing, optional
+        ``columns.keep(inf)``, where it is at hand.
     """
-    packing = columns.keep(np.inf)
+    packing = packing or columns.keep(np.inf)
     inside = np.zeros(columns.slack.size, dtype=bool)
     inside[packing.row_origin] = True
     # a row without columns stays uncovered, at its price
@@ -71,7 +79,8 @@ def log_partition(
             np.ascontiguousarray(piece.row_cols),
             sensor_of[rows],
             a,
-            work if deadline == math.inf or time.monotonic() < deadline else 0,
+            work,
+            deadline,
         )
     return total
 
@@ -79,7 +88,7 @@ def log_partition(
 @njit
 def _component(
     cols: Any, reduced: Floats, slack: Any, slack_reduced: Floats, row_ptr: Any, row_cols: Any, sensor_of: Any,
-    a: float, work: int
+    a: float, work: int, deadline: float
 ) -> float:  # fmt: skip
     """Bound ln Z(a) of one component by splitting the part of the largest product first."""
     num_rows = slack.size
@@ -106,7 +115,7 @@ def _component(
     closed = 0.0
     visits = cols.size * cols.shape[1]
     spent_work = 0
-    while size > 0 and spent_work < work:
+    while size > 0 and spent_work < work and not is_over(deadline):
         node = item[0]
         # what is left below this share of the whole is not worth the time
         if log_bound[node] - top < -30.0:
@@ -140,6 +149,10 @@ def _component(
                 if weights[j] == 0.0 or not _fits(cols, before, j):
                     continue
                 price = -a * reduced[j]
+            if is_over(deadline):
+                # the part counts whole, beside those of its choices that are counted already: still a bound
+                closed += math.exp(log_bound[node] - top)
+                break
             if used == capacity:
                 done = np.concatenate((done, np.zeros((capacity, num_rows), np.bool_)))
                 log_spent = np.concatenate((log_spent, np.zeros(capacity)))

@@ -41,8 +41,10 @@ def rank_planar(problem: AssignmentProblem, k: int, run: Run) -> tuple[Complete,
     prepared = prepare(problem)
     if not murty.feasible:
         raise infeasible(prepared.packing)
+    # shortest paths of some ten milliseconds between two looks at the clock
+    turn = min(2000, max(1, 5_000_000 // max(weights.size, 1)))
     while not murty.done and not run.should_stop():
-        murty.run(2000)
+        murty.run(turn)
     u, v = murty.duals
     duals = np.concatenate([v, u] if turned else [u, v])
     columns = priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)

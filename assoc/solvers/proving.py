@@ -61,7 +61,9 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     tasks: list[_Task] = []
     settled: list[_Task] = []
     nodes = 0
+    deadline = run.deadline()
     for part in parts:
+        part.deadline = deadline
         task = _branch_shortly(part, min(_SHORT, node_limit - nodes), run)
         if task.search is not None:
             nodes += task.search.nodes
@@ -79,7 +81,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         part = task.part
         if not part.closed and not run.should_stop() and nodes < node_limit:
             if task.search is None:
-                task.search = Search(part.packing, part.duals, part.weight, part.tolerance)
+                task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
                 part.stalled = 0
             before = task.search.nodes
             # some ten milliseconds of work between two looks at the clock
@@ -124,7 +126,7 @@ def _branch_shortly(part: Part, nodes: int, run: Run) -> _Task:
     task = _Task(part)
     if part.closed or part.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = Search(part.packing, part.duals, part.weight, part.tolerance)
+    task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
     task.search.run(nodes)
     task.take_over()
     return task

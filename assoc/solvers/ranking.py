@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from assoc._compiled import njit
 from assoc.solvers.branching import doubtful_pairs
+from assoc.solvers.clock import is_over
 from assoc.solvers.enumeration import NOT_COMPLETE, cut_of, enumerate_solutions, new_store
 from assoc.solvers.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
 from assoc.solvers.packing import Packing
@@ -42,13 +43,24 @@ class ComponentRanking:
         Differences of weight that are ties.
     budget : int
         Decisions of enumeration at a node, beyond one for each row, before it is branched.
+    deadline : float
+        When time is over, by the kernels' clock (clock.py): the node at work stays open.
     """
 
     def __init__(
-        self, packing: Packing, duals: Floats, k: int, limit: float, tolerance: float, *, budget: int = NODE_BUDGET
+        self,
+        packing: Packing,
+        duals: Floats,
+        k: int,
+        limit: float,
+        tolerance: float,
+        *,
+        budget: int = NODE_BUDGET,
+        deadline: float = np.inf,
     ) -> None:
         self._packing = packing
         self._budget = budget
+        self._deadline = deadline
         self._k = k
         self._limit = limit
         self._tolerance = tolerance
@@ -80,7 +92,7 @@ class ComponentRanking:
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
-        while not self.done and self.nodes < target:
+        while not self.done and self.nodes < target and not is_over(self._deadline):
             self._open.count, done, self._store = _rank(
                 self._packing.cols,
                 self._packing.weights,
@@ -92,9 +104,10 @@ class ComponentRanking:
                 target - self.nodes,
                 self._budget + self._packing.num_rows,
                 self._store,
+                self._deadline,
             )
             self.nodes += done
-            if not self.done and self.nodes < target:
+            if not self.done and self.nodes < target and not is_over(self._deadline):
                 self._open.grow()
 
 
@@ -114,11 +127,11 @@ def _sorted_store(store: Any) -> Any:
 def _rank(
     cols: Any, weights: Floats, arena: Any, first: Any, size: Any, node_duals: Floats, node_slack: Any,
     node_bound: Floats, num_open: int, k: int, limit: float, tolerance: float, node_limit: int, budget: int,
-    store: Any
+    store: Any, deadline: float
 ) -> Any:  # fmt: skip
     """Search depth first; the number of open nodes, the nodes done, and the store.
 
-    Stops early with nodes open when there is no room left for two children.
+    Stops early with nodes open when there is no room left for two children, or time is over.
     """
     num_sensors = cols.shape[1]
     num_rows = node_duals.shape[1]
@@ -130,6 +143,7 @@ def _rank(
     row_ptr = np.zeros(num_rows + 1, np.int64)
     row_cols = np.empty(most * num_sensors, np.int32)
     reduced = np.empty(most)
+    blocked = np.empty(most, np.int32)
     primal = np.empty(most)
     slack_primal = np.empty(num_rows)
     duals = np.empty(num_rows)
@@ -157,10 +171,16 @@ def _rank(
         lower = node_bound[top]
         temperature = 0.0
         closed = False
+        over = False
         for level in range(3):
+            over = is_over(deadline)
+            if over:
+                break
             index_by_row(cols, active, num, row_ptr, row_cols)
             if level > 0:
-                smooth_sweeps(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5)
+                smooth_sweeps(
+                    slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5, deadline
+                )
             reduced_of(cols, weights, active, num, duals, reduced)
             if not hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2):
                 closed = True
@@ -187,7 +207,7 @@ def _rank(
                     own_cols[a] = cols[active[a]]
                 steps, store = enumerate_solutions(
                     own_cols, active, reduced[:num], slack, duals, row_ptr, row_cols, 0, num_rows,
-                    bound, k, limit, tolerance, budget, True, store,
+                    bound, k, limit, tolerance, budget, True, store, blocked, deadline,
                 )  # fmt: skip
                 if steps != NOT_COMPLETE:
                     closed = True
@@ -195,12 +215,19 @@ def _rank(
                 cut = cut_of(store, k, limit, tolerance)
             gap = cut - lower if cut < np.inf else max(0.1 * abs(lower), 1e3 * tolerance)
             temperature = max(gap * (0.1 if level == 0 else 0.03), tolerance)
+        if over:
+            # the node's columns and multipliers are as they were; what it listed already is known again
+            num_open = top + 1
+            nodes -= 1
+            break
         if closed or lower >= cut:
             continue
         index_by_row(cols, active, num, row_ptr, row_cols)
         duals[:] = kept_duals
         reduced_of(cols, weights, active, num, duals, reduced)
-        smooth_sweeps(slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.0)
+        smooth_sweeps(
+            slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.0, deadline
+        )
         # with distinct columns there always is one: without an open question enumeration would have been complete
         doubtful_pairs(cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values)
         one, two = pairs[0]
@@ -214,7 +241,7 @@ def _rank(
 @njit
 def rank_components(
     cols: Any, reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, row_start: Any, budget: int,
-    k: int, room: float, tolerance: float
+    k: int, room: float, tolerance: float, deadline: float
 ) -> Any:  # fmt: skip
     """Enumerate the k lightest solutions of each component of a packing.
 
@@ -232,6 +259,8 @@ def rank_components(
         How far above their bounds all components together may be.
     tolerance : float
         Differences of weight that are ties.
+    deadline : float
+        When time is over (clock.py).
 
     Returns
     -------
@@ -242,7 +271,7 @@ def rank_components(
     pointer, columns : int64 and int32 arrays
         Solution i has the columns ``columns[pointer[i]:pointer[i + 1]]``.
     proven : float array, shape (C,)
-        What is not among a component's solutions weighs at least this; -inf: the budget did not suffice.
+        What is not among a component's solutions weighs at least this; -inf: the budget or the time did not suffice.
     """
     num_components = row_start.size - 1
     start = np.zeros(num_components + 1, np.int64)
@@ -251,6 +280,7 @@ def rank_components(
     columns = np.empty(256, np.int32)
     proven = np.full(num_components, -np.inf)
     names = np.arange(reduced.size).astype(np.int32)
+    blocked = np.empty(reduced.size, np.int32)
     count = 0
     for c in range(num_components):
         top, end = row_start[c], row_start[c + 1]
@@ -261,6 +291,7 @@ def rank_components(
         steps, store = enumerate_solutions(
             cols, names, reduced, slack, duals, row_ptr, row_cols, top, end,
             base, k, limit, tolerance, budget + end - top, False, new_store(end - top),
+            blocked, deadline,
         )  # fmt: skip
         if steps != NOT_COMPLETE:
             proven[c] = cut_of(store, k, limit, tolerance)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from assoc._compiled import njit
 from assoc.solvers import bounds
 from assoc.solvers.bounds import _component_bounds, _hard_sweeps, _reduced_costs, _smooth_passes, _spread
+from assoc.solvers.clock import is_over
 from assoc.solvers.local_search import _add_greedily, _improve, penalised_weights
 from assoc.solvers.metaheuristic import TOLERANCE, Part, split_components
 from assoc.solvers.packing import Packing, _assemble, _find
@@ -76,8 +77,9 @@ class Reduction:
         )
         while counts[0] < _PASSES.size and state[1].size and not self._run.should_stop():
             state = _reduce(
-                *state, _PASSES, counts, columns, closed, self._proof, TOLERANCE, whole.granularity, _VISITS
-            )
+                *state, _PASSES, counts, columns, closed, self._proof, TOLERANCE, whole.granularity, _VISITS,
+                self._run.deadline(),
+            )  # fmt: skip
         self.closed_columns.append(columns[: counts[1]])
         self.closed_bound = math.fsum(closed[: counts[2], 0])
         self.closed_weight = math.fsum(closed[: counts[2], 1])
@@ -112,7 +114,7 @@ def _start(cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: An
     temperature = _spread(weights, slack, col_start, row_start) * bounds.START
     return (
         cols, weights, slack, col_start, row_start, row_ptr, row_cols,
-        np.arange(num).astype(np.int32), np.arange(num_rows).astype(np.int32), smooth, np.zeros(num_rows),
+        np.arange(num).astype(np.int32), np.arange(num_rows).astype(np.int32), smooth, smooth.copy(),
         np.full(num_rows, -1, np.int32), np.full(parts, np.inf), np.full(parts, -np.inf), temperature,
     )  # fmt: skip
 
@@ -122,7 +124,7 @@ def _reduce(
     cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,
     origin: Any, rows: Any, smooth: Floats, hard: Floats, owner: Any, weight: Floats, bound: Floats,
     temperature: Floats, passes: Any, counts: Any, closed_columns: Any, closed: Floats, proof: Floats,
-    tolerance: float, granularity: float, most_visits: int,
+    tolerance: float, granularity: float, most_visits: int, deadline: float,
 ) -> Any:  # fmt: skip
     """Go through temperatures until none is left, nothing is open or the visits are used up; the new state.
 
@@ -133,12 +135,15 @@ def _reduce(
         reduced, primal, slack_primal = np.empty(weights.size), np.empty(weights.size), np.empty(slack.size)
         visits += _smooth_passes(
             cols, weights, slack, row_start, col_start, row_ptr, row_cols, smooth, reduced, primal, slack_primal,
-            temperature, passes[counts[0]],
+            temperature, passes[counts[0]], deadline,
         )  # fmt: skip
+        # the first cover and the first bound are worth being late for
+        if counts[0] > 0 and is_over(deadline):
+            break
         duals = smooth.copy()
         _reduced_costs(cols, weights, duals, reduced)
         _hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2)
-        new_owner = _round(cols, weights, slack, col_start, row_ptr, row_cols, reduced, temperature)
+        new_owner = _round(cols, weights, slack, col_start, row_ptr, row_cols, reduced, temperature, deadline)
         keep, alive = _compare(
             cols, weights, slack, col_start, row_start,
             _component_bounds(cols, weights, slack, col_start, row_start, row_ptr, duals), duals, new_owner,
@@ -206,7 +211,7 @@ def _reduce(
 @njit
 def _round(
     cols: Any, weights: Floats, slack: Any, col_start: Any, row_ptr: Any, row_cols: Any, reduced: Floats,
-    temperature: Floats,
+    temperature: Floats, deadline: float,
 ) -> Any:  # fmt: skip
     """A cover from the columns of small reduced cost, improved by insertion."""
     # sorted by counting: classes of 1/64 temperature are fine enough, and ties stay in their order
@@ -235,7 +240,8 @@ def _round(
             if not slack[r]:
                 axial = True
                 break
-        _improve(cols, penalised_weights(cols, weights, slack) if axial else weights, row_ptr, row_cols, owner, loose)
+        priced = penalised_weights(cols, weights, slack) if axial else weights
+        _improve(cols, priced, row_ptr, row_cols, owner, loose, deadline)
     return owner
 
 

@@ -36,6 +36,8 @@ class Run:
         Seconds from ``started``.
     callback : callable or None
         Called with each TracePoint; a true answer stops the solver.
+    fallback : int array or None
+        The greedy choice of columns, where it was made first (fallback.py).
     watch : callable or None
         Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
     """
@@ -48,6 +50,7 @@ class Run:
     started: float = field(default_factory=time.perf_counter)
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""
+    fallback: NDArray[np.integer] | None = None
     _rng: np.random.Generator | None = None
 
     @property

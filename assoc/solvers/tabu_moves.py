@@ -91,7 +91,7 @@ class TabuSearch:
             part.offer(owner, weight)
             if weight < least and not incomplete(part, owner):
                 best, least = owner, weight
-            if part.closed:
+            if part.closed or part.late:
                 break
         return Cover.empty(part.packing).owner if best is None else best.copy()
 
