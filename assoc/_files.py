@@ -147,6 +147,16 @@ def _read(
     return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
 
 
+def format_of(path: str | os.PathLike[str]) -> str | None:
+    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
+    file = Path(path)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return str(_member(file, archive, archive.getinfo("format.npy"), Field("str", 0))[()])
+    except Exception:  # whatever a damaged file raises here, loading says it better
+        return None
+
+
 def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field) -> Array:
     """One array, its header checked before memory is taken for it."""
     name = info.filename.removesuffix(".npy")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
-import zipfile
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from assoc._files import format_of
 from assoc._outputs import check_writable, is_stream
 from assoc._program import one_line
 from assoc.errors import InvalidInputError
@@ -25,7 +24,7 @@ def load_source(path: str) -> Scene | AssignmentProblem:
     InvalidInputError
         It is neither, or cannot be read.
     """
-    found = _format_of(path)
+    found = format_of(path)
     if found == "assoc.problem":
         from assoc.problem import AssignmentProblem
 
@@ -35,21 +34,6 @@ def load_source(path: str) -> Scene | AssignmentProblem:
     from assoc.scene import Scene
 
     return Scene.load(path)
-
-
-def _format_of(path: str) -> str | None:
-    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
-    import numpy as np
-
-    try:
-        with zipfile.ZipFile(path) as archive:
-            member = archive.getinfo("format.npy")
-            if member.file_size > 10_000:
-                return None
-            text = np.lib.format.read_array(io.BytesIO(archive.read(member)), allow_pickle=False)
-    except Exception:  # whatever a damaged file raises here, the loader says it better
-        return None
-    return str(text) if text.dtype.kind == "U" and text.ndim == 0 else None
 
 
 def scan_range(text: str, count: int, name: str) -> range:

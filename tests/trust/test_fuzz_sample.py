@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import subprocess
+import sys
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -53,3 +58,17 @@ def test_the_judge_sees_faults(tmp_path):
     for read, words in [(lines, "several lines"), (crash, "IndexError"), (lambda path: None, None)]:
         fault = judge(Room("x", "text", lambda folder: [], read), path)
         assert (fault is None) if words is None else words in fault
+
+
+def test_a_format_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path):
+    """The first look at a file, which asks only for its format, takes no more on trust than the reader does."""
+    path = tmp_path / "large.npz"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<U500000000", "fortran_order": False, "shape": ()})
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("format.npy", header.getvalue())
+    code = (
+        "import sys, tracemalloc; import numpy; from assoc._files import format_of; tracemalloc.start();"
+        "assert format_of(sys.argv[1]) is None; assert tracemalloc.get_traced_memory()[1] < 1e6"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code, str(path)], check=True, timeout=60)
