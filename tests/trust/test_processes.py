@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.simulation import simulate
 from assoc.solvers.front import assign
 from assoc.solvers.kbest import kbest
+from assoc.solvers.marginals import marginals
+from assoc.tracking import MultiSensorTracker
 from tests.oracles import gated_problem, small_problems
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute
@@ -59,6 +62,28 @@ def test_threads_share_one_problem():
         lists = list(pool.map(lambda _: [one.cost for one in kbest(fresh, 5)], range(8)))
     assert all(one.tuples.tolist() == alone.tuples.tolist() and one.cost == alone.cost for one in found)
     assert all(one == ranked for one in lists)
+
+
+def test_threads_rank_track_and_weigh_alone():
+    """Rankings, marginals and trackers in eight threads, each on its own scene."""
+
+    def work(number):
+        scene = simulate("three-radar", number, scans=4)
+        problem = assoc.build_problem(scene, 0)
+        weighed = marginals(problem, 5)
+        tracker = MultiSensorTracker.for_scene(scene)
+        steps = [tracker.step(scan.time, scan.measurements) for scan in scene]
+        return (
+            [(one.cost, one.tuples.tobytes()) for one in kbest(problem, 5)],
+            (weighed.lower.tobytes(), weighed.upper.tobytes()),
+            [[assigned.tobytes() for assigned in step.assigned] for step in steps],
+            [(track.track_id, track.mean.tobytes()) for track in tracker.tracks],
+        )
+
+    alone = [work(number) for number in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(2):
+            assert list(pool.map(work, range(8))) == alone
 
 
 @pytest.mark.parametrize("method", ["spawn", "forkserver"])
