@@ -72,7 +72,8 @@ def test_threads_rank_track_and_weigh_alone():
         problem = assoc.build_problem(scene, 0)
         weighed = marginals(problem, 5)
         tracker = MultiSensorTracker.for_scene(scene)
-        steps = [tracker.step(scan.time, scan.measurements) for scan in scene]
+        scans = [scene.scan(k) for k in range(scene.num_scans)]
+        steps = [tracker.step(scan.time, scan.measurements) for scan in scans]
         return (
             [(one.cost, one.tuples.tobytes()) for one in kbest(problem, 5)],
             (weighed.lower.tobytes(), weighed.upper.tobytes()),
