@@ -9,7 +9,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
@@ -60,7 +60,15 @@ def save_npz(
                 f"{path}: the field {name!r} holds Python objects, expected a plain array"
             )
     header = {"format": np.asarray(format_name), "version": np.asarray(version)}
-    write_atomically(path, lambda file: np.savez_compressed(file, **header, **content))  # type: ignore[arg-type]
+
+    def write(file: IO[bytes]) -> None:
+        # as numpy's savez_compressed, whose archive is left open where the disk is full, and complains of that later
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, value in {**header, **content}.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, value, allow_pickle=False)
+
+    write_atomically(path, write)
 
 
 def load_npz(

@@ -19,10 +19,11 @@ def test_committed_pictures_are_those_of_the_gallery():
 
 def test_a_picture_is_drawn_anew(tmp_path, capsys):
     assert gallery.main(["scene", "-o", str(tmp_path)]) == 0
-    drawn = np.asarray(Image.open(tmp_path / "scene.png").convert("L"), dtype=float)
-    known = np.asarray(Image.open(gallery.FOLDER / "scene.png").convert("L"), dtype=float)
-    # fonts differ between versions of matplotlib, what is drawn does not
-    assert drawn.shape == known.shape and np.abs(drawn - known).mean() < 8.0
+    drawn, known = Image.open(tmp_path / "scene.png"), Image.open(gallery.FOLDER / "scene.png")
+    # fonts differ between versions of matplotlib, and with them sizes by a pixel or two; what is drawn does not
+    assert np.abs(np.subtract(drawn.size, known.size)).max() <= 3
+    one, other = (np.asarray(image.convert("L").resize(known.size), dtype=float) for image in (drawn, known))
+    assert np.abs(one - other).mean() < 8.0
     assert capsys.readouterr().out.startswith("scene")
     with pytest.raises(SystemExit):
         gallery.main(["no-such-picture", "-o", str(tmp_path)])
