@@ -85,7 +85,7 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as it can be sorted by: lists, tables and numbers beyond 64 bits (someone changed them) as text."""
+    """Return a value as it can be sorted by: what someone changed to lists, tables, long numbers as text."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return str(value)
     return value if value is None or isinstance(value, (str, bool, int, float)) else str(value)
