@@ -28,9 +28,8 @@ demo: $(VENV)/.installed
 	$(PY) -m assoc.simulate three-radar -o demo/scene.npz
 	$(PY) -m assoc.solve demo/scene.npz --solver aco --json demo/result.json
 
-# whole files to a process: two that work at one file compile the same kernels and make the same scenes
 test: $(VENV)/.installed-test
-	$(PY) -m pytest -n 2 --dist loadfile -q
+	$(PY) -m pytest -n 2 -q
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .
