@@ -15,8 +15,8 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 p
 VENV := .venv
 OLDEST := .venv-oldest
 # tests with much behind them that are quick without a compiler
-UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_track_gating.py tests/simulation/test_observation.py \
-	tests/solvers/test_reduction.py tests/solvers/test_assignment2d.py tests/solvers/test_dimensionwise.py \
+UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tests/simulation/test_observation.py \
+	tests/solvers/test_reduction.py tests/packing/test_matching.py tests/packing/test_dimensionwise.py \
 	"tests/solvers/test_against_brute_force.py::test_small_problems[exact]" tests/tracking/test_multi_sensor.py
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
@@ -40,8 +40,8 @@ docs: $(VENV)/.installed-docs
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 fuzz: $(VENV)/.installed-test
-	$(PY) -m tests.trust.fuzzing --count 20000 --processes 2
-	$(PY) -m tests.trust.differential --count 3000 --processes 2
+	$(PY) -m tests.reliability.fuzzing --count 20000 --processes 2
+	$(PY) -m tests.reliability.differential --count 3000 --processes 2
 
 # numba keeps the kernels of one version only: they must not take the place of the others
 test-oldest: $(OLDEST)/.installed-test
@@ -51,7 +51,7 @@ test-uncompiled: $(VENV)/.installed-test
 	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $(UNCOMPILED)
 
 test-cold: $(VENV)/.installed-test
-	$(PY) -m tests.trust.cold_cache
+	$(PY) -m tests.reliability.cold_cache
 
 check-dist: $(VENV)/.installed-release
 	$(PY) -m tests.release.distribution

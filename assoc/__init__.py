@@ -12,15 +12,15 @@ from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitEx
 
 if TYPE_CHECKING:
     from assoc import plotting, solvers, sweeps
-    from assoc.association import Association, associate
+    from assoc.association.association import Association, associate
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
-    from assoc.scene import Scene
+    from assoc.ranking.kbest import kbest
+    from assoc.ranking.marginals import marginals
+    from assoc.scene.scene import Scene
     from assoc.solution import Solution
-    from assoc.solvers.front import assign
-    from assoc.solvers.kbest import kbest
-    from assoc.solvers.marginals import marginals
-    from assoc.solvers.warming import warm_up
+    from assoc.solvers.assign import assign
+    from assoc.solvers.warm_up import warm_up
 
 __version__ = "0.1.0"
 
@@ -49,12 +49,12 @@ _HOME = {
     "Association": "assoc.association",
     "Scene": "assoc.scene",
     "Solution": "assoc.solution",
-    "assign": "assoc.solvers.front",
+    "assign": "assoc.solvers.assign",
     "associate": "assoc.association",
     "build_problem": "assoc.costs",
-    "kbest": "assoc.solvers.kbest",
-    "marginals": "assoc.solvers.marginals",
-    "warm_up": "assoc.solvers.warming",
+    "kbest": "assoc.ranking.kbest",
+    "marginals": "assoc.ranking.marginals",
+    "warm_up": "assoc.solvers.warm_up",
 }
 
 

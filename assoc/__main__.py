@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assoc._program import run, steady_streams
+from assoc._cli.program import run, steady_streams
 
 _PROGRAMS = {
     "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assoc import _memory
+from assoc._system import memory
 from assoc.errors import InvalidInputError, LimitExceededError
 
 FORMAT = "assoc.problem"
@@ -86,7 +86,7 @@ class AssignmentProblem:
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
         # by columns to be checked, and what is kept, at first without and then with the singletons
-        _memory.require(
+        memory.require(
             tuples_.size * (tuples_.itemsize + 1 + 2 * 4.0) + 40.0 * costs_.size,
             f"tuples: {tuples_.shape[0]} of {sizes_.size} sensors",
             "split the problem",
@@ -120,7 +120,7 @@ class AssignmentProblem:
 
     def _repr_html_(self) -> str:
         """Return what notebooks and reports show: how many tuples of each size there are, and their costs."""
-        from assoc._html import escape, table
+        from assoc._text.html import escape, table
 
         found = np.count_nonzero(self.tuples, axis=1)
         rows = []
@@ -157,13 +157,13 @@ class AssignmentProblem:
         if dummy and min(dense.shape) == 0:
             raise InvalidInputError(f"tensor: each dimension needs its dummy at index 0, got {dense.shape}")
         advice = "list the allowed tuples instead"
-        _memory.require(2.0 * dense.size, f"tensor: {dense.size} elements", advice)
+        memory.require(2.0 * dense.size, f"tensor: {dense.size} elements", advice)
         keep = ~np.isposinf(dense)
         if dummy:
             keep[(0,) * dense.ndim] = False
         count = np.count_nonzero(keep)
         # numpy's list of indices and the stacked one; then what a problem of them takes
-        _memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
+        memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
         index = np.stack(np.nonzero(keep), axis=1)
         offset = 0 if dummy else 1
         sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
@@ -185,7 +185,7 @@ class AssignmentProblem:
             )
         # the tensor, and indices that numpy widens
         needed = 8.0 * elements + 32.0 * self.tuples.size
-        _memory.require(needed, f"a dense tensor of {elements:.3g} elements", "use .tuples, .costs")
+        memory.require(needed, f"a dense tensor of {elements:.3g} elements", "use .tuples, .costs")
         dense = np.full(shape, np.inf)
         index = self.tuples if self.dummy else self.tuples - 1
         np.minimum.at(dense, tuple(index.T), self.costs)
@@ -219,7 +219,7 @@ class AssignmentProblem:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write ``problem.npz`` (format "assoc.problem", version 1; docs/formats.md)."""
-        from assoc._files import save_npz
+        from assoc._files.npz import save_npz
 
         save_npz(
             path,
@@ -237,7 +237,7 @@ class AssignmentProblem:
         InvalidInputError
             The file is missing, damaged, of another format or a future version, or its content is wrong.
         """
-        from assoc._files import Field, load_npz
+        from assoc._files.npz import Field, load_npz
 
         fields = {
             "tuples": Field("int", 2),

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from assoc._inputs import check_distinct, check_output
-from assoc._program import Option, Parser, begin, given, options, printable, run, whole_number
+from assoc._cli.inputs import check_distinct, check_output
+from assoc._cli.program import Option, Parser, begin, given, options, printable, run, whole_number
 from assoc.errors import InvalidInputError
 
 _PURPOSE = {

@@ -108,7 +108,7 @@ class Solution:
 
     def _repr_html_(self) -> str:
         """Return what notebooks show: the certificate, and the first tuples that are more than a false alarm."""
-        from assoc._html import escape, facts, table
+        from assoc._text.html import escape, facts, table
 
         certificate = {
             "solver": self.solver,

@@ -12,16 +12,16 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._extras import check_extra
-from assoc._inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
-from assoc._program import Option, Parser, begin, each, given, options, run, seconds, whole_number
+from assoc._cli.inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
+from assoc._cli.program import Option, Parser, begin, each, given, options, run, seconds, whole_number
+from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc._plan import Plan
-    from assoc.association import Association, ScanAssociation
+    from assoc.association.association import Association, ScanAssociation
+    from assoc.association.plan import Plan
     from assoc.problem import AssignmentProblem
-    from assoc.scene import Scene
+    from assoc.scene.scene import Scene
 
 DEFAULT_SOLVER = "exact"
 _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
@@ -177,7 +177,7 @@ def _plan(
     settings: dict[str, Any],
     parameters: dict[str, Any],
 ) -> tuple[Plan, list[tuple[int, int]]]:
-    from assoc._plan import Plan
+    from assoc.association.plan import Plan
 
     gating: dict[str, Any] = {
         key: settings[key] for key in ("gate_probability", "max_tuples") if key in settings
@@ -213,7 +213,7 @@ def _with_progress(scans: Iterator[ScanAssociation], count: int) -> Iterator[Sca
 
 
 def _write_json(path: str | None, association: Association, names: list[str]) -> None:
-    from assoc.association import write_json
+    from assoc.association.association import write_json
 
     if path is None:
         return
@@ -225,8 +225,8 @@ def _write_json(path: str | None, association: Association, names: list[str]) ->
 
 
 def _write_csv(path: str | None, association: Association, names: list[str]) -> None:
-    from assoc._outputs import write_text
-    from assoc._tables import to_csv
+    from assoc._cli.table import to_csv
+    from assoc._files.output import write_text
 
     if path is not None:
         write_text(path, to_csv(association.scans, names))
@@ -246,7 +246,7 @@ def _write_report(
 
 
 def _print(association: Association, names: list[str], elapsed: float) -> None:
-    from assoc._tables import print_table
+    from assoc._cli.table import print_table
 
     print_table(association.scans, names)
     print()

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from assoc import _temporary
-from assoc._extras import check_extra
-from assoc._program import INTERRUPTED, Parser, ending_signals, printable, run, steady_streams
+from assoc._cli.program import INTERRUPTED, Parser, ending_signals, printable, run, steady_streams
+from assoc._system import temporary
+from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def _sweep(words: list[str]) -> None:
     if "summary" in given:
         _summary(given)
         return
-    from assoc.sweeps.options import check_outputs, read
+    from assoc._cli.sweep_options import check_outputs, read
 
     options = read(given)
     inputs = [*options.values["files"], *([options.config] if options.config else [])]
@@ -98,7 +98,7 @@ def _summary(given: dict[str, Any]) -> None:
             "--summary: runs nothing and goes only with --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
-    from assoc.sweeps.options import check_outputs
+    from assoc._cli.sweep_options import check_outputs
 
     check_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
     _report(given["summary"], given, None)
@@ -120,11 +120,11 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     if damaged and study is None:
         print(f"{damaged} unfinished lines of the log are passed over; the same sweep again does their runs")
     if "csv" in given:
-        from assoc._outputs import write_text
+        from assoc._files.output import write_text
 
         write_text(given["csv"], table.to_csv(index=False, lineterminator="\n"))
     if "plot" in given:
-        from assoc.sweeps.plots import draw
+        from assoc.plotting.study_figures import draw
 
         for path in draw(folder, frame):
             print(f"drawn: {printable(str(path))}")
@@ -147,7 +147,7 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 @contextmanager
 def _watched(folder: str) -> Iterator[Any]:
     """Show progress on a terminal, and say on Ctrl-C how to go on."""
-    from assoc.sweeps.progress import Bar
+    from assoc._cli.progress import Bar
 
     last: list[Counts] = []
     with Bar(sys.stderr) as bar:
@@ -220,7 +220,7 @@ def _stop_on_signals() -> None:
         _state.update(word=ending[number], code=128 + number)
         _thread.interrupt_main()
         time.sleep(5.0)
-        _temporary.end(128 + number, f"{_goodbye()}\n")
+        temporary.end(128 + number, f"{_goodbye()}\n")
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
 

@@ -12,13 +12,13 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._extras import check_extra
-from assoc._inputs import check_distinct, check_output, number
-from assoc._program import Option, Parser, begin, each, given, options, printable, run, seconds, whole_number
+from assoc._cli.inputs import check_distinct, check_output, number
+from assoc._cli.program import Option, Parser, begin, each, given, options, printable, run, seconds, whole_number
+from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc.scene import Scene
+    from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
 
@@ -189,9 +189,9 @@ def _is_npz(file: str) -> bool:
 def _make(
     name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
 ) -> Tracker:
-    from assoc.filters.motion import positive
+    from assoc.filters.motion.models import positive
     from assoc.tracking import TRACKERS as KINDS
-    from assoc.tracking.choices import make_filter
+    from assoc.tracking.filter_choice import make_filter
 
     if name not in KINDS:
         raise InvalidInputError(f"--tracker: unknown name {name!r}; known: {', '.join(KINDS)}")
@@ -213,7 +213,7 @@ def _make(
 def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
 ) -> tuple[int, Tracker, TrackTable, Scene | None]:
-    from assoc.scene import Scene
+    from assoc.scene.scene import Scene
     from assoc.tracking import track_scene
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
@@ -232,7 +232,7 @@ def _of_plots(
 ) -> tuple[int, Tracker, TrackTable, Scene | None]:
     from assoc.recordings import Window, clustering_time_window, radar_of, read_plots
     from assoc.tracking import TrackTable
-    from assoc.tracking.windows import step_windows
+    from assoc.tracking.plot_windows import step_windows
 
     name = parsed["tracker"] or "mht"
     parsed["filter"] = parsed["filter"] or "ekf"

@@ -1,7 +1,8 @@
 """Every picture of the documentation, drawn anew: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
 Pictures are of fixed scenes and seeds. What is timed on the machine is in none of them but the report's screenshot.
-`stonesoup-fusion.png` takes its experiment's full run, which draws it: ``experiments.stonesoup_fusion --figure``.
+`stonesoup-fusion.png` takes its experiment's full run, which draws it:
+``experiments.trackers.fusion_in_stone_soup --figure``.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import assoc
-from assoc._outputs import write_atomically
+from assoc._files.output import write_atomically
+from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
-from assoc.sweeps.plots import new_figure
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 LARGEST = 100_000
@@ -101,7 +102,7 @@ def convergence(figure: Any) -> None:
 def pheromone(figure: Any) -> None:
     """Draw how the ants of the paper agree on a tour."""
     from assoc.plotting import plot_pheromone
-    from assoc.solvers.pheromone import pheromone_history
+    from assoc.solvers.aco.pheromone_history import pheromone_history
 
     problem = assoc.build_problem(simulate("crowd", 0, targets=8, scans=1), 0)
     plot_pheromone(pheromone_history(problem, seed=0, alpha=1.0, beta=1.0, rho=0.9), ax=figure.subplots())
@@ -205,7 +206,7 @@ def screenshot() -> bytes | None:
     if not (shutil.which("chromium") and shutil.which("chromedriver")):
         return None
     from assoc.plotting.report import write_association_report
-    from tests.plotting.browser import opened, show
+    from experiments.common.browser import opened, show
 
     one, association = _radars()
     with tempfile.TemporaryDirectory() as folder, opened() as browser:

@@ -25,14 +25,14 @@ from typing import Any
 import numpy as np
 
 from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import kbest
 from assoc.sensors.base import Sensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.solvers.front import assign
-from assoc.solvers.kbest import kbest
+from assoc.solvers.assign import assign
 from assoc.tracking import TRACKERS, Tracker
-from experiments.claims import Claim
-from experiments.filters.command import main
+from experiments.common.claims import Claim
+from experiments.common.command import main
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -29,8 +29,8 @@ from assoc.simulation import simulate
 from assoc.sweeps import Setting, Study
 from assoc.sweeps.sources import Source
 from assoc.sweeps.study import Counts
-from experiments.claims import Claim
-from experiments.filters.command import main
+from experiments.common.claims import Claim
+from experiments.common.command import main
 
 WORKERS = 2
 GOALS = {"one process": 1.0, "joblib": 1.0, "dask": 5.0}

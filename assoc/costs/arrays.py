@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc.costs.conversion import convert
 from assoc.errors import InvalidInputError
-from assoc.scene import Scan, Scene
+from assoc.scene.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 
 Array = np.ndarray[Any, np.dtype[Any]]

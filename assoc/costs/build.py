@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from assoc._interrupts import interruptible
+from assoc._system.interrupts import interruptible
 from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
-from assoc.costs.guard import MAX_TUPLES
+from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scan, Scene
+from assoc.scene.scene import Scan, Scene
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
 from assoc.costs.residuals import normal

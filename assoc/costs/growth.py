@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
-from assoc.costs.guard import refuse, too_many
+from assoc.costs.limits import refuse, too_many
 from assoc.costs.pairs import Pairs
 
 Array = np.ndarray[Any, np.dtype[Any]]

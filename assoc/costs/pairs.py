@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates
-from assoc.costs.guard import refuse, too_many
+from assoc.costs.limits import refuse, too_many
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

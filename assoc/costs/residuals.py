@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 from assoc.costs.arrays import ScanArrays, SensorArrays
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 
 Six = tuple[float, float, float, float, float, float]
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from assoc.filters.adaptive import Alarm, FuzzyAdaptiveEKF
 from assoc.filters.base import Expected, Filter, History, Update
 from assoc.filters.consistency import bounds, nees
 from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
-from assoc.filters.given_rules import paper_rules, tuned_data
+from assoc.filters.fuzzy.filter import Alarm, FuzzyAdaptiveEKF
+from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
+from assoc.filters.fuzzy.rules import paper_rules, tuned_data
 from assoc.filters.imm import InteractingMultipleModel, Mixture
-from assoc.filters.inference import FuzzyRules, FuzzyVariable
 from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
 from assoc.filters.measurement import FunctionMeasurement, LinearMeasurement, Measurement
-from assoc.filters.modified import ModifiedEKF
-from assoc.filters.motion import (
+from assoc.filters.modified_ekf import ModifiedEKF
+from assoc.filters.motion.models import (
     ConstantAcceleration,
     ConstantVelocity,
     CoordinatedTurn,
@@ -21,9 +21,9 @@ from assoc.filters.motion import (
     Motion,
     Padded,
 )
+from assoc.filters.motion.unmanned_aircraft import Aerodynamics, UnmannedAircraft
 from assoc.filters.smoother import FixedLagSmoother, Window
 from assoc.filters.state import Gaussian
-from assoc.filters.uav import Aerodynamics, UnmannedAircraft
 from assoc.filters.unscented import UnscentedKalmanFilter
 
 __all__ = [

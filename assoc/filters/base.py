@@ -14,10 +14,10 @@ from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.gate_kernels import pairs
-from assoc.filters.kernels import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
+from assoc.filters.kernels.gates import pairs
+from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
 from assoc.filters.measurement import Measurement, Observation, observation
-from assoc.filters.motion import Motion
+from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from assoc import _memory
+from assoc._system import memory
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
-from assoc.filters.kernels import GOOD
+from assoc.filters.kernels.gaussian import GOOD
+from assoc.filters.kernels.points import ensemble_update, move_ensemble
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import Motion, positive
-from assoc.filters.sigma_kernels import ensemble_update, move_ensemble
+from assoc.filters.motion.models import Motion, positive
 from assoc.filters.state import Gaussian, finite
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -90,7 +90,7 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         check_dimension(state, self.motion.dim)
         B, n = state.mean.shape
         # the members, their noise, and the next ones
-        _memory.require(24.0 * B * n * self.size, f"size = {self.size}: {B} ensembles", "take fewer members")
+        memory.require(24.0 * B * n * self.size, f"size = {self.size}: {B} ensembles", "take fewer members")
         factors = np.linalg.cholesky(state.covariance)
         shocks = self.rng.standard_normal((B, self.size, n))
         return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))

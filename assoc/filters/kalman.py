@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from assoc.errors import InvalidInputError
-from assoc.filters.kernels import LINEAR
+from assoc.filters.kernels.gaussian import LINEAR
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import Motion
+from assoc.filters.motion.models import Motion
 
 _POSITION = 0
 

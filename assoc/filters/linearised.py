@@ -17,13 +17,13 @@ from assoc.filters.base import (
     measured_array,
     update_of,
 )
-from assoc.filters.gate_kernels import expect
-from assoc.filters.kernels import GOOD, PLAIN, STATUSES, follow
-from assoc.filters.kernels import predict as predict_kernel
-from assoc.filters.kernels import step as step_kernel
-from assoc.filters.kernels import update as update_kernel
+from assoc.filters.kernels.gates import expect
+from assoc.filters.kernels.gaussian import GOOD, PLAIN, STATUSES, follow
+from assoc.filters.kernels.gaussian import predict as predict_kernel
+from assoc.filters.kernels.gaussian import step as step_kernel
+from assoc.filters.kernels.gaussian import update as update_kernel
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import LinearMotion, Motion, positive
+from assoc.filters.motion.models import LinearMotion, Motion, positive
 from assoc.filters.state import Gaussian, gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]

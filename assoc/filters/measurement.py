@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.kernels import GIVEN, LINEAR
-from assoc.filters.motion import Motion, differences
+from assoc.filters.kernels.gaussian import GIVEN, LINEAR
+from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import finite, positive_definite
 from assoc.sensors.base import Sensor
 from assoc.sensors.kernels import CODES
@@ -92,7 +92,7 @@ Measurement = Sensor | LinearMeasurement | FunctionMeasurement
 
 
 class Observation(NamedTuple):
-    """A measurement model in the form that the kernels take; see `assoc.filters.kernels.update`."""
+    """A measurement model in the form that the kernels take; see `assoc.filters.kernels.gaussian.update`."""
 
     code: int
     dim: int

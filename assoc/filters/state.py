@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.filters.linear_algebra import all_factors
+from assoc.filters.kernels.linear_algebra import all_factors
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

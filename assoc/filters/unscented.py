@@ -9,11 +9,11 @@ import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
-from assoc.filters.kernels import GOOD
-from assoc.filters.kernels import predict as predict_kernel
+from assoc.filters.kernels.gaussian import GOOD
+from assoc.filters.kernels.gaussian import predict as predict_kernel
+from assoc.filters.kernels.points import moments, sigma_points, unscented
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion import Motion, positive
-from assoc.filters.sigma_kernels import moments, sigma_points, unscented
+from assoc.filters.motion.models import Motion, positive
 from assoc.filters.state import Gaussian, gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -12,6 +12,7 @@ from assoc.metrics.plot_identity import identity_after_each
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+
 @dataclass(frozen=True, eq=False)
 class CtMtIt:
     """Rates of each window and their means, in percent.

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from assoc import _memory
+from assoc._system import memory
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
 
@@ -94,7 +94,7 @@ def distances(x: Array, y: Array) -> Array:
     if not len(x) or not len(y):
         return np.zeros((len(x), len(y)))
     # the distances, their powers, and the assignment's own copies
-    _memory.require(
+    memory.require(
         40.0 * len(x) * len(y), f"all distances of {len(x)} and {len(y)} points", "compare fewer points at a time"
     )
     between: Array = cdist(x, y)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc import _memory
+from assoc._system import memory
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import Ospa, check_cutoff, distances, ospa_of_distances
 from assoc.metrics.trajectories import Trajectories, epochs
@@ -59,7 +59,7 @@ def ospa2(
     target_ids, target_of = np.unique(truth.ids, return_inverse=True)
     track_ids, track_of = np.unique(tracks.ids, return_inverse=True)
     shape = (len(target_ids), len(track_ids))
-    _memory.require(
+    memory.require(
         64.0 * shape[0] * shape[1],
         f"OSPA(2) of {shape[0]} targets and {shape[1]} tracks",
         "compare a shorter time, with fewer identities",

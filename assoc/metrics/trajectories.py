@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from assoc.plotting.convergence import plot_convergence
     from assoc.plotting.costs import plot_costs, plot_gates
+    from assoc.plotting.heat_map import plot_heat_map
     from assoc.plotting.metric import plot_metric
     from assoc.plotting.overview import plot_overview
     from assoc.plotting.pheromone import plot_pheromone
     from assoc.plotting.scene import plot_scene
     from assoc.plotting.solution import plot_solution
-    from assoc.plotting.study import plot_heat_map
     from assoc.plotting.tracks import plot_tracks
 
 _HOME = {
     "plot_convergence": "convergence",
     "plot_costs": "costs",
     "plot_gates": "costs",
-    "plot_heat_map": "study",
+    "plot_heat_map": "heat_map",
     "plot_metric": "metric",
     "plot_overview": "overview",
     "plot_pheromone": "pheromone",

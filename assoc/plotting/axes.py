@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._extras import load_extra
+from assoc._system.extras import load_extra
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from assoc._extras import load_extra
-from assoc.association import Association
+from assoc._system.extras import load_extra
+from assoc.association.association import Association
 from assoc.costs import build_problem
 from assoc.errors import InvalidInputError
 from assoc.plotting.convergence import plot_convergence
 from assoc.plotting.costs import belongs, plot_costs
 from assoc.plotting.scene import plot_scene
 from assoc.plotting.solution import plot_solution
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 
 
 def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes: Any = None) -> Any:

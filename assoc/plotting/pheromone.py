@@ -10,7 +10,7 @@ from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import VERMILION
 
 if TYPE_CHECKING:
-    from assoc.solvers.pheromone import PheromoneHistory
+    from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 _NAMED = 40
 
@@ -21,7 +21,7 @@ def plot_pheromone(history: PheromoneHistory, *, nodes: int = 25, ax: Any = None
     Parameters
     ----------
     history : PheromoneHistory
-        Of ``assoc.solvers.pheromone.pheromone_history``.
+        Of ``assoc.solvers.aco.pheromone_history.pheromone_history``.
     nodes : int
         So many nodes are shown, those with the most pheromone in the end and those chosen first.
     ax : matplotlib Axes, optional

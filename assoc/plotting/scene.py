@@ -11,7 +11,7 @@ from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, 
 from assoc.plotting.colours import BLACK, GREY, colour, marker
 from assoc.plotting.ellipses import ellipses, place_covariances
 from assoc.plotting.places import distances_to_border, places
-from assoc.scene import Scan, Scene
+from assoc.scene.scene import Scan, Scene
 from assoc.sensors import BearingSensor, Sensor
 
 Array = np.ndarray[Any, np.dtype[Any]]

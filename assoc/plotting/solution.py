@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from assoc.association import ScanAssociation
+from assoc.association.association import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
 from assoc.plotting.ellipses import ellipses
 from assoc.plotting.places import distances_to_border, places
 from assoc.plotting.scene import draw_sensors, draw_truth
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 
 Array = np.ndarray[Any, np.dtype[Any]]

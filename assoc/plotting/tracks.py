@@ -10,7 +10,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, plan, unit_of
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
 from assoc.plotting.scene import truth_paths
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 
 if TYPE_CHECKING:
     import pandas as pd

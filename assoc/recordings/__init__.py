@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.groupings import fixed_groups, groups_of_sizes, irregular_groups
+from assoc.recordings.radar import radar_of
 from assoc.recordings.reading import read_plots
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.recordings.rotation import estimate_rotation
-from assoc.recordings.sensor import radar_of
 from assoc.recordings.windows import Window, clustering_time_window
 from assoc.recordings.writing import write_plots, write_tracks
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
 

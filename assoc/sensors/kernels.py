@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._compiled import njit
+from assoc._system.compiled import njit
 from assoc.sensors.base import Sensor
 from assoc.sensors.bearing import BearingSensor
 from assoc.sensors.position import PositionSensor

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc.scene import Scene, Truth
+from assoc.scene.scene import Scene, Truth
 from assoc.sensors.base import Array, Sensor, wrap_angle
-from assoc.simulation.room import require_room
+from assoc.simulation.memory import require_room
 
 
 def observe(

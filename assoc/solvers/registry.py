@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import Any
 
 from assoc.errors import InvalidInputError
-from assoc.solvers.run import Parameters, SolveFunction
+from assoc.packing.run import Parameters, SolveFunction
 
 # name -> module with a class `parameters` and a function `solve`; imported on first use
 _MODULES: dict[str, str] = {
-    name: f"assoc.solvers.{name}" for name in ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
+    name: f"assoc.solvers.{name}.solve" for name in ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
 }
 _REGISTERED: dict[str, tuple[type[Parameters], SolveFunction]] = {}
 

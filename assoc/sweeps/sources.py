@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from assoc._inputs import load_source
+from assoc._cli.inputs import load_source
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 
 
 @dataclass(frozen=True)

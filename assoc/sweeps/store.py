@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 from assoc.errors import InvalidInputError
 from assoc.sweeps.setting import Setting
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import assoc
 from assoc.errors import InvalidInputError
-from assoc.sweeps.batching import Batches, RunNumbers
-from assoc.sweeps.code import code_digest
+from assoc.sweeps.backends.batches import Batches, RunNumbers
+from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
 from assoc.sweeps.sources import Source
 from assoc.sweeps.store import Manifest, RunKey, Store
-from assoc.sweeps.work import Job, Result
+from assoc.sweeps.worker import Job, Result
 
 Progress = Callable[["Counts"], object]
 
@@ -172,7 +172,7 @@ class Study:
         take: Callable[[Result], object] | None = None,
     ) -> Counts:
         """Do as `run` does, in a store that is open; ``take`` is called with each result that is kept."""
-        from assoc.sweeps import cluster, local
+        from assoc.sweeps.backends import dask, local
 
         missing = sum(1 for _ in self.missing(store))
         counts = Counts(self.size, self.size - missing)
@@ -181,11 +181,11 @@ class Study:
         if missing == 0:
             return counts
         job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, assoc.__version__, code_digest())
-        seconds = local.SECONDS_OF_A_BATCH if scheduler is None else cluster.SECONDS_OF_A_BATCH
+        seconds = local.SECONDS_OF_A_BATCH if scheduler is None else dask.SECONDS_OF_A_BATCH
         batches = Batches(self.settings, self.missing(store), seconds)
         results: Generator[Result]
         if scheduler is not None:
-            results = cluster.run_with_dask(job, batches, scheduler)
+            results = dask.run_with_dask(job, batches, scheduler)
         elif jobs > 1:
             results = local.run_with_joblib(job, batches, jobs, store.folder)
         else:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers import registry
@@ -24,7 +24,7 @@ from assoc.sweeps.space import Range, Space, Values
 from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
 from assoc.sweeps.study import Counts, Study
 from assoc.sweeps.summary import by_problem
-from assoc.sweeps.work import Result
+from assoc.sweeps.worker import Result
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from assoc.tracking.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.multi_sensor import MultiSensorTracker
+from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
+from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
-from assoc.tracking.output import TrackTable, track_scene
-from assoc.tracking.static import StaticFusionTracker
+from assoc.tracking.single_scan.multi_sensor import MultiSensorTracker
+from assoc.tracking.single_scan.static import StaticFusionTracker
 from assoc.tracking.track import Decision, Step, Track
-from assoc.tracking.track_oriented import TrackOrientedMHT
+from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
 
 TRACKERS: dict[str, type[Tracker]] = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
-from assoc.filters.motion import Motion
+from assoc.filters.motion.models import Motion
 from assoc.filters.state import gaussian
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from assoc.costs.track_scores import sequential_threshold
+from assoc.costs.tracks.scores import sequential_threshold
 from assoc.errors import InvalidInputError
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -6,13 +6,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from assoc.costs.track_scores import doubted_gain
+from assoc.costs.tracks.scores import doubted_gain
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
-from assoc.tracking.bank import Bank
-from assoc.tracking.frames import Frame, look
+from assoc.tracking.gated_pairs import Frame, look
 from assoc.tracking.track import Step, decision
+from assoc.tracking.track_batch import Bank
 from assoc.tracking.tracker import Tracker
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -11,28 +11,28 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from assoc._files import Field, load_npz, save_npz
-from assoc._interrupts import interruptible
+from assoc._files.npz import Field, load_npz, save_npz
+from assoc._system.interrupts import interruptible
 from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances, single_positions
-from assoc.costs.guard import MAX_TUPLES
-from assoc.costs.track_scores import score_terms
+from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scan, Scene
+from assoc.scene.scene import Scan, Scene
 from assoc.sensors import Sensor
 from assoc.sensors.base import finite_array
 from assoc.solution import Solution
-from assoc.solvers.front import assign
+from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
-from assoc.tracking.bank import Bank, empty_bank
+from assoc.tracking.checkpoint import check_bank, check_progress, described, difference, rng_state
 from assoc.tracking.defaults import two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.saving import check_bank, check_progress, described, difference, rng_state
 from assoc.tracking.track import Decision, Step, Track
+from assoc.tracking.track_batch import Bank, empty_bank
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -399,4 +399,3 @@ class Tracker(ABC):
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
-

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 
 if TYPE_CHECKING:
     from experiments.benchmarks.families import Case
@@ -62,7 +62,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.report_only and not table.exists():
         parser.error(f"--report-only: {table} does not exist")
 
-    from experiments.benchmarks import report as reporting
+    from experiments.benchmarks import markdown as reporting
     from experiments.benchmarks import rows as storage
 
     def write(minutes: float | None) -> None:

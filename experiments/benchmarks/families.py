@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
-from experiments.instances import scenes, synthetic
+from experiments.common.instances import scenes, synthetic
 
 HEURISTICS = ("aco", "genetic", "tabu")
 
@@ -27,7 +27,7 @@ class Entry:
     Attributes
     ----------
     solver : str
-        Name in ``assoc.solvers.names()`` or in `experiments.peers.PEERS`.
+        Name in ``assoc.solvers.names()`` or in `experiments.common.peers.PEERS`.
     limit : float
         Time limit, seconds.
     stop_gap : float or None

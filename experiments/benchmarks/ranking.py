@@ -15,8 +15,8 @@ from assoc.problem import AssignmentProblem
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import one_core
-from experiments.checking import check_answer
-from experiments.instances import scenes, synthetic
+from experiments.common.checking import check_answer
+from experiments.common.instances import scenes, synthetic
 
 PLANAR, PLANAR_K = "2-D n=100 k=100", 100
 SPATIAL, SPATIAL_K = "3x20 k=20", 20
@@ -112,7 +112,7 @@ def _murty_peer(size: str, problem: AssignmentProblem, k: int, seed: int) -> Row
 
 def _small(count: int) -> Row:
     """Count the small problems whose ranking equals full enumeration; some have fewer than k solutions."""
-    from tests import oracles
+    from experiments.common import oracles
 
     equal = 0
     start = time.perf_counter()

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 
 HIT = 1e-6
 

@@ -14,12 +14,12 @@ from assoc.costs import build_problem
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solution import TracePoint
-from experiments import peers
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import HEURISTICS, Case, Entry, Instance
 from experiments.benchmarks.rows import Row
-from experiments.checking import check_answer
-from experiments.instances import scenes, synthetic
+from experiments.common import peers
+from experiments.common.checking import check_answer
+from experiments.common.instances import scenes, synthetic
 
 PROVING = ("exact", "milp")
 UNLIMITED = 1_000_000_000

@@ -29,7 +29,7 @@ def measure(targets: int, seed: int) -> dict[str, float | str]:
     """
     import assoc
     from experiments.benchmarks.run import one_core
-    from experiments.instances import scenes
+    from experiments.common.instances import scenes
 
     with one_core():
         for warm, few in ((0, 50), (1, 50), (2, 300), (3, 1_000)):

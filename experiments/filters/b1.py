@@ -10,7 +10,7 @@ import numpy as np
 
 from assoc.filters import Gaussian, nees
 from assoc.filters.base import Filter
-from assoc.filters.motion import ConstantVelocity
+from assoc.filters.motion.models import ConstantVelocity
 from assoc.sensors import Radar3D
 
 Array = np.ndarray[Any, np.dtype[Any]]

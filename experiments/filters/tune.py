@@ -1,11 +1,11 @@
-"""Tune the fuzzy rules and the IMM with the same care; writes assoc/filters/fuzzy_parameters.json.
+"""Tune the fuzzy rules and the IMM with the same care; writes assoc/filters/fuzzy/tuned_parameters.json.
 
     python -m experiments.filters.tune [--evaluations N] [--flights N] [--seed N] [--output FILE]
 
 Both see the same random flights and the same measurements, and have the same search: adaptation of a covariance matrix
 (CMA-ES, package `cma`), as many evaluations, the same first spread, begun at the parameters that the package has. None
-of these flights is in the report (experiments/fuzzy_ekf.py); at the end both are measured on as many others, which
-shows whether they have learned the flights by heart. About three minutes of one core.
+of these flights is in the report (experiments/papers/fuzzy_ekf.py); at the end both are measured on as many others,
+which shows whether they have learned the flights by heart. About three minutes of one core.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._outputs import write_text
+from assoc._files.output import write_text
 from assoc.errors import AssocError
 from assoc.filters import tuned_data
 from assoc.filters.base import Filter
@@ -27,7 +27,7 @@ from experiments.filters.manoeuvres import Batch, errors, random_flights
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy_parameters.json"
+OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy" / "tuned_parameters.json"
 SPREAD = 0.2
 """First standard deviation of the search in each coordinate, most of which are logarithms."""
 

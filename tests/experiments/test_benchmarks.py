@@ -1,4 +1,4 @@
-"""The benchmark's machinery: rows, goals and report on numbers made for the purpose."""
+"""The benchmark's machinery: rows, goals and markdown on numbers made for the purpose."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import FIRST_SEED, goals, report, rows
+from experiments.benchmarks import FIRST_SEED, goals, markdown, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_case
-from experiments.instances import synthetic
+from experiments.common.instances import synthetic
 
 ROW = Row(
     "gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True
@@ -98,7 +98,7 @@ def test_shares_and_scale_and_kbest() -> None:
 
 
 def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
-    text = report.render(
+    text = markdown.render(
         [ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], 1.0, "make bench"
     )
     assert "## gated" in text
@@ -139,12 +139,12 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "gatd" in capsys.readouterr().err
     path = tmp_path / "b.csv"
     with pytest.raises(SystemExit):
-        main(["--report-only", "--csv", str(path)])
+        main(["--markdown-only", "--csv", str(path)])
     rows.save(path, [ROW, PEER])
-    assert main(["--report-only", "--csv", str(path)]) == 0
+    assert main(["--markdown-only", "--csv", str(path)]) == 0
     assert "## gated" in (tmp_path / "b.md").read_text()
 
 
 def test_report_says_what_its_reader_should_know() -> None:
-    assert "**These rows**: two runs." in report.render([ROW, PEER], None, "make bench", "two runs.")
-    assert "These rows" not in report.render([ROW, PEER], None, "make bench")
+    assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "make bench", "two runs.")
+    assert "These rows" not in markdown.render([ROW, PEER], None, "make bench")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments import claims
-from experiments.claims import Claim
+from experiments.common import claims
+from experiments.common.claims import Claim
 
 SAMPLE = [
     Claim("mean cycles", "", 4.03, 4.9, (4.8, 5.0), (3.5, 5.5)),

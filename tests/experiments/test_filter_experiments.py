@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from experiments import dubins_enkf, filter_benchmark, filter_consistency, fuzzy_ekf, modified_ekf
-from experiments.claims import load_json
-from experiments.filters import manoeuvres
+from experiments.common.claims import load_json
+from experiments.filters import benchmark, consistency, manoeuvres
 from experiments.filters.b1 import Setting
+from experiments.papers import dubins_enkf, fuzzy_ekf, modified_ekf
 
 
 @pytest.mark.parametrize("module", [modified_ekf, dubins_enkf])
@@ -63,12 +63,12 @@ def test_tuning_never_sees_the_reports_flights():
 def test_consistency_of_the_exact_filters(tmp_path, monkeypatch):
     import numpy as np
 
-    monkeypatch.setattr(filter_consistency, "STEPS", 40)
+    monkeypatch.setattr(consistency, "STEPS", 40)
     rng = np.random.default_rng(0)
-    case = filter_consistency.linear_case(60, rng)
+    case = consistency.linear_case(60, rng)
     from assoc.filters import KalmanFilter, bounds
 
-    values, nis = filter_consistency.run(KalmanFilter(filter_consistency.ConstantVelocity(1.0)), case)
+    values, nis = consistency.run(KalmanFilter(consistency.ConstantVelocity(1.0)), case)
     low, high = bounds(6, 60, 0.999)
     assert low < values[-1].mean() < high
     low, high = bounds(3, nis.size, 0.999)
@@ -76,9 +76,9 @@ def test_consistency_of_the_exact_filters(tmp_path, monkeypatch):
 
 
 def test_benchmark_times_all_three():
-    for kind in filter_benchmark.KINDS:
-        assert filter_benchmark.ours(kind, 3, 2) > 0
+    for kind in benchmark.KINDS:
+        assert benchmark.ours(kind, 3, 2) > 0
     pytest.importorskip("filterpy")
     pytest.importorskip("stonesoup")
-    assert filter_benchmark.filterpy("Kalman", 2) > 0
-    assert filter_benchmark.stonesoup("EKF", 1) > 0
+    assert benchmark.filterpy("Kalman", 2) > 0
+    assert benchmark.stonesoup("EKF", 1) > 0

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from assoc.problem import AssignmentProblem
-from experiments import peers
-from experiments.instances import synthetic
-from tests import oracles
+from experiments.common import oracles, peers
+from experiments.common.instances import synthetic
 
 EXACT = ["cp_sat", "scip", "scip_1", "highs"]
 

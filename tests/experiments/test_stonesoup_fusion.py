@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("stonesoup")
 
-from experiments import stonesoup_fusion as fusion
-from experiments.claims import load_json
+from experiments.common.claims import load_json
+from experiments.trackers import fusion_in_stone_soup as fusion
 
 
 @pytest.fixture

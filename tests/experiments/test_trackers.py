@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from assoc.tracking import NearestNeighbourTracker, TrackOrientedMHT
-from experiments import tracker_benchmark, tracking_comparison
-from experiments.claims import load_json
-from experiments.trackers import plane
+from experiments.common.claims import load_json
+from experiments.trackers import benchmark, comparison, plane
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
 
 
 def test_comparison_as_a_program(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(tracking_comparison, "NAMES", ("multi-sensor", "static", "mht", "nearest-neighbour"))
+    monkeypatch.setattr(comparison, "NAMES", ("multi-sensor", "static", "mht", "nearest-neighbour"))
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
-    assert tracking_comparison.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
+    assert comparison.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
     by_name = {claim.quantity: claim for claim in load_json(files[0])}
     assert by_name["three radars, multi-sensor: mean GOSPA"].ours < 300
     assert by_name["three radars, multi-sensor: identity switches a scene"].ours == 0
@@ -30,22 +29,22 @@ def test_stone_soup_and_ours_on_the_same_detections():
     from experiments.trackers import stone_soup
 
     results = {
-        "mfa": tracker_benchmark.judged(stone_soup.multi_frame(one, 3, 0.999), one, 60.0),
-        "gnn": tracker_benchmark.judged(stone_soup.nearest(one, 0.999), one, 60.0),
-        "mht": tracker_benchmark.judged(in_plane(TrackOrientedMHT, one, depth=3), one, 60.0),
-        "nearest": tracker_benchmark.judged(in_plane(NearestNeighbourTracker, one), one, 60.0),
+        "mfa": benchmark.judged(stone_soup.multi_frame(one, 3, 0.999), one, 60.0),
+        "gnn": benchmark.judged(stone_soup.nearest(one, 0.999), one, 60.0),
+        "mht": benchmark.judged(in_plane(TrackOrientedMHT, one, depth=3), one, 60.0),
+        "nearest": benchmark.judged(in_plane(NearestNeighbourTracker, one), one, 60.0),
     }
     for result in results.values():
         assert len(result.gospa) == 4 and (result.gospa < 60).all() and (result.seconds > 0).all()
     # few false alarms, targets apart: all say the same
     np.testing.assert_allclose(results["mht"].gospa, results["mfa"].gospa, atol=4.0)
-    ratio, (difference, interval), scans = tracker_benchmark._paired([results["mht"]] * 2, [results["mfa"]] * 2)
+    ratio, (difference, interval), scans = benchmark._paired([results["mht"]] * 2, [results["mfa"]] * 2)
     assert ratio > 2 and scans == 8 and interval is not None and interval[0] <= difference <= interval[1]
 
 
 def test_a_peer_stops_when_its_time_is_over():
     one = plane.simulate(3, 0.2, 5, 1)
-    assert len(tracker_benchmark.judged(iter([(0.1, np.zeros((0, 2)))] * 5), one, 0.0).seconds) == 1
+    assert len(benchmark.judged(iter([(0.1, np.zeros((0, 2)))] * 5), one, 0.0).seconds) == 1
 
 
 def test_goals_of_the_three_radar_scene():

@@ -28,7 +28,7 @@ from assoc.filters import (
     nees,
     paper_rules,
 )
-from assoc.filters.motion import differences
+from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
 
 

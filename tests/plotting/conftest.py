@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plotting.browser import opened
+from experiments.common.browser import opened
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from assoc.plotting.report import write_association_report
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from assoc.simulation import simulate
-from tests.plotting.browser import DESKTOP, PHONE, complaints, press, screenshot, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL
 
 CURRENT = "return document.querySelector('#scan-table tr[aria-current=true]').dataset.row"

@@ -144,14 +144,14 @@ def test_problems_and_several_sources(tmp_path, scene, association):
 
 
 def _of_problem(problem):
-    from assoc._plan import Plan
+    from assoc.association.plan import Plan
 
     plan = Plan((problem,), "exact")
     return plan.gather(plan.run(plan.items()))
 
 
 def test_ranked_associations_say_how_far_the_second_is(tmp_path, scene):
-    from assoc._plan import Plan
+    from assoc.association.plan import Plan
 
     plan = Plan((scene,), "exact", kbest=3)
     ranked = plan.gather(plan.run(plan.items()[:2]))

@@ -14,12 +14,12 @@ from scipy import stats
 import assoc
 from assoc import plotting
 from assoc.plotting.ellipses import ellipses, place_covariances
+from assoc.plotting.heat_map import cells
 from assoc.plotting.places import distances_to_border, places
-from assoc.plotting.study import cells
+from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
-from assoc.solvers.pheromone import pheromone_history
-from assoc.sweeps.plots import new_figure
+from assoc.solvers.aco.pheromone_history import pheromone_history
 
 mpl.use("agg")
 

@@ -11,7 +11,7 @@ from assoc.plotting.report import write_sweep_report
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid, load, summarize
 from assoc.sweeps.sources import Source
-from tests.plotting.browser import DESKTOP, PHONE, complaints, press, screenshot, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
 
 

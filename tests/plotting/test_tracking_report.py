@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.report import write_tracking_report
 from assoc.scene import Scene
 from assoc.simulation import simulate
-from tests.plotting.browser import DESKTOP, PHONE, complaints, press, screenshot, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
 
 

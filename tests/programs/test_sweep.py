@@ -189,9 +189,9 @@ BAD = [
 @pytest.mark.parametrize(("words", "message"), BAD, ids=[" ".join(words) for words, _ in BAD])
 def test_bad_input_is_one_line(scene_file, tmp_path, monkeypatch, capsys, words, message):
     from assoc.sweep import main
-    from assoc.sweeps import cluster
+    from assoc.sweeps.backends import dask
 
-    monkeypatch.setattr(cluster, "_CONNECT_SECONDS", 1.0)
+    monkeypatch.setattr(dask, "_CONNECT_SECONDS", 1.0)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a-file").write_text("")
     assert main([str(scene_file), "-o", "study", *words]) == 2

@@ -143,11 +143,12 @@ def test_bad_input_is_one_line_and_code_2(case, scene_file, tmp_path, monkeypatc
 
 
 def test_too_many_tuples_is_code_3(scene_file, tmp_path, monkeypatch, capsys):
-    from assoc.tracking import single_scan, tracker
+    from assoc.tracking import tracker
+    from assoc.tracking.single_scan import base
 
     monkeypatch.setattr(tracker.Tracker.__init__, "__kwdefaults__", {
         **tracker.Tracker.__init__.__kwdefaults__, "max_tuples": 5})  # fmt: skip
-    assert single_scan
+    assert base
     assert track.main([str(scene_file), "-o", str(tmp_path / "tracks.csv")]) == 3
     assert "more than max_tuples = 5" in capsys.readouterr().err
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from assoc.errors import InfeasibleError, InvalidInputError, LimitExceededError
 from assoc.simulation import simulate
-from assoc.simulation.dubins import Path, Pose, Segment, path, paths, shortest
-from assoc.simulation.dubins_kernels import WORDS
-from assoc.simulation.dubins_obstacles import around
+from assoc.simulation.dubins.kernels import WORDS
+from assoc.simulation.dubins.obstacles import around
+from assoc.simulation.dubins.paths import Path, Pose, Segment, path, paths, shortest
 from assoc.simulation.scenarios.dubins_uav import DubinsParameters, no_fly_zones
 
 FIRST, LAST = Pose(-500.0, 100.0, math.pi / 3), Pose(0.0, 200.0, 0.0)

@@ -9,8 +9,8 @@ from assoc import solvers
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solution import OPTIMALITY_TOLERANCE
-from assoc.solvers.front import assign
-from tests.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
+from assoc.solvers.assign import assign
+from experiments.common.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
 
 # milp has a test file of its own, and its backends take their time
 PROVING = ("exact", "milp")
@@ -57,7 +57,7 @@ def check(problem, solution, optimum):
 
 @pytest.mark.parametrize("name", installed())
 def test_small_problems(name):
-    # searches take a tenth of a second for each; thousands more are in tests.trust.differential
+    # searches take a tenth of a second for each; thousands more are in tests.reliability.differential
     count = {"milp": 90, "genetic": 200, "tabu": 200, "aco": 200}.get(name, 450)
     infeasible = 0
     for problem in small_problems(count, seed=21):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
-from assoc.solvers.front import assign
-from tests.oracles import axial_problem, brute_force, check_answer, gated_problem
+from assoc.solvers.assign import assign
+from experiments.common.oracles import axial_problem, brute_force, check_answer, gated_problem
 from tests.solvers.test_against_brute_force import installed
 
 QUICK = [name for name in installed() if name != "milp"]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.packing import prepare
 from assoc.problem import AssignmentProblem
-from assoc.solvers.bounds import certified_bound, dual_bound
-from assoc.solvers.front import assign
-from assoc.solvers.packing import prepare
-from assoc.solvers.relaxation import Relaxation
-from experiments.instances.synthetic import axial_known_optimum, planted
-from tests.oracles import (
+from assoc.solvers.assign import assign
+from assoc.solvers.lagrangian.relaxation import Relaxation
+from experiments.common.instances.synthetic import axial_known_optimum, planted
+from experiments.common.oracles import (
     axial_problem,
     brute_force,
     check_answer,

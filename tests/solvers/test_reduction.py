@@ -5,9 +5,9 @@ import pytest
 
 import assoc
 from assoc import AssignmentProblem
-from assoc.solvers.packing import prepare
-from assoc.solvers.reduction import Reduction, _best_of_both
-from assoc.solvers.run import Run
+from assoc.packing.packing import prepare
+from assoc.packing.run import Run
+from assoc.solvers.exact.reduction import Reduction, _best_of_both
 
 
 def _problem(seed: int, whole: bool) -> AssignmentProblem:

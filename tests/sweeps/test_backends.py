@@ -12,7 +12,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.batching import Batches
+from assoc.sweeps.backends.batches import Batches
 from assoc.sweeps.store import Store
 
 DASK = [sys.executable, "-m", "dask"]
@@ -21,10 +21,10 @@ DASK = [sys.executable, "-m", "dask"]
 @pytest.fixture(autouse=True)
 def small_batches(monkeypatch):
     """Many batches, so that there is a middle to interrupt in."""
-    from assoc.sweeps import cluster, local
+    from assoc.sweeps.backends import dask, local
 
     monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.04)
-    monkeypatch.setattr(cluster, "SECONDS_OF_A_BATCH", 0.04)
+    monkeypatch.setattr(dask, "SECONDS_OF_A_BATCH", 0.04)
 
 
 def same(one, other):
@@ -128,7 +128,7 @@ def test_batches_take_about_their_time_and_leave_nothing_out(study):
 def test_the_job_is_small_and_shared_once(study):
     import pickle
 
-    from assoc.sweeps.work import Batch
+    from assoc.sweeps.worker import Batch
 
     batch = Batch(study.settings, [(0, 0, 0, scan) for scan in range(5)])
     assert len(pickle.dumps(batch)) < 3000
@@ -171,7 +171,7 @@ def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp
 def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
     slow, expected, scheduler, start_worker, tmp_path, monkeypatch
 ):
-    from assoc.sweeps.work import Job
+    from assoc.sweeps.worker import Job
 
     workers = [start_worker(), start_worker()]
     packed, seen = [], {}
@@ -214,9 +214,9 @@ def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, start_wor
 
 
 def test_no_scheduler_is_one_clear_line(study, tmp_path, monkeypatch):
-    from assoc.sweeps import cluster
+    from assoc.sweeps.backends import dask
 
-    monkeypatch.setattr(cluster, "_CONNECT_SECONDS", 1.0)
+    monkeypatch.setattr(dask, "_CONNECT_SECONDS", 1.0)
     for address in ("tcp://127.0.0.1:9", "nonsense://", "127.0.0.1:9"):
         with pytest.raises(InvalidInputError, match="--scheduler: no scheduler answers at") as raised:
             study.run(tmp_path / "s", scheduler=address)
@@ -228,8 +228,8 @@ def test_a_job_that_someone_changed_is_not_loaded(slow, tmp_path):
     import os
     import pickle
 
-    from assoc.sweeps.local import _digest, _run
-    from assoc.sweeps.work import Batch
+    from assoc.sweeps.backends.local import _digest, _run
+    from assoc.sweeps.worker import Batch
 
     class Trap:
         def __reduce__(self):

@@ -8,9 +8,9 @@ import pytest
 from scipy import stats
 
 from assoc.errors import InvalidInputError
+from assoc.plotting.study_figures import draw
 from assoc.sweeps import grid, load, summarize
 from assoc.sweeps.bootstrap import mean_interval, resampled_means, weighted_mean
-from assoc.sweeps.plots import draw
 from assoc.sweeps.store import Store
 from assoc.sweeps.study import Study
 

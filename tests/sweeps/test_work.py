@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
-from assoc.solvers.greedy import GreedyParameters
-from assoc.solvers.run import Outcome
+from assoc.solvers.greedy.solve import GreedyParameters
 from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.sources import Source
 
@@ -62,11 +62,11 @@ def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
 
 
 def test_a_run_done_again_is_the_same(study, tmp_path, monkeypatch):
-    from assoc.sweeps import work
+    from assoc.sweeps import worker
 
     study.run(tmp_path / "once")
     calls = []
-    monkeypatch.setattr(work, "loaded", lambda: calls.append(1) or len(calls))
+    monkeypatch.setattr(worker, "loaded", lambda: calls.append(1) or len(calls))
     study.run(tmp_path / "again")
     assert len(calls) == 8 * study.size
     frames = [load(tmp_path / name).drop(columns="time") for name in ("once", "again")]
@@ -74,7 +74,7 @@ def test_a_run_done_again_is_the_same(study, tmp_path, monkeypatch):
 
 
 def test_a_worker_with_other_code_is_refused(study):
-    from assoc.sweeps.work import Batch, Job, run_batch
+    from assoc.sweeps.worker import Batch, Job, run_batch
 
     job = Job(tuple(study.sources), 0, None, {}, assoc.__version__, "0" * 16)
     with pytest.raises(assoc.InvalidInputError, match="other code"):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from assoc.costs.track_scores import score_terms
-from assoc.costs.track_tuples import grow_track_tuples
+from assoc.costs.tracks.scores import score_terms
+from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.filters import ConstantVelocity, Gaussian, KalmanFilter
 from assoc.tracking import Initiation, LifeCycle, MultiSensorTracker, StaticFusionTracker
 from tests.tracking import plain

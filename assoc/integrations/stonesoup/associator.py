@@ -18,7 +18,7 @@ from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.ordering import sorted_detections, sorted_paths
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
-from assoc.solvers.front import assign
+from assoc.solvers.assign import assign
 
 
 class AssignmentAssociator(DataAssociator):  # type: ignore[misc]

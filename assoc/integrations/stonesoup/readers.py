@@ -17,7 +17,7 @@ from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.models import measurement_model
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array
 
 EPOCH = datetime(1970, 1, 1)

@@ -14,7 +14,7 @@ from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.adapted import AdaptedSensor
 from assoc.integrations.stonesoup.frame import Frame, make_frame
 from assoc.integrations.stonesoup.ordering import sorted_detections, sorted_paths
-from assoc.scene import Scene, Truth, default_region
+from assoc.scene.scene import Scene, Truth, default_region
 from assoc.sensors import Sensor
 from assoc.sensors.base import Array
 

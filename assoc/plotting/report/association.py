@@ -6,13 +6,13 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from assoc._html import escape
-from assoc.association import Association, ScanAssociation
+from assoc._text.html import escape
+from assoc.association.association import Association, ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.report.page import CONTROLS, Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 
 Source = Scene | AssignmentProblem
 

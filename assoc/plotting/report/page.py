@@ -15,9 +15,9 @@ from importlib.resources import files
 from typing import Any
 
 import assoc
-from assoc._extras import check_extra, load_extra
-from assoc._html import escape, script_json
-from assoc._outputs import write_text
+from assoc._files.output import write_text
+from assoc._system.extras import check_extra, load_extra
+from assoc._text.html import escape, script_json
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 

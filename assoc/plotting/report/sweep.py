@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._html import escape
+from assoc._text.html import escape
+from assoc.plotting.heat_map import MEASURES, cells
 from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import number
-from assoc.plotting.study import MEASURES, cells
+from assoc.plotting.study_figures import FACTORS, mean_excess, title, with_excess
 from assoc.sweeps.frame import RESULTS, load, load_traces
-from assoc.sweeps.plots import FACTORS, mean_excess, title, with_excess
 from assoc.sweeps.store import read_manifest
 from assoc.sweeps.summary import measured, summarize, varied
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._html import escape
+from assoc._text.html import escape
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time
 from assoc.plotting.places import places
 from assoc.plotting.report.page import CONTROLS, Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.scene import truth_paths
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from assoc.association import ScanAssociation
+from assoc.association.association import ScanAssociation
 from assoc.costs import tuple_costs
 from assoc.plotting.places import measures_height
 from assoc.plotting.solution import measured_places
 from assoc.problem import AssignmentProblem
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 from assoc.sensors.base import ANGLES
 

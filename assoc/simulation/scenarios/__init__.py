@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array
 from assoc.sensors.bearing import BearingSensor
+from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
-from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.scenarios.crowd import horizontal_velocities
 

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array, Sensor
 from assoc.sensors.position import PositionSensor
+from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radar_over
-from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 REFERENCE_TARGETS = 100

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array
-from assoc.simulation.dubins import Path, Pose
-from assoc.simulation.dubins_obstacles import around
+from assoc.simulation.dubins.obstacles import around
+from assoc.simulation.dubins.paths import Path, Pose
+from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 
 _TRIES = 200

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array
 from assoc.simulation.geodesy import east_north_up
+from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from assoc import _memory
+from assoc._system import memory
 from assoc.errors import InvalidInputError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Traffic = Literal["random", "crossing", "parallel", "head-on"]
 
 BEARING_STEP = 1440 / 4095
-# bytes, measured (tests/trust/test_memory.py): of a step of one path, of a plot
+# bytes, measured (tests/reliability/test_memory.py): of a step of one path, of a plot
 _STEP, _PLOT = 300, 250
 PARALLEL_SEPARATION = 5.0
 """Nautical miles: what air traffic control keeps between aircraft en route."""
@@ -105,7 +105,7 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
 
     p = parameters
     turns = p.duration / p.rotation
-    _memory.require(
+    memory.require(
         _STEP * p.duration / STEP + _PLOT * turns * (p.aircraft + p.false_plots),
         f"plots with duration = {p.duration:g}, rotation = {p.rotation:g}, aircraft = {p.aircraft}, "
         f"false_plots = {p.false_plots:g}",

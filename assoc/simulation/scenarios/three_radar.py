@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from assoc.scene import Scene
+from assoc.scene.scene import Scene
 from assoc.sensors.base import Array
+from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.room import require_room
 from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 

@@ -1,0 +1,1 @@
+"""What the command lines share: options, tables, progress, signals, exit codes."""

@@ -1,0 +1,218 @@
+"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from assoc._cli.inputs import check_distinct, check_kind, check_output, number, read_toml, scan_range
+from assoc._cli.program import seconds, whole_number
+from assoc.errors import InvalidInputError
+from assoc.solvers import registry
+from assoc.sweeps.design import designed, read_words, settings_from
+from assoc.sweeps.store import LOG, MANIFEST, REPORT
+
+if TYPE_CHECKING:
+    from assoc.sweeps.setting import Setting
+    from assoc.sweeps.sources import Source
+    from assoc.sweeps.space import Space
+    from assoc.sweeps.study import Study
+    from assoc.sweeps.tuning import Report
+
+DEFAULT_SOLVER = "aco"
+
+_TEXTS = ("output", "scheduler", "scans", "target")
+_WHOLE = {"repeats": 1, "seed": 0, "random": 1, "max_tuples": 1, "tune": 1}
+_NUMBERS = ("time_limit", "gate_probability")
+_LISTS = ("files", "solver", "grid")
+_KNOWN = (*_LISTS, *_TEXTS, *_WHOLE, *_NUMBERS, "jobs")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a sweep was asked to do, checked.
+
+    Attributes
+    ----------
+    values : mapping
+        Options by name, in their types.
+    tables : mapping
+        The design as tables, if a file has it.
+    config : str
+        Name of that file.
+    """
+
+    values: Mapping[str, Any]
+    tables: Mapping[str, Any]
+    config: str
+
+    @property
+    def output(self) -> str:
+        """The study's folder."""
+        return str(self.values["output"])
+
+    @property
+    def jobs(self) -> int:
+        """Number of processes."""
+        return int(self.values.get("jobs", 1))
+
+    @property
+    def scheduler(self) -> str | None:
+        """Address of the dask scheduler."""
+        return self.values.get("scheduler")
+
+    @property
+    def tune(self) -> int | None:
+        """Number of trials, if parameters are to be searched."""
+        return self.values.get("tune")
+
+    @property
+    def solvers(self) -> list[str]:
+        """Names of the solvers of the command line."""
+        words = [name for word in self.values.get("solver", [DEFAULT_SOLVER]) for name in word.split(",") if name]
+        for name in words:
+            registry.parameters(name)
+        return list(dict.fromkeys(words))
+
+    @cached_property
+    def spaces(self) -> dict[str, dict[str, Space]]:
+        """Values and ranges of the command line for each solver."""
+        return read_words(self.values.get("grid", []), self.solvers)
+
+    @cached_property
+    def settings(self) -> list[Setting]:
+        """The design."""
+        random, seed = self.values.get("random"), self.values.get("seed", 0)
+        if self.tables:
+            return settings_from(self.tables, random, seed, f"{self.config}: ")
+        return designed(list(self.spaces.items()), random, seed)
+
+    @cached_property
+    def sources(self) -> tuple[Source, ...]:
+        """The scenes and problems."""
+        from assoc.sweeps.sources import load_sources
+
+        return load_sources(self.values["files"])
+
+    def study(self) -> Study:
+        """Return the study."""
+        from assoc.sweeps.study import Study
+
+        settings = self.settings  # a wrong design is told before scenes are read
+        return Study(sources=self.sources, settings=settings, repeats=self.values.get("repeats", 1), **self._common())
+
+    def tuning(self, progress: Callable[[Any], object]) -> Report:
+        """Search parameters."""
+        from assoc.sweeps.tuning import tune
+
+        if self.tables or len(self.solvers) != 1 or "random" in self.values:
+            raise InvalidInputError("--tune: searches one --solver in the ranges of --grid, without --random or tables")
+        solver = self.solvers[0]
+        return tune(
+            self.output,
+            self.sources,
+            solver,
+            self.spaces[solver],
+            self.values["tune"],
+            target=self.values.get("target", "gap"),
+            repeats=self.values.get("repeats", 3),
+            jobs=self.jobs,
+            scheduler=self.scheduler,
+            progress=progress,
+            **self._common(),
+        )
+
+    def _common(self) -> dict[str, Any]:
+        values = self.values
+        scans = None
+        if "scans" in values:
+            scans = [scan_range(values["scans"], source.num_scans, source.name) for source in self.sources]
+        return {
+            "seed": values.get("seed", 0),
+            "time_limit": values.get("time_limit"),
+            "gating": {name: values[name] for name in ("gate_probability", "max_tuples") if name in values},
+            "scans": scans,
+        }
+
+
+def read(given: Mapping[str, Any]) -> Options:
+    """Check the options of the command line and of the file that ``config`` names; the former come first.
+
+    Raises
+    ------
+    InvalidInputError
+        Anything that is not as ``--help`` says.
+    """
+    config = given.get("config", "")
+    content = read_toml(config) if config else {}
+    tables = {key: content.pop(key) for key in [*content] if key in registry.names() and key not in _KNOWN}
+    values = {key: _of_file(config, key, value) for key, value in content.items()}
+    for name, value in given.items():
+        if name in _KNOWN and value != []:
+            values[name] = _of_text(name, value)
+    if tables:
+        for name in ("solver", "grid"):
+            if name in values:
+                raise InvalidInputError(f"--{name}: the design is in the tables of {config}; give one of the two")
+    if not values.get("files"):
+        raise InvalidInputError("no scene.npz or problem.npz is given")
+    if "output" not in values:
+        raise InvalidInputError("--output: missing, expected the folder that keeps the study")
+    if "scheduler" in values and "jobs" in values:
+        raise InvalidInputError("--jobs: the cluster has its own workers; give --jobs or --scheduler")
+    if values.get("target", "gap") not in ("gap", "time"):
+        raise InvalidInputError(f"--target: expected gap or time, got {values['target']!r}")
+    if "target" in values and "tune" not in values:
+        raise InvalidInputError("--target: goes only with --tune")
+    if not 0 < values.get("gate_probability", 1.0) <= 1:
+        raise InvalidInputError(f"--gate-probability: expected a number in (0, 1], got {values['gate_probability']}")
+    return Options(values, tables, config)
+
+
+def _of_text(name: str, value: Any) -> Any:
+    flag = "--" + name.replace("_", "-")
+    if name in _WHOLE:
+        return whole_number(value, flag, _WHOLE[name])
+    if name == "time_limit":
+        return seconds(value, flag)
+    if name == "gate_probability":
+        return number(value, flag)
+    if name == "jobs":
+        return os.cpu_count() or 1 if value == "all" else whole_number(value, flag, 1)
+    return value
+
+
+def _of_file(file: str, key: str, value: Any) -> Any:
+    label = f"{file}: {key}"
+    if key not in _KNOWN:
+        if isinstance(value, (dict, list)):
+            raise InvalidInputError(f"{file}: [{key}] is no solver; known: {', '.join(registry.names())}")
+        raise InvalidInputError(f"{label}: unknown key; known: {', '.join(_KNOWN)}, and tables [solver]")
+    if key in _LISTS:
+        words = [value] if isinstance(value, str) else value
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            raise InvalidInputError(f"{label}: expected text or a list of texts, got {value!r}")
+        return words
+    if key == "jobs" and value == "all":
+        return _of_text(key, value)
+    check_kind(value, str if key in _TEXTS else float if key in _NUMBERS else int, label)
+    if key in _WHOLE or key == "jobs":
+        least = _WHOLE.get(key, 1)
+        if value < least:
+            raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {value!r}")
+    if key == "time_limit" and not 0 < value < float("inf"):
+        raise InvalidInputError(f"{label}: expected seconds > 0, got {value!r}")
+    return float(value) if key in _NUMBERS else value
+
+
+def check_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
+    """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
+    outputs = [file for file in files if file is not None]
+    check_distinct(outputs, [*inputs, *(os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT))])
+    for file in outputs:
+        check_output(file, folder)

@@ -1,0 +1,222 @@
+"""npz files: written whole or not at all, and read without trusting them."""
+
+from __future__ import annotations
+
+import lzma
+import math
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from assoc._files.output import write_atomically
+from assoc.errors import InvalidInputError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SIZE_LIMIT = 4 * 1024**3
+"""The most bytes that the arrays of one npz file may hold together."""
+
+_HEADER_LIMIT = 10_000
+# deflate cannot expand by more than about 1032; a member that claims more is a lie or a trap
+_LARGEST_EXPANSION = 1_100
+# arrays of scenes and problems compress by 3 to 10, and only small ones of equal numbers by much more
+_USUAL_EXPANSION, _SMALL = 100, 128 * 1024**2
+
+_KINDS = {"float": "fiu", "int": "iu", "str": "U", "bool": "b"}
+_TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_, "bool": np.bool_}
+
+
+class Field(NamedTuple):
+    """What an array of an npz file must be.
+
+    Parameters
+    ----------
+    kind : {"float", "int", "str", "bool"}
+        "float" also takes integers; the array is returned as float64, int64, str or bool.
+    ndim : int
+        Number of dimensions.
+    required : bool
+        Whether a file without it is refused.
+    """
+
+    kind: str
+    ndim: int
+    required: bool = True
+
+
+def save_npz(
+    path: str | os.PathLike[str], format_name: str, version: int, arrays: Mapping[str, Array | str | int]
+) -> None:
+    """Write arrays as a compressed npz with its format name and version; see `load_npz`."""
+    content = {name: np.asarray(value) for name, value in arrays.items()}
+    for name, value in content.items():
+        if value.dtype.hasobject:
+            raise InvalidInputError(
+                f"{path}: the field {name!r} holds Python objects, expected a plain array"
+            )
+    header = {"format": np.asarray(format_name), "version": np.asarray(version)}
+
+    def write(file: IO[bytes]) -> None:
+        # as numpy's savez_compressed, whose archive is left open where the disk is full, and complains of that later
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, value in {**header, **content}.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, value, allow_pickle=False)
+
+    write_atomically(path, write)
+
+
+def load_npz(
+    path: str | os.PathLike[str], format_name: str, version: int, fields: Mapping[str, Field]
+) -> dict[str, Array]:
+    """Read an npz file written by `save_npz`, or refuse it with one line.
+
+    Nothing in the file is executed (no pickles), and no memory is taken for an array before its header
+    has been checked against the bytes that the file really holds.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    format_name, version : str, int
+        What its fields "format" and "version" must say; older versions are read, later ones are refused.
+    fields : mapping of str to Field
+        The arrays to read. Arrays that are not named are left alone.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The arrays, contiguous; optional fields that the file does not have are missing.
+
+    Raises
+    ------
+    InvalidInputError
+        Anything else than a readable file of this format; the message begins with the path.
+    """
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise InvalidInputError(f"{file}: is a folder, expected a file of format {format_name!r}")
+        if not file.exists():
+            raise InvalidInputError(f"{file}: no such file")
+        if file.stat().st_size == 0:
+            raise InvalidInputError(f"{file}: is empty, expected a file of format {format_name!r}")
+        with zipfile.ZipFile(file) as archive:
+            return _read(file, archive, format_name, version, fields)
+    except InvalidInputError:
+        raise
+    except zipfile.BadZipFile as error:
+        raise InvalidInputError(
+            f"{file}: is not a readable npz file ({_one_line(error)}), "
+            f"expected a file of format {format_name!r}"
+        ) from error
+    except (OSError, EOFError, zlib.error, lzma.LZMAError, RuntimeError, ValueError, NotImplementedError) as error:
+        raise InvalidInputError(f"{file}: cannot be read ({_one_line(error)})") from error
+
+
+def _one_line(error: BaseException) -> str:
+    text = str(getattr(error, "strerror", None) or error).strip()
+    return text.splitlines()[0][:160] if text else type(error).__name__
+
+
+def _read(
+    file: Path, archive: zipfile.ZipFile, format_name: str, version: int, fields: Mapping[str, Field]
+) -> dict[str, Array]:
+    members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+    if "format" not in members:
+        raise InvalidInputError(f"{file}: has no field 'format', expected a file of format {format_name!r}")
+    wanted = {name: spec for name, spec in fields.items() if spec.required or name in members}
+    found = str(_member(file, archive, members["format"], Field("str", 0))[()])
+    if found != format_name:
+        raise InvalidInputError(f"{file}: has the format {found[:60]!r}, expected {format_name!r}")
+    if "version" not in members:
+        raise InvalidInputError(f"{file}: the field 'version' is missing")
+    stored = int(_member(file, archive, members["version"], Field("int", 0))[()])
+    if stored > version:
+        raise InvalidInputError(
+            f"{file}: has version {stored} of {format_name!r}, this program reads up to version {version}"
+        )
+    if stored < 1:
+        raise InvalidInputError(f"{file}: the field 'version' is {stored}, expected 1 or more")
+    for name in wanted:
+        if name not in members:
+            raise InvalidInputError(f"{file}: the field {name!r} is missing")
+    total = sum(members[name].file_size for name in wanted)
+    if total > SIZE_LIMIT:
+        raise InvalidInputError(f"{file}: its arrays take {total} bytes, the limit is {SIZE_LIMIT}")
+    packed = sum(members[name].compress_size for name in wanted)
+    if total > _SMALL and total > _USUAL_EXPANSION * packed:
+        raise InvalidInputError(f"{file}: its arrays claim to unpack from {packed} to {total} bytes, which none do")
+    return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
+
+
+def format_of(path: str | os.PathLike[str]) -> str | None:
+    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
+    file = Path(path)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return str(_member(file, archive, archive.getinfo("format.npy"), Field("str", 0))[()])
+    except Exception:  # whatever a damaged file raises here, loading says it better
+        return None
+
+
+def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field) -> Array:
+    """One array, its header checked before memory is taken for it."""
+    name = info.filename.removesuffix(".npy")
+    if info.file_size > SIZE_LIMIT or info.file_size > _LARGEST_EXPANSION * info.compress_size + 1000:
+        raise InvalidInputError(
+            f"{file}: the field {name!r} claims {info.file_size} bytes, more than it can hold"
+        )
+    with archive.open(info) as stream:
+        try:
+            major, minor = np.lib.format.read_magic(stream)
+            if (major, minor) == (1, 0):
+                shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream, _HEADER_LIMIT)
+            elif (major, minor) == (2, 0):
+                shape, fortran, dtype = np.lib.format.read_array_header_2_0(stream, _HEADER_LIMIT)
+            else:
+                raise ValueError(f"npy version {major}.{minor}")
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError) as error:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} is not a plain array ({_one_line(error)})"
+            ) from error
+        if dtype.hasobject:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} holds pickled objects, expected {spec.kind} values"
+            )
+        if dtype.kind not in _KINDS[spec.kind]:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values"
+            )
+        if dtype.itemsize == 0:
+            # numpy makes room for one character each, which no check of sizes against the file would see
+            raise InvalidInputError(f"{file}: the field {name!r} holds texts without room for a character")
+        if len(shape) != spec.ndim:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}"
+            )
+        if any(type(side) is not int for side in shape):
+            # True and False pass numpy's own check, and no array has such a side
+            raise InvalidInputError(f"{file}: the field {name!r} has the shape {shape}, expected whole numbers")
+        if any(side < 0 for side in shape):
+            raise InvalidInputError(f"{file}: the field {name!r} has a negative shape {shape}")
+        size = math.prod(shape) * dtype.itemsize
+        if size > info.file_size:
+            raise InvalidInputError(
+                f"{file}: the field {name!r} claims {size} bytes of data, the file holds {info.file_size}"
+            )
+        data = stream.read(size)
+        if len(data) != size:
+            raise InvalidInputError(f"{file}: the field {name!r} ends after {len(data)} of {size} bytes")
+    if size == 0:
+        array: Array = np.zeros(shape, dtype)
+    else:
+        array = np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+    if spec.kind == "int" and dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
+        raise InvalidInputError(f"{file}: the field {name!r} has integers beyond 64 bits")
+    return np.array(array, dtype=_TARGETS[spec.kind], order="C")

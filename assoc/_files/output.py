@@ -1,0 +1,198 @@
+"""Files that are written whole or not at all, and what is no file: pipes, terminals, /dev/null."""
+
+from __future__ import annotations
+
+import io
+import os
+import secrets
+import stat
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from assoc._system import temporary
+from assoc.errors import InvalidInputError
+
+FilePath = str | os.PathLike[str]
+
+
+def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) -> None:
+    """Refuse a path at which no file can be written; before the work, and not only after it.
+
+    Parameters
+    ----------
+    path : path-like
+    folder_to_come : path-like, optional
+        A folder that need not be there yet.
+
+    Raises
+    ------
+    InvalidInputError
+        It is a folder or a disk, or in a folder that does not exist or takes no files.
+    """
+    try:
+        found = _status(path)
+        if found is not None and stat.S_ISDIR(found.st_mode):
+            raise InvalidInputError(f"{path}: is a folder, expected a file name to write")
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            if not is_stream(path):
+                raise InvalidInputError(f"{path}: is neither a file nor a pipe or terminal")
+            return
+        # a name that leads elsewhere is kept, and the file written where it leads
+        parent = Path(os.path.realpath(path)).parent
+        if not parent.is_dir():
+            if folder_to_come is not None and parent == Path(os.path.realpath(folder_to_come)):
+                return
+            leads = parent if os.path.islink(path) else Path(path).parent
+            raise InvalidInputError(f"{path}: the folder {leads} does not exist")
+        if found is not None and not os.access(path, os.W_OK):
+            raise InvalidInputError(f"{path}: cannot be written (it is read-only)")
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise InvalidInputError(f"{path}: cannot be written (the folder {Path(path).parent} is read-only)")
+    except (OSError, ValueError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        raise InvalidInputError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from error
+
+
+def is_stream(path: FilePath) -> bool:
+    """Whether a path is a pipe, a terminal or a device of characters, which cannot be replaced by a file."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode)
+
+
+def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> None:
+    """Write a file so that readers see the old one or the whole new one, never a part.
+
+    A pipe or a device is written to as it is, in one piece. A symbolic link stays, and its target is replaced.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the file goes.
+    writer : callable
+        Called with a binary file object; it writes the content. If it raises, nothing is left behind.
+
+    Raises
+    ------
+    InvalidInputError
+        The path is a folder, its folder does not exist, or it cannot be written.
+    """
+    check_writable(path)
+    number = _standard_stream(path)
+    if number is not None or is_stream(path):
+        _write_stream(path, number, writer)
+        return
+    target = os.path.realpath(path)
+    name = ""
+    try:
+        handle, name = _create(target)
+        with os.fdopen(handle, "wb") as file:
+            writer(file)
+            # on the disk before it takes the name: a crash of the machine must not leave an empty file under it
+            file.flush()
+            os.fsync(file.fileno())
+        with temporary.lock:
+            os.replace(name, target)
+            temporary.forget(name)
+    except BaseException as error:
+        if name:
+            temporary.remove(name)
+        # an archive that cannot be closed on a full disk complains of that, and has the disk's complaint as context
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, OSError):
+            cause = cause.__context__
+        if cause is not None and isinstance(error, Exception):
+            raise InvalidInputError(
+                f"{path}: cannot be written ({cause.strerror or cause}); what was there before is unchanged"
+            ) from error
+        raise
+    _sync_folder(os.path.dirname(target))
+
+
+def write_text(path: FilePath, text: str) -> None:
+    """Write text as UTF-8, whole or not at all; see `write_atomically`.
+
+    Names of files may hold bytes that are no text; they are written as escapes.
+    """
+    content = text.encode("utf-8", "backslashreplace")
+    write_atomically(path, lambda file: file.write(content))
+
+
+def _status(path: FilePath) -> os.stat_result | None:
+    """What is at a path, or at the end of a link; None if nothing is."""
+    try:
+        return os.stat(path)
+    except FileNotFoundError:
+        return None
+    except NotADirectoryError:
+        raise InvalidInputError(f"{path}: the folder {Path(path).parent} does not exist") from None
+
+
+def _create(target: str) -> tuple[int, str]:
+    """Open a new file in the folder of another one, with the mode that this one has or would get."""
+    folder, base = os.path.split(target)
+    # names may have 255 bytes; 30 are for what is put around
+    start = os.fsdecode(os.fsencode(base)[:200])
+    old = _status(target)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    while True:
+        name = os.path.join(folder, f".{start}.{secrets.token_hex(6)}.part")
+        with temporary.lock:
+            try:
+                # the mode is the system's affair: asking for the umask changes it for all threads
+                handle = os.open(name, flags, 0o666)
+            except FileExistsError:
+                continue
+            temporary.add(name)
+        if old is not None:
+            with suppress(OSError):
+                os.chmod(name, stat.S_IMODE(old.st_mode) & 0o777)
+        return handle, name
+
+
+def _standard_stream(path: FilePath) -> int | None:
+    """Return 1 or 2 if a path is where our stdout or stderr goes (/dev/stdout, or the same file)."""
+    found = _status(path)
+    for number in (1, 2):
+        with suppress(OSError):
+            if found is not None and os.path.samestat(found, os.fstat(number)):
+                return number
+    return None
+
+
+def _write_stream(path: FilePath, number: int | None, writer: Callable[[IO[bytes]], object]) -> None:
+    content = io.BytesIO()
+    writer(content)
+    try:
+        if number is None:
+            with open(path, "wb") as file:
+                file.write(content.getbuffer())
+            return
+        stream = sys.stdout if number == 1 else sys.stderr
+        if stream is not None:
+            stream.flush()
+        # opened anew, a file would begin at its start again
+        with os.fdopen(os.dup(number), "wb") as file:
+            file.write(content.getbuffer())
+    except BrokenPipeError:
+        if number == 1:
+            raise  # the reader of our output has seen enough
+        raise InvalidInputError(f"{path}: cannot be written (its reader has gone)") from None
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _sync_folder(folder: str) -> None:
+    """Have the new name on the disk, too, where a folder can be asked for that."""
+    with suppress(OSError):
+        handle = os.open(folder or ".", os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

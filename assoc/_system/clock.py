@@ -1,0 +1,46 @@
+"""The clock as kernels see it: a time limit holds inside a kernel, too.
+
+Kernels that can take longer than some hundredths of a second on a large problem are given a deadline, in seconds of
+`time.monotonic`, and look at the clock now and then; ``inf`` is no deadline. A kernel that is late stops where its
+result is sound, not where it is best.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numba import config, types  # noqa: TID251  (a declaration of the system's clock; kernels are made by _compiled)
+
+from assoc._system.compiled import njit
+
+_read: Any = None
+_UNCOMPILED = bool(getattr(config, "DISABLE_JIT", 0))
+_CLOCK = 0
+if not _UNCOMPILED and hasattr(time, "clock_gettime"):
+    _read = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.voidptr))
+    _CLOCK = time.CLOCK_MONOTONIC
+
+    @njit
+    def now() -> float:
+        """Return seconds of `time.monotonic`."""
+        pair = np.empty(2, np.int64)
+        _read(_CLOCK, pair.ctypes.data)
+        return float(pair[0] + 1e-9 * pair[1])
+
+elif _UNCOMPILED:
+    now = time.monotonic
+
+else:
+
+    @njit
+    def now() -> float:
+        """Return 0: without a clock that kernels can read, time limits are kept between kernels alone."""
+        return 0.0
+
+
+@njit
+def is_over(deadline: float) -> bool:
+    """Whether the time is over."""
+    return bool(deadline < np.inf and now() > deadline)

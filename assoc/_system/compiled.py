@@ -1,0 +1,146 @@
+"""The one way to numba: lazy signatures, cached on disk, without the GIL, and never stale.
+
+numba keeps a compiled kernel as long as the kernel's own file is unchanged, so an edited helper in another
+file, or an upgrade that leaves one file as it was, would leave stale code. Here the stamp of every kernel
+is that of all files with kernels that it could call. Where no cache folder can be written (a read-only installation
+and home), numba would fail at import; the cache then goes to a temporary folder, and where there is none of
+these either, nothing is kept.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import caching, event
+
+from assoc._system import temporary
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+# these rooms know no other room's kernels but the clock
+_SOLVING = ("packing", "solvers", "ranking")
+
+
+@functools.cache
+def _source_stamp(solvers: bool) -> str:
+    """Digest of names and contents of all files with kernels, of the solvers or of the other rooms.
+
+    The solvers know no other room, so that a change elsewhere leaves their kernels as they are. Contents
+    rather than times: a copied or checked-out tree keeps its compiled kernels.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        content = path.read_bytes()
+        if _is_solving(path) == solvers and b"njit" in content:
+            digest.update(f"{path.relative_to(_PACKAGE)} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+
+def _is_solving(path: Path) -> bool:
+    return path.relative_to(_PACKAGE).parts[0] in _SOLVING
+
+
+_CACHES: Any = caching.CacheImpl
+_CONFIG: Any = numba.config
+_EVENT: Any = event
+_STANDARD_LOCATORS = tuple(_CACHES._locator_classes)
+
+
+class _PackageCacheLocator:
+    """Finds numba's usual cache place for kernels of this package, with the package's stamp."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        path = Path(py_file).resolve()
+        if not path.is_relative_to(_PACKAGE):
+            return None
+        for standard in _STANDARD_LOCATORS:
+            locator = standard.from_function(py_func, py_file)
+            if locator is not None:
+                break
+        else:
+            # for the processes that this one starts, too; it goes when this process ends
+            folder = tempfile.mkdtemp(prefix="assoc-numba-")
+            temporary.add(folder)
+            _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
+            locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
+        stamp = _source_stamp(_is_solving(path))
+        locator.get_source_stamp = lambda: stamp
+        return locator
+
+
+_CACHES._locator_classes = [_PackageCacheLocator, *_STANDARD_LOCATORS]
+
+
+_FUNCTION_CACHE: Any = caching.FunctionCache
+
+
+class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
+    """numba's cache of one kernel, which is a help and never an obstacle."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep compiled code; on a full disk, say, it is compiled again next time."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load compiled code; what cannot be read (a file cut by a crash) is compiled again, and replaced."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            # an index that cannot be read cannot be added to either
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+
+def njit(function: Callable[..., Any]) -> Any:
+    """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``.
+
+    With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
+    """
+    if _CONFIG.DISABLE_JIT:
+
+        @functools.wraps(function)
+        def silent(*arguments: Any) -> Any:
+            with np.errstate(all="ignore"):
+                return function(*arguments)
+
+        return silent
+    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    # nowhere to keep it, not even for a while: each process compiles for itself
+    with contextlib.suppress(OSError):
+        kernel._cache = _KernelCache(function)
+    return kernel
+
+
+class _Loads(event.Listener):
+    """Counts how often the compiler was asked: for code to compile, or to load from the cache."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def on_start(self, event: Any) -> None:
+        self.count += 1
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+_loads = _Loads()
+_EVENT.register("numba:compiler_lock", _loads)
+
+
+def loaded() -> tuple[int, int]:
+    """Return numbers that change when code is compiled, loaded from the cache, or imported in this process."""
+    return _loads.count, len(sys.modules)

@@ -1,0 +1,33 @@
+"""Work in a thread that is left behind when time is over: for libraries that look at no clock, or seldom."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from assoc.packing.run import Run
+
+Answer = TypeVar("Answer")
+
+
+def in_time(work: Callable[[], Answer], run: Run, name: str) -> Answer | None:
+    """Return what the work returns, or None when it is not back by the time limit; what it raises is raised.
+
+    The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself.
+    """
+    answers: list[Answer] = []
+    errors: list[BaseException] = []
+
+    def run_aside() -> None:
+        try:
+            answers.append(work())
+        except BaseException as error:  # handed to the caller below
+            errors.append(error)
+
+    thread = threading.Thread(target=run_aside, name=name, daemon=True)
+    thread.start()
+    thread.join(max(run.remaining(), 0.0))
+    if errors:
+        raise errors[0]
+    return answers[0] if answers else None

@@ -1,0 +1,1 @@
+"""Text for people: plain and HTML."""

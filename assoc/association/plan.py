@@ -1,0 +1,157 @@
+"""The plan of an association: which scans of what, solved how; it can be sent to other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.processes import ordered_map
+from assoc.association.association import Association, ScanAssociation
+from assoc.costs import build_problem, positions_and_covariances
+from assoc.errors import InvalidInputError
+from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import checked_k, kbest
+from assoc.scene.scene import Scan, Scene
+from assoc.solution import Solution
+from assoc.solvers.assign import assign
+from assoc.solvers.registry import make_parameters
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How to associate scans; one plan serves all processes.
+
+    Attributes
+    ----------
+    sources : sequence of Scene or AssignmentProblem
+    solver, seed, time_limit, parameters
+        As in ``associate``.
+    gating : mapping
+        Options of ``assoc.build_problem``.
+    kbest : int, optional
+        Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
+    """
+
+    sources: Sequence[Scene | AssignmentProblem]
+    solver: str
+    seed: int = 0
+    time_limit: float | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    gating: Mapping[str, Any] = field(default_factory=dict)
+    kbest: int | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
+            raise InvalidInputError(f"seed: expected a whole number >= 0, got {self.seed!r}")
+        if self.kbest is not None:
+            checked_k(self.kbest)
+        self.all_parameters  # noqa: B018  (refuses what is wrong now, not in the first scan)
+
+    @property
+    def all_parameters(self) -> dict[str, Any]:
+        """The parameters given and the defaults of the others."""
+        if self.kbest is not None:
+            return {"k": self.kbest}
+        chosen: Any = make_parameters(self.solver, self.parameters)
+        return {one.name: getattr(chosen, one.name) for one in fields(chosen)}
+
+    def __call__(self, item: tuple[int, int]) -> ScanAssociation:
+        """Associate scan ``item[1]`` of source ``item[0]``."""
+        source = self.sources[item[0]]
+        if isinstance(source, AssignmentProblem):
+            return _best([_of_problem(source, one) for one in self._solve(source, self.seed)], self.kbest)
+        return self.associate(source, source.scan(item[1]))
+
+    def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
+        """Associate a scan of the sensors of a scene."""
+        # a seed of its own for each scan, whichever process solves it and whatever was solved before
+        seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
+        problem = build_problem(scene, scan, **self.gating)
+        return _best([_of_scan(scene, scan, problem, one) for one in self._solve(problem, seed)], self.kbest)
+
+    def _solve(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> list[Solution]:
+        if self.kbest is not None:
+            return kbest(problem, self.kbest, time_limit=self.time_limit)
+        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)]
+
+    def items(self) -> list[tuple[int, int]]:
+        """All scans of all sources, as (source, scan)."""
+        counts = [source.num_scans if isinstance(source, Scene) else 1 for source in self.sources]
+        return [(number, k) for number, count in enumerate(counts) for k in range(count)]
+
+    def run(self, items: Sequence[tuple[int, int]], jobs: int = 1) -> Iterator[ScanAssociation]:
+        """Associate scans one after the other, or several at once in processes; results in order."""
+        if isinstance(jobs, bool) or not isinstance(jobs, (int, np.integer)) or jobs < 1:
+            raise InvalidInputError(f"jobs: expected a whole number >= 1, got {jobs!r}")
+        return ordered_map(self, items, int(jobs))
+
+    def gather(self, scans: Iterable[ScanAssociation]) -> Association:
+        """Put associated scans together."""
+        name = self.solver if self.kbest is None else "kbest"
+        return Association(tuple(scans), name, self.all_parameters, int(self.seed))
+
+
+def _best(scans: list[ScanAssociation], k: int | None) -> ScanAssociation:
+    """Return the first of ranked associations, which carries all of them where they were asked for."""
+    return scans[0] if k is None else replace(scans[0], ranked=tuple(scans))
+
+
+def _targets(problem: AssignmentProblem, solution: Solution) -> NDArray[np.int32]:
+    number = np.count_nonzero(solution.tuples, axis=1)
+    alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
+    return solution.tuples[(number >= 2) | alone_but_real]
+
+
+def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
+    sizes = tuple(int(n) for n in problem.sizes)
+    return ScanAssociation(0, None, sizes, solution, _targets(problem, solution))
+
+
+def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
+    targets = _targets(problem, solution)
+    positions, covariances = positions_and_covariances(scene, scan, targets)
+    truth = true_tuples(scan)
+    correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
+    return ScanAssociation(
+        scan=scan.index,
+        time=scan.time,
+        sizes=tuple(int(n) for n in scan.sizes),
+        solution=solution,
+        targets=targets,
+        positions=positions,
+        covariances=covariances,
+        true_tuples=None if truth is None else len(truth),
+        correct_tuples=correct,
+    )
+
+
+def true_tuples(scan: Scan) -> NDArray[np.int32] | None:
+    """The tuples of the targets that at least two sensors detected.
+
+    Parameters
+    ----------
+    scan : Scan
+
+    Returns
+    -------
+    int32 array (T, S), or None
+        In order of target id; None where the sources are not known. A target of which one sensor has several
+        measurements has no tuple and is left out.
+    """
+    if scan.sources is None:
+        return None
+    count = len(scan.sources)
+    ids = np.unique(np.concatenate([*scan.sources, np.zeros(0, np.int64)]))
+    ids = ids[ids >= 0]
+    tuples = np.zeros((len(ids), count), dtype=np.int32)
+    single = np.ones(len(ids), dtype=bool)
+    for sensor, source in enumerate(scan.sources):
+        real = np.flatnonzero(source >= 0)
+        row = np.searchsorted(ids, source[real])
+        tuples[row, sensor] = real + 1
+        single &= np.bincount(row, minlength=len(ids)) <= 1
+    return tuples[single & (np.count_nonzero(tuples, axis=1) >= 2)]

@@ -1,0 +1,1 @@
+"""Candidate tuples of tracks and measurements, and what they cost."""

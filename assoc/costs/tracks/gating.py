@@ -1,0 +1,142 @@
+"""Which measurements may belong to which tracks: sorted by one component, then boxes."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc.errors import LimitExceededError
+from assoc.filters.base import Expected
+from assoc.filters.measurement import Measurement
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MOST_PAIRS = 20_000_000
+"""The most pairs of tracks and measurements: more would only mean that the tracks know nothing."""
+
+_TURN = 2.0 * math.pi
+
+
+def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
+    """Pairs of tracks and measurements that may pass a chi-square gate; none that does is left out.
+
+    Parameters
+    ----------
+    expected : Expected
+        Means (B, d) and covariances (B, d, d) of what each track leads one to expect.
+    measurements : array (M, d)
+    angular : tuple of bool
+        Which components are angles (they are compared around the circle).
+    gate : float
+        Squared Mahalanobis distance.
+
+    Returns
+    -------
+    track, measurement : int arrays (K,)
+        Ordered by track, then measurement.
+
+    Raises
+    ------
+    LimitExceededError
+        More than `MOST_PAIRS` pairs.
+    """
+    h, z = expected.mean, measurements
+    if not len(h) or not len(z):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate, MOST_PAIRS)
+    if len(tracks) > MOST_PAIRS:
+        # ordered by track: what is left would go on like this
+        expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
+        raise LimitExceededError(
+            f"about {expected_pairs:.3g} pairs of {len(h)} tracks and {len(z)} measurements in their gates, at most "
+            f"{MOST_PAIRS} are looked at; lower gate_probability, or end uncertain tracks sooner"
+        )
+    return tracks, found
+
+
+@lru_cache(maxsize=64)
+def _turning(angular: tuple[bool, ...]) -> Array:
+    return np.array(angular, dtype=np.bool_)
+
+
+@njit
+def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int) -> Any:
+    """Pairs whose components are all within reach, no more than one above ``most``; sorted by one component."""
+    num, dim = h.shape
+    reach = np.empty((num, dim))
+    for t in range(num):
+        for i in range(dim):
+            reach[t, i] = math.sqrt(gate * covariance[t, i, i]) * (1.0 + 1e-9)
+    # the component in which a gate is the smallest share of all measurements; angles have no order
+    axis, widest = -1, 0.0
+    for i in range(dim):
+        if not turning[i]:
+            share = (z[:, i].max() - z[:, i].min()) / max(reach[:, i].mean(), 1e-300)
+            if share > widest:
+                axis, widest = i, share
+    low, high = np.zeros(num, np.int64), np.full(num, z.shape[0], np.int64)
+    order = np.arange(z.shape[0])
+    if axis >= 0:
+        order = np.argsort(z[:, axis], kind="mergesort")
+        along = z[order, axis]
+        for t in range(num):
+            low[t] = np.searchsorted(along, h[t, axis] - reach[t, axis], side="left")
+            high[t] = np.searchsorted(along, h[t, axis] + reach[t, axis], side="right")
+    # in a wide gate there are many more than are within reach
+    tracks = np.empty(min((high - low).sum(), 64 + 8 * num), np.int64)
+    found = np.empty(tracks.size, np.int64)
+    count = 0
+    for t in range(num):
+        first = count
+        for k in range(low[t], high[t]):
+            inside = True
+            for i in range(dim):
+                off = abs(z[order[k], i] - h[t, i])
+                if turning[i]:
+                    off %= _TURN
+                    off = min(off, _TURN - off)
+                if not off <= reach[t, i]:
+                    inside = False
+                    break
+            if inside:
+                if count == tracks.size:
+                    tracks = np.concatenate((tracks, np.empty(count, np.int64)))
+                    found = np.concatenate((found, np.empty(count, np.int64)))
+                tracks[count] = t
+                found[count] = order[k]
+                count += 1
+                if count > most:
+                    return tracks[:count].copy(), found[:count].copy()
+        found[first:count] = np.sort(found[first:count])
+    return tracks[:count].copy(), found[:count].copy()
+
+
+def _reach(expected: Expected, gate: float) -> Array:
+    """Largest component of a residual within the gate: |v_i| <= sqrt(gate S_ii)."""
+    reach: Array = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
+    return reach
+
+
+def within(
+    expected: Expected, rows: Array, measurements: Array, found: Array, angular: tuple[bool, ...], gate: float
+) -> Array:
+    """Which pairs (row of `expected`, row of `measurements`) may pass a chi-square gate; bool (K,)."""
+    off = _apart(measurements[found], expected.mean[rows], np.array(angular))
+    return np.asarray((off <= _reach(expected, gate)[rows]).all(axis=1))
+
+
+def _apart(a: Array, b: Array, turning: Array) -> Array:
+    off: Array = np.abs(a - b)
+    if turning.any():
+        part = off[..., turning] % (2 * math.pi)
+        off[..., turning] = np.minimum(part, 2 * math.pi - part)
+    return off
+
+
+def angular_components(sensor: Measurement) -> tuple[bool, ...]:
+    """Which components of a measurement are angles; none for models that are no sensor."""
+    return getattr(sensor, "angular", (False,) * sensor.dim)[: sensor.dim]

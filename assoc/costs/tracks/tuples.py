@@ -1,0 +1,178 @@
+"""Candidate tuples of a track and measurements, and their costs under the track's predicted density.
+
+The track's prediction is corrected with the measurements of a tuple one after the other; the logarithms of
+the predictive densities add up to that of all of them together, and each enters against clutter. So the cost
+of (track, z_1, ..., z_S) is the negative logarithm of p(z_1, ..., z_S | track) over "all are false alarms".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._system import memory
+from assoc.costs.gating import chi_square_quantiles
+from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.tracks.gating import angular_components, near_pairs, within
+from assoc.costs.tracks.scores import ScoreTerms
+from assoc.errors import LimitExceededError
+from assoc.filters.base import Filter
+from assoc.filters.batches import concatenate
+from assoc.filters.measurement import Measurement
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class TrackTuples(NamedTuple):
+    """M candidate tuples of T tracks; every track has one in which all sensors missed it."""
+
+    track: Array
+    """Row of the track, int (M,)."""
+    rows: Array
+    """1-based measurement of each sensor, 0 where it missed, int32 (M, S)."""
+    costs: Array
+    """(M,)."""
+    states: Any
+    """The corrected states, one for each tuple."""
+
+
+class TrackPairs(NamedTuple):
+    """K measurements of one sensor in the gates of tracks, and the tracks corrected by them."""
+
+    track: Array
+    measurement: Array
+    """0-based."""
+    log_likelihood: Array
+    states: Any
+
+
+def gate_of(sensor: Measurement, probability: float) -> float:
+    """Squared Mahalanobis distance within which this share of the measurements lies."""
+    return float(chi_square_quantiles(float(probability), sensor.dim)[sensor.dim])
+
+
+def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: Measurement, gate: float) -> TrackPairs:
+    """Correct tracks by every measurement of one sensor in their gates."""
+    nothing = np.zeros(0, dtype=np.int64)
+    if not len(states) or not len(measurements):
+        return TrackPairs(nothing, nothing, np.zeros(0), states[nothing])
+    track, found = near_pairs(filter.expected(states, sensor), measurements, angular_components(sensor), gate)
+    return _corrected(filter, states, measurements, sensor, gate, track, found)
+
+
+def require_states(states: Any, count: int) -> None:
+    """Refuse to correct more tracks than there is memory for."""
+    own = [value for value in vars(states).values() if isinstance(value, np.ndarray)] if len(states) else []
+    each = sum(array.nbytes for array in own) / max(len(states), 1)
+    # picked, corrected, and what a filter needs in between
+    memory.require(
+        4.0 * each * count,
+        f"{count} pairs of {len(states)} tracks and measurements",
+        "lower gate_probability, or end uncertain tracks sooner",
+    )
+
+
+def _corrected(
+    filter: Filter[Any], states: Any, measurements: Array, sensor: Measurement, gate: float, track: Array, found: Array
+) -> TrackPairs:
+    if not len(track):
+        return TrackPairs(track, found, np.zeros(0), states[track])
+    require_states(states, len(track))
+    done = filter.update(states[track], np.ascontiguousarray(measurements[found]), sensor)
+    inside = done.nis <= gate
+    if inside.all():
+        return TrackPairs(track, found, done.log_likelihood, done.state)
+    return TrackPairs(track[inside], found[inside], done.log_likelihood[inside], done.state[inside])
+
+
+def grow_track_tuples(
+    filter: Filter[Any],
+    states: Any,
+    measurements: Sequence[Array],
+    sensors: Sequence[Measurement],
+    terms: ScoreTerms,
+    *,
+    gate_probability: float,
+    max_tuples: int = MAX_TUPLES,
+) -> TrackTuples:
+    """Candidate tuples of predicted tracks and one measurement or none of each sensor.
+
+    Parameters
+    ----------
+    filter : Filter
+    states
+        The T predicted states.
+    measurements : sequence over sensors of arrays (n_s, d_s)
+    sensors : sequence of Sensor
+    terms : ScoreTerms
+        Of these sensors.
+    gate_probability : float
+        Share of true measurements that a gate lets through.
+    max_tuples : int
+        The most tuples that may be made.
+
+    Returns
+    -------
+    TrackTuples
+        Ordered by track. A tuple that costs as much as its track all missed is left out: its measurements
+        are better declared false alarms, at cost 0.
+
+    Raises
+    ------
+    LimitExceededError
+        There are more tuples than `max_tuples`.
+    """
+    count = len(states)
+    track = np.arange(count)
+    rows = np.zeros((count, len(sensors)), dtype=np.int32)
+    costs = np.zeros(count)
+    grown = states
+    alone, ahead = -float(terms.miss.sum()), _ahead(sensors, terms)
+    for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
+        gate = gate_of(sensor, gate_probability)
+        near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
+        parent, found = _join(track, *near, count)
+        if s:
+            # what has corrected the track already narrows its gate
+            angles = angular_components(sensor)
+            inside = within(filter.expected(grown, sensor), parent, z, found, angles, gate)
+            parent, found = parent[inside], found[inside]
+        if len(parent) + len(track) > max_tuples:
+            raise LimitExceededError(
+                f"about {len(parent) + len(track):.3g} candidate tuples of tracks and measurements, "
+                f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
+            )
+        done = _corrected(filter, grown, z, sensor, gate, parent, found)
+        new = rows[done.track]
+        new[:, s] = done.measurement + 1
+        missed = costs - terms.miss[s]
+        costs = np.concatenate([missed, costs[done.track] - done.log_likelihood - terms.detection[s]])
+        rows = np.concatenate([rows, new])
+        track = np.concatenate([track, track[done.track]])
+        grown = concatenate([grown, done.states])
+        # what the sensors to come can still take off the cost; then a track all missed must be beaten
+        hopeful = np.flatnonzero((costs - ahead[s + 1] < alone) | ~rows.any(axis=1))
+        if len(hopeful) < len(rows):
+            costs, rows, track, grown = costs[hopeful], rows[hopeful], track[hopeful], grown[hopeful]
+    order = np.lexsort((*rows.T[::-1], track))
+    return TrackTuples(track[order], rows[order], costs[order], grown[order])
+
+
+def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms) -> Array:
+    """The most that sensors s, s + 1, ... can take off a cost, (S + 1,): no density is above the noise's own."""
+    peak = [-0.5 * float(np.linalg.slogdet(2.0 * math.pi * sensor.covariance)[1]) for sensor in sensors]
+    gain = np.maximum(terms.detection + np.array(peak), terms.miss)
+    return np.append(np.cumsum(gain[::-1])[::-1], 0.0)
+
+
+def _join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:
+    """Partial tuples times the measurements near their tracks: row of the tuple, measurement."""
+    first = np.searchsorted(near_track, np.arange(count + 1))
+    low, high = first[track], first[track + 1]
+    lengths = high - low
+    parent = np.repeat(np.arange(len(track)), lengths)
+    offsets = np.repeat(low - (np.cumsum(lengths) - lengths), lengths)
+    return parent, near_found[np.arange(len(parent)) + offsets]

@@ -1,0 +1,1 @@
+"""The extended Kalman filter whose noise is set by fuzzy rules."""

@@ -1,0 +1,82 @@
+"""The modified EKF for a radar that measures range, azimuth and elevation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Expected
+from assoc.filters.kernels.gaussian import LOG_TURN, MODIFIED, SIMPLIFIED
+from assoc.filters.linearised import GaussianFilter
+from assoc.filters.measurement import Measurement, Observation
+from assoc.filters.motion.models import Motion
+from assoc.filters.state import Gaussian, finite
+from assoc.sensors.base import wrap_angle
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_RADAR = 1
+
+
+class ModifiedEKF(GaussianFilter):
+    """The modified EKF of Park and Lee: the residual debiased, its covariance widened by the curvature.
+
+    It linearises the position that a measurement points at instead of the measurement itself. What matters
+    is r sigma_azimuth^2 / sigma_range: above about 0.25 an ordinary EKF becomes overconfident.
+
+    Parameters
+    ----------
+    motion : Motion
+    simplified : bool
+        The short form of the paper (equations 2.29 and 2.32): only the range is debiased, at any elevation
+        as if it were low, and the prior's share of the covariance is left out.
+
+    References
+    ----------
+    S.-T. Park and J. G. Lee, Improved Kalman filter design for three-dimensional radar tracking, 2001. The
+    full form has the corrected terms: cos^2 and cos^4 of the elevation, azimuth and elevation debiased too,
+    and the prior variances of the angles.
+    """
+
+    def __init__(self, motion: Motion, simplified: bool = False) -> None:
+        super().__init__(motion)
+        self.kind = SIMPLIFIED if simplified else MODIFIED
+
+    def observe(self, sensor: Measurement) -> Observation:
+        """Put a measurement model in the form that the kernels take."""
+        o = super().observe(sensor)
+        if o.code != _RADAR:
+            raise InvalidInputError(f"sensor must be a Radar3D for a modified EKF, got {type(sensor).__name__}")
+        if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
+            raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
+        return o
+
+    def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
+        """Return the expected measurements before debiasing, and the widened covariances."""
+        return super().expected(state, sensor)
+
+    def compare(self, state: Gaussian, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:
+        """`log_likelihood` and `distances` of debiased residuals, (B, M) each."""
+        o = self.observe(sensor)
+        z = finite(measurements, "measurements", 2)
+        if z.shape[1] != 3:
+            raise InvalidInputError(f"measurements must have shape (M, 3), got {z.shape}")
+        h, covariance = self.expected(state, sensor)
+        v = z[None] - h[:, None]
+        v[..., 1] = wrap_angle(v[..., 1])
+        r, e = h[:, 0, None], h[:, 2, None]
+        t, p = v[..., 1].copy(), v[..., 2].copy()
+        st, sp = o.covariance[0, 1, 1], o.covariance[0, 2, 2]
+        if self.kind == SIMPLIFIED:
+            v[..., 0] -= 0.5 * r * (t**2 + p**2 - st - sp)
+        else:
+            v[..., 0] -= 0.5 * r * (np.cos(e) ** 2 * (t**2 - st) + p**2 - sp)
+            v[..., 1] -= np.tan(e) * t * p
+            v[..., 2] += 0.5 * np.sin(e) * np.cos(e) * (t**2 - st)
+        factor = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(factor, v.transpose(0, 2, 1))
+        square = (white**2).sum(axis=1)
+        log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
+        return -0.5 * (square + log_det[:, None] + 3 * LOG_TURN), square

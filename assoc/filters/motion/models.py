@@ -1,0 +1,331 @@
+"""Motion models: how a state moves on, and how uncertain that is.
+
+States hold positions first, then velocities, then accelerations or a turn rate: [x, y, z, vx, vy, vz, ...],
+metres and seconds; in two dimensions z is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.filters.kernels.turn import turn
+from assoc.filters.state import finite
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
+
+
+def positive(value: object, what: str, *, zero: bool = False) -> float:
+    """Return a finite number above 0 (or at least 0)."""
+    good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
+    if not good or not math.isfinite(float(value)) or float(value) < 0 or (not zero and value == 0):  # type: ignore[arg-type]
+        raise InvalidInputError(f"{what} must be a number {'>= 0' if zero else 'above 0'}, got {value!r}")
+    return float(value)  # type: ignore[arg-type]
+
+
+class Motion(ABC):
+    """A motion model.
+
+    Attributes
+    ----------
+    dim : int
+        Components of the state, n.
+    position : tuple of int
+        Where x, y (and z) stand in it; without z sensors see the height 0.
+    """
+
+    dim: int
+    position: tuple[int, ...]
+
+    @abstractmethod
+    def propagate(self, states: Array, dt: float) -> Array:
+        """Move states (m, n) on by dt seconds, without noise."""
+
+    @abstractmethod
+    def jacobian(self, states: Array, dt: float) -> Array:
+        """Derivatives of `propagate` at states (m, n): (m, n, n), or (1, n, n) where they are all alike."""
+
+    @abstractmethod
+    def noise(self, states: Array, dt: float) -> Array:
+        """Process noise covariance at states (m, n): (m, n, n), or (1, n, n)."""
+
+    @property
+    def linear(self) -> bool:
+        """Whether `propagate` is a matrix."""
+        return False
+
+
+class LinearMotion(Motion):
+    """A motion model given by matrices: x' = F(dt) x + w, w ~ N(0, Q(dt)).
+
+    Parameters
+    ----------
+    transition, noise : callable dt -> (n, n)
+    dim : int
+    position : tuple of int
+        As in `Motion`.
+    """
+
+    def __init__(
+        self,
+        transition: Callable[[float], Array],
+        noise: Callable[[float], Array],
+        dim: int,
+        position: tuple[int, ...] = (0, 1, 2),
+    ) -> None:
+        self.dim, self.position = dim, position
+        self._transition, self._noise = transition, noise
+        self._known: dict[float, tuple[Array, Array, Array]] = {}
+
+    @property
+    def linear(self) -> bool:
+        """Whether `propagate` is a matrix."""
+        return True
+
+    def matrices(self, dt: float) -> tuple[Array, Array]:
+        """Return F and Q, each (1, n, n)."""
+        F, Q, _ = self.models(dt)
+        return F, Q
+
+    def models(self, dt: float) -> tuple[Array, Array, Array]:
+        """Return F, Q and both in one array (2, 1, n, n); remembered, since most trackers use few time steps."""
+        known = self._known.get(dt)
+        if known is None:
+            positive(dt, "dt", zero=True)
+            F = finite(self._transition(dt), "transition", 2)
+            Q = finite(self._noise(dt), "noise", 2)
+            for name, one in (("transition", F), ("noise", Q)):
+                if one.shape != (self.dim, self.dim):
+                    raise InvalidInputError(f"{name} must have shape {(self.dim, self.dim)}, got {one.shape}")
+            if len(self._known) > 64:
+                self._known.clear()
+            both = np.stack((F[None], Q[None]))
+            known = self._known[dt] = (both[0], both[1], both)
+        return known
+
+    def propagate(self, states: Array, dt: float) -> Array:
+        """Move states (m, n) on by dt seconds, without noise."""
+        moved: Array = states @ self.matrices(dt)[0][0].T
+        return moved
+
+    def jacobian(self, states: Array, dt: float) -> Array:
+        """Return the transition matrix, (1, n, n)."""
+        return self.matrices(dt)[0]
+
+    def noise(self, states: Array, dt: float) -> Array:
+        """Return the process noise covariance, (1, n, n)."""
+        return self.matrices(dt)[1]
+
+
+def _axes(dimensions: int) -> tuple[int, ...]:
+    if dimensions not in (2, 3):
+        raise InvalidInputError(f"dimensions must be 2 or 3, got {dimensions!r}")
+    return tuple(range(dimensions))
+
+
+def polynomial(order: int, dt: float) -> Array:
+    """Transition of one axis: position, velocity, ..., the `order`-th derivative constant."""
+    F = np.eye(order + 1)
+    for i in range(order + 1):
+        for j in range(i + 1, order + 1):
+            F[i, j] = dt ** (j - i) / math.factorial(j - i)
+    return F
+
+
+def polynomial_noise(order: int, dt: float, sigma: float, kind: str) -> Array:
+    """Process noise of one axis.
+
+    "discrete": the derivative of order `order` (velocity model: the acceleration; acceleration model: the
+    acceleration's increment) is drawn anew for each step, G sigma^2 G' of the papers. "continuous": white
+    noise of density sigma^2 in the next derivative.
+    """
+    if kind == "discrete":
+        gain = np.array([dt ** (2 - i) / math.factorial(2 - i) if i < 2 else 1.0 for i in range(order + 1)])
+        return sigma**2 * np.outer(gain, gain)
+    Q = np.empty((order + 1, order + 1))
+    for i in range(order + 1):
+        for j in range(order + 1):
+            a, b = order - i, order - j
+            Q[i, j] = dt ** (a + b + 1) / ((a + b + 1) * math.factorial(a) * math.factorial(b))
+    return sigma**2 * Q
+
+
+class ConstantVelocity(LinearMotion):
+    """Nearly constant velocity, [x, y, z, vx, vy, vz].
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the acceleration, m/s^2 ("discrete": constant over a step), or the root of its
+        spectral density, m/s^1.5 ("continuous").
+    dimensions : 2 or 3
+    kind : "discrete" or "continuous"
+    """
+
+    order = 1
+
+    def __init__(self, noise: float, dimensions: int = 3, kind: Literal["discrete", "continuous"] = "discrete") -> None:
+        self.sigma = positive(noise, "noise", zero=True)
+        self.kind = kind
+        if kind not in ("discrete", "continuous"):
+            raise InvalidInputError(f"kind must be 'discrete' or 'continuous', got {kind!r}")
+        axes, unit, order = _axes(dimensions), np.eye(dimensions), self.order
+        super().__init__(
+            lambda dt: np.kron(polynomial(order, dt), unit),
+            lambda dt: np.kron(polynomial_noise(order, dt, self.sigma, kind), unit),
+            (order + 1) * dimensions,
+            axes,
+        )
+
+
+class ConstantAcceleration(ConstantVelocity):
+    """Nearly constant acceleration, [x, y, z, vx, vy, vz, ax, ay, az] (equations 3 to 5 of the fuzzy paper).
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the acceleration's increment over a step, m/s^2 ("discrete"), or the root of the
+        jerk's spectral density, m/s^2.5 ("continuous").
+    dimensions : 2 or 3
+    kind : "discrete" or "continuous"
+    """
+
+    order = 2
+
+
+class CoordinatedTurn(Motion):
+    """A horizontal turn at a rate that is part of the state, [x, y, z, vx, vy, vz, w]; w in rad/s.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the acceleration, constant over a step, m/s^2.
+    rate_noise : float
+        Standard deviation of the turn rate's increment over a step, rad/s.
+    """
+
+    def __init__(self, noise: float, rate_noise: float) -> None:
+        self.dim, self.position = 7, (0, 1, 2)
+        self.sigma = positive(noise, "noise", zero=True)
+        self.rate_sigma = positive(rate_noise, "rate_noise", zero=True)
+        self._noise: tuple[float, Array] | None = None
+
+    def propagate(self, states: Array, dt: float) -> Array:
+        """Move states (m, 7) on by dt seconds, without noise."""
+        states = np.ascontiguousarray(states, dtype=np.float64)
+        moved = np.empty(states.shape)
+        turn(states, float(dt), moved, _NO_SLOPES)
+        return moved
+
+    def jacobian(self, states: Array, dt: float) -> Array:
+        """Derivatives of `propagate` at states (m, 7): (m, 7, 7)."""
+        states = np.ascontiguousarray(states, dtype=np.float64)
+        F = np.empty((len(states), 7, 7))
+        turn(states, float(dt), _NO_STATES, F)
+        return F
+
+    def noise(self, states: Array, dt: float) -> Array:
+        """Process noise covariance, (1, 7, 7); that of the last time step is remembered."""
+        if self._noise is None or self._noise[0] != dt:
+            Q = np.zeros((1, 7, 7))
+            Q[0, :6, :6] = np.kron(polynomial_noise(1, dt, self.sigma, "discrete"), np.eye(3))
+            Q[0, 6, 6] = self.rate_sigma**2
+            self._noise = (dt, Q)
+        return self._noise[1]
+
+
+class Padded(LinearMotion):
+    """A linear model with components added that it does not use, so that it can stand beside a larger one.
+
+    In an interacting multiple model all models share one state. The added components are drawn anew with
+    each step, N(0, spread^2): constant velocity beside a coordinated turn forgets the turn rate.
+
+    Parameters
+    ----------
+    model : LinearMotion
+    spread : sequence of float
+        Standard deviation of each added component.
+    """
+
+    def __init__(self, model: LinearMotion, *spread: float) -> None:
+        extra = np.array([positive(s, "spread") for s in spread])
+        n, m = model.dim, model.dim + len(extra)
+
+        def transition(dt: float) -> Array:
+            F = np.zeros((m, m))
+            F[:n, :n] = model.matrices(dt)[0][0]
+            return F
+
+        def noise(dt: float) -> Array:
+            Q = np.diag(np.concatenate([np.zeros(n), extra**2]))
+            Q[:n, :n] = model.matrices(dt)[1][0]
+            return Q
+
+        super().__init__(transition, noise, m, model.position)
+
+
+class FunctionMotion(Motion):
+    """A user's own motion model.
+
+    Parameters
+    ----------
+    function : callable (states (m, n), dt) -> (m, n)
+        Moves many states at once.
+    noise : array_like (n, n) or callable (states, dt) -> (n, n) or (m, n, n)
+        Process noise covariance of a step.
+    dim : int
+    jacobian : callable (states, dt) -> (m, n, n), optional
+        Without it central differences are taken.
+    position : tuple of int
+        As in `Motion`.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Array, float], Array],
+        noise: Array | Callable[[Array, float], Array],
+        dim: int,
+        *,
+        jacobian: Callable[[Array, float], Array] | None = None,
+        position: tuple[int, ...] = (0, 1, 2),
+    ) -> None:
+        self.dim, self.position = dim, position
+        self._function, self._jacobian, self._noise = function, jacobian, noise
+
+    def propagate(self, states: Array, dt: float) -> Array:
+        """Move states (m, n) on by dt seconds, without noise."""
+        moved = finite(self._function(states, dt), "the motion function's result", 2)
+        if moved.shape != states.shape:
+            raise InvalidInputError(f"the motion function's result must have shape {states.shape}, got {moved.shape}")
+        return moved
+
+    def jacobian(self, states: Array, dt: float) -> Array:
+        """Derivatives of `propagate` at states (m, n): (m, n, n)."""
+        if self._jacobian is not None:
+            return finite(self._jacobian(states, dt), "the motion function's jacobian", 3)
+        return differences(lambda x: self.propagate(x, dt), states)
+
+    def noise(self, states: Array, dt: float) -> Array:
+        """Process noise covariance, (1, n, n) or (m, n, n)."""
+        Q = finite(self._noise(states, dt) if callable(self._noise) else self._noise, "noise", 2, 3)
+        return Q[None] if Q.ndim == 2 else Q
+
+
+def differences(function: Callable[[Array], Array], states: Array) -> Array:
+    """Central differences of a vectorised function at states (m, n): (m, d, n)."""
+    m, n = states.shape
+    step = 6e-6 * np.maximum(1.0, np.abs(states))
+    ends = np.repeat(states[:, None, None, :], n, axis=1).repeat(2, axis=2)
+    index = np.arange(n)
+    ends[:, index, 0, index] += step
+    ends[:, index, 1, index] -= step
+    values = function(np.ascontiguousarray(ends.reshape(-1, n))).reshape(m, n, 2, -1)
+    slopes: Array = (values[:, :, 0] - values[:, :, 1]) / (2 * step[:, :, None])
+    return np.ascontiguousarray(slopes.transpose(0, 2, 1))

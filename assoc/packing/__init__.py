@@ -1,0 +1,1 @@
+"""The solvers' model: a weighted set packing, its bounds, and the searches on it."""

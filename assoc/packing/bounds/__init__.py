@@ -1,0 +1,1 @@
+"""Lower bounds of a packing, from multipliers of its rows."""

@@ -1,0 +1,40 @@
+"""Finding any solution of a problem without dummies, or proving that there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InfeasibleError, LimitExceededError
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.search import Search
+from assoc.packing.packing import Packing
+from assoc.packing.run import Run
+
+
+def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
+    """Return the columns of some complete solution; None when none exists or time is over."""
+    if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
+        return None
+    chosen = []
+    for c in range(packing.num_components):
+        part = packing.component(c)
+        search = Search(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline())
+        while search.columns is None and not search.done and not run.should_stop():
+            search.run(20)
+        if search.columns is None:
+            if search.out_of_memory:
+                raise LimitExceededError("no memory to find out whether there is a solution; split the problem")
+            return None
+        chosen.append(part.origin[search.columns])
+    return np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.int32)
+
+
+def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
+    """Return the error for a problem without dummies in which no solution was found (in the time of a run)."""
+    uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
+    if uncovered:
+        return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+    if run is not None and run.should_stop():
+        return InfeasibleError("no complete solution was found in the time limit")
+    return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

@@ -1,0 +1,1 @@
+"""Compiled tools that know no packing: matching, sorting, a heap."""

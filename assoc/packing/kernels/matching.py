@@ -1,0 +1,335 @@
+"""Two-dimensional assignment: exact, sparse, with slack on either side, and with its duals.
+
+Rows are matched to columns at the cost of the edge; a row or column left alone costs what its side's slack
+costs (``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima
+and the augmenting row reduction of [1]_, then Dijkstra over a heap from every row that is left. A row's slack is a
+private column at the end of any path.
+
+The duals solve
+
+    max  sum(u) + sum(v)   subject to   u_i + v_j <= c_ij,   u_i <= row_slack_i,   v_j <= column_slack_j
+
+and their sum is the optimal cost.
+
+References
+----------
+.. [1] R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear
+   assignment problems", Computing 38, 325-340 (1987).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assoc._system.compiled import njit
+from assoc.errors import InfeasibleError
+
+Floats = NDArray[np.float64]
+
+
+class Matching(NamedTuple):
+    """A two-dimensional assignment and its proof.
+
+    Attributes
+    ----------
+    row_edge : int64 array, shape (n,)
+        The chosen edge of each row (a place in ``indices``), or -1.
+    row_duals, column_duals : float arrays, shapes (n,) and (m,)
+        u and v of the module's dual problem.
+    cost : float
+        Total cost, what is left alone included.
+    """
+
+    row_edge: NDArray[np.int64]
+    row_duals: Floats
+    column_duals: Floats
+    cost: float
+
+
+def match(
+    indptr: ArrayLike, indices: ArrayLike, costs: ArrayLike, row_slack: ArrayLike, column_slack: ArrayLike
+) -> Matching:
+    """Solve a sparse two-dimensional assignment.
+
+    Parameters
+    ----------
+    indptr : array_like of int, shape (n + 1,)
+        Row i has edges ``indptr[i]:indptr[i+1]``.
+    indices : array_like of int, shape (E,)
+        Column of each edge; parallel edges are allowed.
+    costs : array_like of float, shape (E,)
+        Cost of each edge, of any sign; ``inf`` forbids it.
+    row_slack, column_slack : array_like of float, shapes (n,) and (m,)
+        Cost of leaving a row or column alone; ``inf`` where it must be matched.
+
+    Raises
+    ------
+    InfeasibleError
+        Not everything that must be matched can be.
+    """
+    edge_costs = np.ascontiguousarray(costs, dtype=np.float64)
+    rows = np.ascontiguousarray(row_slack, dtype=np.float64)
+    columns = np.ascontiguousarray(column_slack, dtype=np.float64)
+    row_edge = np.empty(rows.size, np.int64)
+    u, v = np.empty(rows.size), np.empty(columns.size)
+    cost = match_sparse(
+        np.ascontiguousarray(indptr, dtype=np.int64),
+        np.ascontiguousarray(indices, dtype=np.int64),
+        edge_costs,
+        rows,
+        columns,
+        row_edge,
+        u,
+        v,
+    )
+    if cost == np.inf:
+        raise InfeasibleError("not every row and column that must be matched can be")
+    return Matching(row_edge, u, v, float(cost))
+
+
+@njit
+def match_sparse(
+    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, column_slack: Floats, row_edge: Any, u: Any, v: Any
+) -> float:  # fmt: skip
+    """Fill ``row_edge``, ``u`` and ``v``; return the total cost, ``inf`` where there is no matching."""
+    n, m = row_slack.size, column_slack.size
+    # a column that must be matched gets a price for staying alone that no matching can make up for
+    largest = 0.0
+    for k in range(indptr[n]):
+        if costs[k] < np.inf:
+            largest = max(largest, abs(costs[k]))
+    for i in range(n):
+        if row_slack[i] < np.inf:
+            largest = max(largest, abs(row_slack[i]))
+    for j in range(m):
+        if column_slack[j] < np.inf:
+            largest = max(largest, abs(column_slack[j]))
+    price = 4.0 * largest * (min(n, m) + 1.0) + 1.0
+    base = np.empty(m)
+    for j in range(m):
+        base[j] = column_slack[j] if column_slack[j] < np.inf else price
+        v[j] = 0.0
+    owner = np.full(m, -1, np.int64)
+    pending = np.empty(n, np.int64)
+    num_pending = 0
+    for i in range(n):
+        row_edge[i] = -1
+        least, best = np.inf, -1
+        for k in range(indptr[i], indptr[i + 1]):
+            value = costs[k] - base[indices[k]]
+            if value < least:
+                least, best = value, k
+        if row_slack[i] <= least:
+            if least == np.inf and row_slack[i] == np.inf:
+                return np.inf
+            u[i] = row_slack[i]
+        else:
+            u[i] = least
+            j = indices[best]
+            if owner[j] < 0:
+                owner[j] = i
+                row_edge[i] = best
+            else:
+                pending[num_pending] = i
+                num_pending += 1
+    num_pending = _reduce_rows(indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending)
+    if num_pending > 0 and not _augment_all(
+        indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending
+    ):
+        return np.inf
+    total = 0.0
+    for i in range(n):
+        total += row_slack[i] if row_edge[i] < 0 else costs[row_edge[i]]
+    for j in range(m):
+        v[j] += base[j]
+        if owner[j] < 0:
+            total += column_slack[j]
+    return total
+
+
+@njit
+def _reduce_rows(
+    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, base: Floats, row_edge: Any, u: Any, v: Any,
+    owner: Any, pending: Any, num_pending: int
+) -> int:  # fmt: skip
+    """Augmenting row reduction: each row takes its best column at the price of its second best."""
+    steps = 4 * num_pending + 8
+    left = 0
+    at = 0
+    while at < num_pending:
+        i = pending[at]
+        at += 1
+        while i >= 0:
+            least, second, best = np.inf, row_slack[i], -1
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                value = costs[k] - base[j] - v[j]
+                if value < least:
+                    # a parallel edge to the same column is no second choice, but only makes the step smaller
+                    second = min(second, least)
+                    least, best = value, k
+                elif value < second:
+                    second = value
+            if best < 0 or row_slack[i] <= least:
+                u[i] = row_slack[i]
+                break
+            j = indices[best]
+            if owner[j] < 0:
+                u[i] = least
+                owner[j] = i
+                row_edge[i] = best
+                break
+            steps -= 1
+            if steps <= 0 or second == np.inf or second <= least:
+                # a tie or a row without a second choice: left to the augmenting paths
+                u[i] = least
+                pending[left] = i
+                left += 1
+                break
+            u[i] = second
+            v[j] -= second - least
+            other = owner[j]
+            owner[j] = i
+            row_edge[i] = best
+            row_edge[other] = -1
+            i = other
+    return left
+
+
+@njit
+def _augment_all(
+    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, base: Floats, row_edge: Any, u: Any, v: Any,
+    owner: Any, pending: Any, num_pending: int
+) -> bool:  # fmt: skip
+    """Shortest augmenting path from each pending row; False when one must be matched and cannot be."""
+    m = base.size
+    distance = np.full(m, np.inf)
+    closed = np.zeros(m, np.bool_)
+    previous = np.empty(m, np.int64)
+    reached = np.empty(m, np.int64)
+    tree_row = np.empty(m + 1, np.int64)
+    tree_distance = np.empty(m + 1)
+    heap_key = np.empty(64)
+    heap_column = np.empty(64, np.int64)
+    edge_row = np.empty(indices.size, np.int64)
+    for i in range(indptr.size - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            edge_row[k] = i
+    for at in range(num_pending):
+        start = pending[at]
+        num_reached = 0
+        num_tree = 0
+        size = 0
+        sink_distance, sink_row, sink_column = np.inf, -1, -1
+        i, d = start, 0.0
+        while True:
+            tree_row[num_tree] = i
+            tree_distance[num_tree] = d
+            num_tree += 1
+            if d + row_slack[i] - u[i] < sink_distance:
+                sink_distance = d + row_slack[i] - u[i]
+                sink_row = i
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                if closed[j]:
+                    continue
+                value = d + max(0.0, costs[k] - base[j] - u[i] - v[j])
+                if value < distance[j] and value < sink_distance:
+                    if distance[j] == np.inf:
+                        reached[num_reached] = j
+                        num_reached += 1
+                    distance[j] = value
+                    previous[j] = k
+                    if size == heap_key.size:
+                        heap_key = _doubled(heap_key)
+                        heap_column = _doubled(heap_column)
+                    _push(heap_key, heap_column, size, value, j)
+                    size += 1
+            found = False
+            while size > 0:
+                d = heap_key[0]
+                j = heap_column[0]
+                size -= 1
+                _pop(heap_key, heap_column, size)
+                if not closed[j] and d == distance[j]:
+                    found = True
+                    break
+            if not found or d >= sink_distance:
+                break
+            closed[j] = True
+            if owner[j] < 0:
+                sink_distance, sink_column = d, j
+                break
+            i = owner[j]
+        if sink_distance == np.inf:
+            return False
+        for t in range(num_tree):
+            u[tree_row[t]] += sink_distance - tree_distance[t]
+        for t in range(num_reached):
+            j = reached[t]
+            if closed[j]:
+                v[j] -= max(0.0, sink_distance - distance[j])
+                closed[j] = False
+            distance[j] = np.inf
+        if sink_column >= 0:
+            j = sink_column
+        elif sink_row == start:
+            continue
+        else:
+            j = indices[row_edge[sink_row]]
+            row_edge[sink_row] = -1
+        while True:
+            k = previous[j]
+            i = edge_row[k]
+            after = row_edge[i]
+            row_edge[i] = k
+            owner[j] = i
+            if i == start:
+                break
+            j = indices[after]
+    return True
+
+
+@njit
+def _doubled(array: Any) -> Any:
+    larger = np.empty(2 * array.size, array.dtype)
+    larger[: array.size] = array
+    return larger
+
+
+@njit
+def _push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
+    place = size
+    while place > 0:
+        parent = (place - 1) >> 1
+        if key[parent] <= value:
+            break
+        key[place] = key[parent]
+        item[place] = item[parent]
+        place = parent
+    key[place] = value
+    item[place] = thing
+
+
+@njit
+def _pop(key: Any, item: Any, size: int) -> None:
+    """Remove the root; ``size`` is what is left."""
+    value = key[size]
+    thing = item[size]
+    place = 0
+    while True:
+        child = 2 * place + 1
+        if child >= size:
+            break
+        if child + 1 < size and key[child + 1] < key[child]:
+            child += 1
+        if key[child] >= value:
+            break
+        key[place] = key[child]
+        item[place] = item[child]
+        place = child
+    key[place] = value
+    item[place] = thing

@@ -1,0 +1,68 @@
+"""Sorting a million weights in hundredths of a second: what stands before every greedy choice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+
+Floats = NDArray[np.float64]
+
+# bits of a digit; below so many numbers counting digits does not pay
+_BITS = 11
+_FEW = 5000
+
+
+def ascending(values: Floats) -> NDArray[np.int32]:
+    """Return the places of numbers in ascending order, ties in their order (a stable argsort)."""
+    if values.size < _FEW:
+        return np.argsort(values, kind="stable").astype(np.int32)
+    # adding 0 makes -0.0 equal to 0.0 in its bits, too
+    order: NDArray[np.int32] = _by_digits((values + 0.0).view(np.int64))
+    return order
+
+
+def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Return the same for whole numbers >= 0."""
+    if values.size < _FEW:
+        return np.argsort(values, kind="stable").astype(np.int32)
+    # in order by their bits as positive floats are
+    order: NDArray[np.int32] = _by_digits(np.ascontiguousarray(values))
+    return order
+
+
+@njit
+def _by_digits(bits: Any) -> Any:
+    """Sort floats by their bits, eleven at a time from the lowest; digits that all share are passed over."""
+    num = bits.size
+    digits = 6
+    base = 1 << _BITS
+    counts = np.zeros((digits, base + 1), np.int64)
+    keys = np.empty(num, np.uint64)
+    for i in range(num):
+        # negative floats: all bits turned; others: the sign's bit set
+        key = np.uint64(~bits[i] if bits[i] < 0 else bits[i] ^ np.int64(-9223372036854775808))
+        keys[i] = key
+        for d in range(digits):
+            counts[d, np.int64((key >> np.uint64(_BITS * d)) & np.uint64(base - 1)) + 1] += 1
+    order = np.arange(num).astype(np.int32)
+    other = np.empty(num, np.int32)
+    other_keys = np.empty(num, np.uint64)
+    for d in range(digits):
+        shift = np.uint64(_BITS * d)
+        if counts[d].max() == num:
+            continue
+        for b in range(base):
+            counts[d, b + 1] += counts[d, b]
+        for i in range(num):
+            digit = np.int64((keys[i] >> shift) & np.uint64(base - 1))
+            at = counts[d, digit]
+            counts[d, digit] += 1
+            other[at] = order[i]
+            other_keys[at] = keys[i]
+        order, other = other, order
+        keys, other_keys = other_keys, keys
+    return order

@@ -1,0 +1,277 @@
+"""Dimensionwise search: split the sensors into two parts and re-match the halves of all tuples, exactly.
+
+Every chosen tuple falls into two halves, one for each part of the sensors; a free measurement is a half of
+its own. Which halves belong together at the least cost is a two-dimensional assignment over the listed
+tuples (assignment2d.py). A half may stay alone: as the tuple that it is, where that is listed, or broken up
+into false alarms. Over all splits (one sensor against the others for S = 3, all 2^(S-1) - 1 bipartitions
+for S up to 6) until none improves.
+
+References
+----------
+D. Karapetyan and G. Gutin, "Local search heuristics for the multidimensional assignment problem", Journal
+of Heuristics 17, 201-249 (2011).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import now
+from assoc._system.compiled import njit
+from assoc.packing.kernels.matching import match_sparse
+from assoc.packing.packing import Packing
+
+Floats = NDArray[np.float64]
+
+_MOST_SPLITS_FOR = 6
+
+
+def improve(
+    packing: Packing,
+    owner: NDArray[np.int32],
+    weights: Floats | None = None,
+    *,
+    rounds: int | None = None,
+    deadline: float = np.inf,
+) -> float:
+    """Re-match halves until no split improves.
+
+    Parameters
+    ----------
+    packing : Packing
+        The problem, whole or one component.
+    owner : int32 array, shape (R,)
+        The chosen column of each row, or -1; every row without slack covered. Changed in place.
+    weights : float array, shape (N,), optional
+        Weights to search by instead of the packing's (noisy ones, say); the cover may then get worse by
+        the packing's own.
+    rounds : int, optional
+        Rounds over all splits at the most.
+    deadline : float
+        No split is begun after this (clock.py).
+
+    Returns
+    -------
+    float
+        The change of total weight (<= 0), by ``weights``.
+    """
+    used = packing.weights if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
+    return float(
+        _improve(
+            packing.cols,
+            used,
+            packing.slack,
+            packing.row_ptr,
+            packing.row_cols,
+            owner,
+            splits(packing.cols.shape[1]),
+            np.iinfo(np.int64).max if rounds is None else rounds,
+            deadline,
+        )
+    )
+
+
+def splits(num_sensors: int) -> NDArray[np.int64]:
+    """Return the bipartitions of the sensors as bit sets: all of them up to 6 sensors, else the single ones."""
+    if num_sensors <= _MOST_SPLITS_FOR:
+        # the complement is the same split
+        return np.arange(1, max(1 << (num_sensors - 1), 2), dtype=np.int64)
+    return np.left_shift(np.int64(1), np.arange(num_sensors, dtype=np.int64))
+
+
+@njit
+def _improve(
+    cols: Any,
+    weights: Floats,
+    slack: Any,
+    row_ptr: Any,
+    row_cols: Any,
+    owner: Any,
+    masks: Any,
+    rounds: int,
+    deadline: float,
+) -> float:
+    num_sensors = cols.shape[1]
+    sensor = np.zeros(owner.size, np.int64)
+    for r in range(owner.size):
+        if row_ptr[r] < row_ptr[r + 1]:
+            for s in range(num_sensors):
+                if cols[row_cols[row_ptr[r]], s] == r:
+                    sensor[r] = s
+    # halves that must be matched are best the rows of the assignment
+    must = 0
+    for r in range(owner.size):
+        if not slack[r]:
+            must |= 1 << sensor[r]
+    everything = (1 << num_sensors) - 1
+    total = 0.0
+    quiet, at, done = 0, 0, 0
+    timed = deadline < np.inf
+    while quiet < masks.size and done < rounds * masks.size and not (timed and now() > deadline):
+        mask = masks[at]
+        if must & mask == 0:
+            mask = everything & ~mask
+        change = _rematch(cols, weights, slack, row_ptr, row_cols, owner, sensor, mask)
+        total += change
+        quiet = 1 if change < 0.0 else quiet + 1
+        at = (at + 1) % masks.size
+        done += 1
+    return total
+
+
+@njit
+def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any, size: Any, first: Any) -> int:
+    """Number the halves on one side (1: sensors in ``mask``): each row's half, sizes, and a row of each."""
+    count = 0
+    num_sensors = cols.shape[1]
+    for r in range(owner.size):
+        if (mask >> sensor[r]) & 1 != side:
+            continue
+        k = owner[r]
+        if k < 0:
+            half[r] = count
+            size[count] = 1
+            first[count] = r
+            count += 1
+            continue
+        leader = True
+        members = 0
+        for s in range(num_sensors):
+            q = cols[k, s]
+            if q >= 0 and (mask >> s) & 1 == side:
+                members += 1
+                if q < r:
+                    leader = False
+        if leader:
+            for s in range(num_sensors):
+                q = cols[k, s]
+                if q >= 0 and (mask >> s) & 1 == side:
+                    half[q] = count
+            size[count] = members
+            first[count] = r
+            count += 1
+    return count
+
+
+@njit
+def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> int:
+    """Which half on a side column j has in full: -1 none at all, -2 only some rows or several halves."""
+    found = -1
+    members = 0
+    for s in range(cols.shape[1]):
+        q = cols[j, s]
+        if q >= 0 and (mask >> s) & 1 == side:
+            if found >= 0 and half[q] != found:
+                return -2
+            found = half[q]
+            members += 1
+    if found >= 0 and members != size[found]:
+        return -2
+    return found
+
+
+@njit
+def _rematch(
+    cols: Any, weights: Floats, slack: Any, row_ptr: Any, row_cols: Any, owner: Any, sensor: Any, mask: int
+) -> float:
+    """Re-match the halves of one split; returns the change of weight (0: nothing better)."""
+    num_rows = owner.size
+    half = np.empty(num_rows, np.int64)
+    left_size, left_first = np.empty(num_rows, np.int64), np.empty(num_rows, np.int64)
+    right_size, right_first = np.empty(num_rows, np.int64), np.empty(num_rows, np.int64)
+    num_left = _halves(cols, owner, sensor, mask, 1, half, left_size, left_first)
+    num_right = _halves(cols, owner, sensor, mask, 0, half, right_size, right_first)
+    left_alone, left_column = np.zeros(num_left), np.full(num_left, -1, np.int64)
+    right_alone, right_column = np.zeros(num_right), np.full(num_right, -1, np.int64)
+    left_must = right_must = 0
+    for r in range(num_rows):
+        if not slack[r]:
+            if (mask >> sensor[r]) & 1:
+                left_alone[half[r]] = np.inf
+            else:
+                right_alone[half[r]] = np.inf
+    for q in range(num_right):
+        right_must += right_alone[q] == np.inf
+        if right_size[q] > 1:
+            r = right_first[q]
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                j = row_cols[k]
+                if (
+                    weights[j] < right_alone[q]
+                    and _match_of(cols, j, mask, 1, half, left_size) == -1
+                    and _match_of(cols, j, mask, 0, half, right_size) == q
+                ):
+                    right_alone[q] = weights[j]
+                    right_column[q] = j
+    indptr = np.empty(num_left + 1, np.int64)
+    capacity = 16
+    for p in range(num_left):
+        capacity += row_ptr[left_first[p] + 1] - row_ptr[left_first[p]]
+        left_must += left_alone[p] == np.inf
+    indices, column = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
+    costs = np.empty(capacity)
+    count = 0
+    for p in range(num_left):
+        indptr[p] = count
+        r = left_first[p]
+        for k in range(row_ptr[r], row_ptr[r + 1]):
+            j = row_cols[k]
+            if _match_of(cols, j, mask, 1, half, left_size) != p:
+                continue
+            q = _match_of(cols, j, mask, 0, half, right_size)
+            if q >= 0:
+                indices[count] = q
+                column[count] = j
+                costs[count] = weights[j]
+                count += 1
+            elif q == -1 and weights[j] < left_alone[p]:
+                left_alone[p] = weights[j]
+                left_column[p] = j
+    indptr[num_left] = count
+    price = right_alone.copy()
+    if left_must == num_left and num_left == num_right:
+        # all on the left must be matched, so all on the right will be
+        for q in range(num_right):
+            price[q] = 0.0
+    before = 0.0
+    for r in range(num_rows):
+        k = owner[r]
+        if k >= 0 and _leads(cols, k, r):
+            before += weights[k]
+    row_edge = np.empty(num_left, np.int64)
+    u, v = np.empty(num_left), np.empty(num_right)
+    after = match_sparse(indptr, indices[:count], costs[:count], left_alone, price, row_edge, u, v)
+    if not after < before - 1e-9 * max(1.0, abs(before)):
+        return 0.0
+    for r in range(num_rows):
+        owner[r] = -1
+    taken = np.zeros(num_right, np.bool_)
+    for p in range(num_left):
+        e = row_edge[p]
+        if e >= 0:
+            taken[indices[e]] = True
+            _put(cols, owner, column[e])
+        elif left_column[p] >= 0:
+            _put(cols, owner, left_column[p])
+    for q in range(num_right):
+        if not taken[q] and right_column[q] >= 0:
+            _put(cols, owner, right_column[q])
+    return after - before
+
+
+@njit
+def _leads(cols: Any, k: int, r: int) -> bool:
+    for s in range(cols.shape[1]):
+        if cols[k, s] >= 0:
+            return cols[k, s] == r
+    return False
+
+
+@njit
+def _put(cols: Any, owner: Any, j: int) -> None:
+    for s in range(cols.shape[1]):
+        if cols[j, s] >= 0:
+            owner[cols[j, s]] = j

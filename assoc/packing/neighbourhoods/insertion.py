@@ -1,0 +1,257 @@
+"""Insertion with ejection: the local search that all heuristic solvers share.
+
+A cover is held as the owner of each row: the chosen column that uses it, or -1. Inserting a column ejects
+the owners of its rows; the rows that this frees can be used by other columns. Rows that changed are looked
+at again until nothing improves.
+
+Without dummies some rows must be covered. A penalty larger than any sum of weights is then taken off each
+column for every such row, so that covering comes before cost; what the penalty adds is known and removed.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import is_over
+from assoc._system.compiled import njit
+from assoc.packing.packing import Packing
+from assoc.packing.run import Run
+
+Floats = NDArray[np.float64]
+
+# seconds for the way out of a dead end when time is over
+_GRACE = 0.02
+# columns looked at between two looks at the clock: about a millisecond
+_LOOK = 50_000
+
+
+class Cover:
+    """A choice of columns that share no row, changed in place.
+
+    Attributes
+    ----------
+    owner : int32 array, shape (R,)
+        The chosen column that uses each row, or -1.
+    """
+
+    def __init__(self, packing: Packing, owner: NDArray[np.int32]) -> None:
+        self.packing = packing
+        self.owner = owner
+
+    @classmethod
+    def empty(cls, packing: Packing) -> Cover:
+        """Return the cover without any column."""
+        return cls(packing, np.full(packing.num_rows, -1, dtype=np.int32))
+
+    @classmethod
+    def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
+        """Return the cover of columns that share no row."""
+        cover = cls.empty(packing)
+        own(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
+        return cover
+
+    def columns(self) -> NDArray[np.int32]:
+        """Return the chosen columns, ascending."""
+        columns: NDArray[np.int32] = chosen_columns(self.packing.cols, self.owner)
+        return columns
+
+    @property
+    def weight(self) -> float:
+        """Total weight of the chosen columns."""
+        return float(self.packing.weights[self.columns()].sum())
+
+    @property
+    def complete_already(self) -> bool:
+        """Whether all rows without slack are covered."""
+        return not bool((self.owner[~self.packing.slack] < 0).any())
+
+    def add_greedily(self, order: NDArray[np.integer]) -> None:
+        """Add columns in the given order while they fit; with slack only those of negative weight."""
+        packing = self.packing
+        _add_greedily(packing.cols, packing.weights, packing.slack, order, self.owner)
+
+    def improve(self, deadline: float = np.inf) -> None:
+        """Insert with ejection until no insertion improves or time is over (clock.py)."""
+        packing = self.packing
+        weights = packing.weights if not packing.is_axial else penalised(packing)
+        rows = np.arange(packing.num_rows, dtype=np.int32)
+        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows, deadline)
+
+    def complete(self, run: Run) -> bool:
+        """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
+
+        Raises
+        ------
+        InfeasibleError
+            Never; the caller knows the problem's words for it.
+        """
+        if self.complete_already:
+            return True
+        # a moment beyond the time, if need be: most dead ends are left in less, and there is nothing else to return
+        self.improve(max(run.deadline(), time.monotonic() + _GRACE))
+        if self.complete_already:
+            return True
+        from assoc.packing.branching.feasibility import first_solution
+
+        columns = first_solution(self.packing, run)
+        if columns is None:
+            return False
+        self.owner[:] = Cover.of(self.packing, columns).owner
+        return True
+
+
+@njit
+def own(cols: Any, columns: Any, owner: Any) -> None:
+    """Make these columns the owners of their rows."""
+    for j in columns:
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                owner[cols[j, s]] = j
+
+
+@njit
+def chosen_columns(cols: Any, owner: Any) -> Any:
+    """The chosen columns, ascending, in the type of ``owner``."""
+    chosen = np.zeros(cols.shape[0], np.bool_)
+    count = 0
+    for j in owner:
+        if j >= 0 and not chosen[j]:
+            chosen[j] = True
+            count += 1
+    result = np.empty(count, owner.dtype)
+    count = 0
+    for j in range(chosen.size):
+        if chosen[j]:
+            result[count] = j
+            count += 1
+    return result
+
+
+def penalised(packing: Packing) -> Floats:
+    """Return weights with a penalty taken off for every row without slack that a column covers."""
+    return np.asarray(penalised_weights(packing.cols, packing.weights, packing.slack))
+
+
+@njit
+def penalised_weights(cols: Any, weights: Floats, slack: Any) -> Floats:
+    """The same from arrays."""
+    widest = 0.0
+    for weight in weights:
+        widest = max(widest, abs(weight))
+    penalty = 2.0 * widest * cols.shape[1] + 1.0
+    result = weights.copy()
+    for j in range(result.size):
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0 and not slack[cols[j, s]]:
+                result[j] -= penalty
+    return result
+
+
+@njit
+def _add_greedily(cols: Any, weights: Floats, slack: Any, order: Any, owner: Any) -> None:
+    num_sensors = cols.shape[1]
+    for j in order:
+        fits = True
+        duty = False
+        for s in range(num_sensors):
+            r = cols[j, s]
+            if r >= 0:
+                if owner[r] >= 0:
+                    fits = False
+                    break
+                duty = duty or not slack[r]
+        if fits and (weights[j] < 0.0 or duty):
+            for s in range(num_sensors):
+                if cols[j, s] >= 0:
+                    owner[cols[j, s]] = j
+
+
+@njit
+def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
+    """Weight of column j less that of the columns it would eject; negative is good."""
+    num_sensors = cols.shape[1]
+    change = weights[j]
+    for s in range(num_sensors):
+        r = cols[j, s]
+        if r >= 0 and owner[r] >= 0:
+            k = owner[r]
+            counted = False
+            for q in range(s):
+                if cols[j, q] >= 0 and owner[cols[j, q]] == k:
+                    counted = True
+                    break
+            if not counted:
+                change -= weights[k]
+    return change
+
+
+@njit
+def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int:
+    """Eject the owners of column j's rows and insert it; rows that lost their owner go to ``changed``."""
+    num_sensors = cols.shape[1]
+    for s in range(num_sensors):
+        r = cols[j, s]
+        if r >= 0:
+            k = owner[r]
+            if k >= 0 and k != j:
+                for q in range(num_sensors):
+                    if cols[k, q] >= 0:
+                        owner[cols[k, q]] = -1
+                        changed[num_changed] = cols[k, q]
+                        num_changed += 1
+    for s in range(num_sensors):
+        if cols[j, s] >= 0:
+            owner[cols[j, s]] = j
+            changed[num_changed] = cols[j, s]
+            num_changed += 1
+    return num_changed
+
+
+@njit
+def _improve(
+    cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any, rows: Any, deadline: float
+) -> float:
+    """Insert with ejection around ``rows`` and all rows that change, until time is over; the sum of the gains."""
+    num_sensors = cols.shape[1]
+    queue = np.empty(owner.size, np.int32)
+    waiting = np.zeros(owner.size, np.bool_)
+    changed = np.empty(num_sensors * (num_sensors + 1), np.int32)
+    head, count = 0, 0
+    for r in rows:
+        queue[count] = r
+        waiting[r] = True
+        count += 1
+    total = 0.0
+    unseen = 0
+    while count > 0:
+        r = queue[head]
+        unseen += row_ptr[r + 1] - row_ptr[r]
+        if unseen > _LOOK:
+            unseen = 0
+            if is_over(deadline):
+                break
+        head = (head + 1) % owner.size
+        count -= 1
+        waiting[r] = False
+        best, chosen = -1e-12, -1
+        for k in range(row_ptr[r], row_ptr[r + 1]):
+            j = row_cols[k]
+            if owner[r] == j:
+                continue
+            gain = insertion_gain(cols, weights, owner, j)
+            if gain < best - 1e-12 * abs(weights[j]):
+                best, chosen = gain, j
+        if chosen >= 0:
+            total += best
+            num_changed = insert(cols, owner, chosen, changed, 0)
+            for i in range(num_changed):
+                q = changed[i]
+                if not waiting[q]:
+                    waiting[q] = True
+                    queue[(head + count) % owner.size] = q
+                    count += 1
+    return total

@@ -1,0 +1,326 @@
+"""The form in which all solvers see a problem: weighted columns over rows, sorted by component.
+
+A row is one measurement. With dummies, each row's singleton is taken as the state of rest: a column is a
+tuple of two or more measurements, its weight the cost of the tuple less the costs of its singletons, and
+every row has *slack* (it may stay uncovered at weight 0). The problem is then a minimum-weight set packing,
+in which only columns of negative weight matter. Without dummies every tuple is a column; rows of the
+smallest dimension have no slack.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc.problem import AssignmentProblem
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """Columns over rows; columns and rows are sorted by component.
+
+    Attributes
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of each column; -1 where the sensor missed.
+    weights : float array, shape (N,)
+        Weight of each column.
+    slack : bool array, shape (R,)
+        Whether a row may stay uncovered.
+    col_start, row_start : int64 arrays, shape (C + 1,)
+        Component c has columns ``col_start[c]:col_start[c+1]`` and rows ``row_start[c]:row_start[c+1]``.
+    row_ptr, row_cols : int64 array (R + 1,), int32 array
+        Columns of each row, ascending.
+    origin : int32 array, shape (N,)
+        Each column's place in what this packing was made from.
+    row_origin : int32 array, shape (R,)
+        Each row's place in what this packing was made from.
+    granularity : float
+        1.0 where all weights are whole numbers, so that solutions differ by at least 1; else 0.0.
+    """
+
+    cols: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    slack: NDArray[np.bool_]
+    col_start: NDArray[np.int64]
+    row_start: NDArray[np.int64]
+    row_ptr: NDArray[np.int64]
+    row_cols: NDArray[np.int32]
+    origin: NDArray[np.int32]
+    row_origin: NDArray[np.int32]
+    granularity: float = 0.0
+
+    @property
+    def num_columns(self) -> int:
+        """Number of columns N."""
+        return int(self.weights.size)
+
+    @property
+    def num_rows(self) -> int:
+        """Number of rows R."""
+        return int(self.slack.size)
+
+    @property
+    def num_components(self) -> int:
+        """Number of independent components C."""
+        return int(self.col_start.size - 1)
+
+    @property
+    def is_axial(self) -> bool:
+        """Whether some row must be covered (a problem without dummies)."""
+        return not bool(self.slack.all())
+
+    def restrict(self, keep: NDArray[np.bool_]) -> Packing:
+        """Return the packing of the columns in ``keep``, split into its components.
+
+        Rows without slack are kept even if no column covers them any more.
+        """
+        chosen = np.flatnonzero(keep).astype(np.int32)
+        return assemble(self.cols[chosen], self.weights[chosen], self.slack, chosen, self.granularity)
+
+    def component(self, index: int) -> Packing:
+        """Return one component as a packing of its own."""
+        first, last = int(self.col_start[index]), int(self.col_start[index + 1])
+        top, end = int(self.row_start[index]), int(self.row_start[index + 1])
+        cols = self.cols[first:last].copy()
+        cols[cols >= 0] -= top
+        pointer = self.row_ptr[top : end + 1]
+        return Packing(
+            cols,
+            self.weights[first:last],
+            self.slack[top:end],
+            np.array([0, last - first]),
+            np.array([0, end - top]),
+            pointer - pointer[0],
+            self.row_cols[pointer[0] : pointer[-1]] - np.int32(first),
+            np.arange(first, last, dtype=np.int32),
+            np.arange(top, end, dtype=np.int32),
+            self.granularity,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A problem in packing form and the way back.
+
+    Attributes
+    ----------
+    packing : Packing
+        ``packing.origin`` are rows of ``problem.tuples``, ``packing.row_origin`` global row numbers.
+    offset : float
+        Cost of the state of rest: all singletons (0 without dummies).
+    single : int64 array
+        With dummies, the cheapest singleton tuple of each global row; empty without.
+    single_cost : float array
+        Its cost.
+    """
+
+    packing: Packing
+    offset: float
+    single: NDArray[np.int64]
+    single_cost: NDArray[np.float64]
+
+
+def prepare(problem: AssignmentProblem) -> Prepared:
+    """Bring a problem into packing form; the result is kept with the problem, which never changes."""
+    if problem._prepared is not None:
+        return problem._prepared
+    sizes = problem.sizes.astype(np.int64)
+    offsets = np.cumsum(sizes) - sizes
+    arrays: Any
+    if problem.dummy:
+        *arrays, whole, single, single_cost = _prepare_with_dummies(
+            problem.tuples, problem.costs, offsets, int(sizes.sum())
+        )
+    else:
+        rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
+        slack = np.repeat(sizes > sizes.min(), sizes)
+        arrays = _assemble(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
+        whole = _whole_numbers(problem.costs)
+        single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
+    packing = Packing(*(*arrays, 1.0 if whole else 0.0))
+    prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
+    problem._prepared = prepared
+    return prepared
+
+
+def assemble(
+    rows: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    slack: NDArray[np.bool_],
+    origin: NDArray[np.int32],
+    granularity: float = 0.0,
+) -> Packing:
+    """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
+    arrays: Any = _assemble(rows, weights, slack, origin)
+    return Packing(*(*arrays, granularity))
+
+
+@njit
+def _prepare_with_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+) -> Any:
+    """Arrays of the packing, whether its weights are whole numbers, and the singletons."""
+    rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
+    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = _assemble(
+        rows, weights, np.ones(total, np.bool_), origin
+    )
+    return (
+        cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin,
+        _whole_numbers(weights), single, single_cost,
+    )  # fmt: skip
+
+
+@njit
+def _whole_numbers(weights: NDArray[np.float64]) -> bool:
+    """Whether all weights are whole numbers, small enough for sums of them to be exact."""
+    if weights.size == 0:
+        return False
+    for j in range(weights.size):
+        if not (abs(weights[j]) < 1e9 and weights[j] == math.floor(weights[j])):
+            return False
+    return True
+
+
+@njit
+def _columns_with_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+) -> Any:
+    """Cheapest singleton of each row, and the columns of negative weight."""
+    num_tuples, num_sensors = tuples.shape
+    single = np.full(total, -1, np.int64)
+    single_cost = np.zeros(total)
+    for j in range(num_tuples):
+        size = 0
+        row = -1
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                size += 1
+                row = offsets[s] + tuples[j, s] - 1
+        if size == 1 and (single[row] < 0 or costs[j] < single_cost[row]):
+            single[row] = j
+            single_cost[row] = costs[j]
+    weights = np.empty(num_tuples)
+    origin = np.empty(num_tuples, np.int32)
+    count = 0
+    for j in range(num_tuples):
+        size = 0
+        weight = costs[j]
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                size += 1
+                weight -= single_cost[offsets[s] + tuples[j, s] - 1]
+        if size > 1 and weight < 0.0:
+            weights[count] = weight
+            origin[count] = j
+            count += 1
+    rows = np.empty((count, num_sensors), np.int32)
+    for k in range(count):
+        j = origin[k]
+        for s in range(num_sensors):
+            i = tuples[j, s]
+            rows[k, s] = offsets[s] + i - 1 if i > 0 else -1
+    return rows, weights[:count].copy(), origin[:count].copy(), single, single_cost
+
+
+@njit
+def _find(parent: NDArray[np.int32], i: int) -> int:
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit
+def _assemble(
+    rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
+) -> Any:
+    num, num_sensors = rows.shape
+    total = slack.size
+    parent = np.arange(total).astype(np.int32)
+    used = np.zeros(total, np.bool_)
+    for j in range(num):
+        first = -1
+        for s in range(num_sensors):
+            r = rows[j, s]
+            if r >= 0:
+                used[r] = True
+                root = _find(parent, r)
+                if first < 0:
+                    first = root
+                elif root != first:
+                    # the smaller number becomes the root: components are ordered by their first row
+                    if root < first:
+                        parent[first] = root
+                        first = root
+                    else:
+                        parent[root] = first
+    component = np.full(total, -1, np.int32)
+    num_components = 0
+    for r in range(total):
+        if used[r] or not slack[r]:
+            root = _find(parent, r)
+            if component[root] < 0:
+                component[root] = num_components
+                num_components += 1
+            component[r] = component[root]
+    row_start = np.zeros(num_components + 1, np.int64)
+    col_start = np.zeros(num_components + 1, np.int64)
+    for r in range(total):
+        if component[r] >= 0:
+            row_start[component[r] + 1] += 1
+    first_row = np.empty(num, np.int32)
+    for j in range(num):
+        for s in range(num_sensors):
+            if rows[j, s] >= 0:
+                first_row[j] = rows[j, s]
+                break
+        col_start[component[first_row[j]] + 1] += 1
+    for c in range(num_components):
+        row_start[c + 1] += row_start[c]
+        col_start[c + 1] += col_start[c]
+    fill = row_start[:-1].copy()
+    new_row = np.full(total, -1, np.int32)
+    row_origin = np.empty(row_start[-1], np.int32)
+    new_slack = np.empty(row_start[-1], np.bool_)
+    for r in range(total):
+        c = component[r]
+        if c >= 0:
+            new_row[r] = fill[c]
+            row_origin[fill[c]] = r
+            new_slack[fill[c]] = slack[r]
+            fill[c] += 1
+    fill = col_start[:-1].copy()
+    cols = np.empty((num, num_sensors), np.int32)
+    new_weights = np.empty(num)
+    new_origin = np.empty(num, np.int32)
+    row_ptr = np.zeros(row_origin.size + 1, np.int64)
+    for j in range(num):
+        c = component[first_row[j]]
+        k = fill[c]
+        fill[c] += 1
+        new_weights[k] = weights[j]
+        new_origin[k] = origin[j]
+        for s in range(num_sensors):
+            r = rows[j, s]
+            if r >= 0:
+                cols[k, s] = new_row[r]
+                row_ptr[new_row[r] + 1] += 1
+            else:
+                cols[k, s] = -1
+    for r in range(row_origin.size):
+        row_ptr[r + 1] += row_ptr[r]
+    place = row_ptr[:-1].copy()
+    row_cols = np.empty(row_ptr[-1], np.int32)
+    for k in range(num):
+        for s in range(num_sensors):
+            r = cols[k, s]
+            if r >= 0:
+                row_cols[place[r]] = k
+                place[r] += 1
+    return cols, new_weights, new_slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin

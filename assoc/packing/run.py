@@ -1,0 +1,124 @@
+"""What a solver is given besides the problem, and what it gives back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.errors import InvalidInputError
+from assoc.solution import TracePoint
+
+if TYPE_CHECKING:
+    from assoc.packing.packing import Packing
+
+Callback = Callable[[TracePoint], object]
+
+# points of a trace at the most
+_TRACE = 100_000
+
+
+@dataclass(slots=True)
+class Run:
+    """One call of a solver: its random generator, its clock, and its trace.
+
+    Attributes
+    ----------
+    seed : int, SeedSequence or Generator
+        Where ``rng`` comes from.
+    offset : float
+        Added to packing weights gives costs of the problem (the cost of all singletons).
+    time_limit : float or None
+        Seconds from ``started``.
+    callback : callable or None
+        Called with each TracePoint; a true answer stops the solver.
+    fallback : int array or None
+        The greedy choice of columns, where it was made first (fallback.py).
+    watch : callable or None
+        Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
+    """
+
+    seed: int | np.random.SeedSequence | np.random.Generator
+    offset: float = 0.0
+    time_limit: float | None = None
+    callback: Callback | None = None
+    watch: Callable[[int, NDArray[np.float64]], object] | None = None
+    started: float = field(default_factory=time.perf_counter)
+    trace: list[TracePoint] = field(default_factory=list)
+    stopped_by: str = ""
+    fallback: NDArray[np.integer] | None = None
+    _rng: np.random.Generator | None = None
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """The only source of randomness; made when a solver first needs it, which on easy problems is never."""
+        if self._rng is None:
+            self._rng = np.random.default_rng(self.seed)
+        return self._rng
+
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self.started
+
+    def remaining(self) -> float:
+        """Seconds left; infinite without a time limit."""
+        return np.inf if self.time_limit is None else self.time_limit - self.elapsed()
+
+    def deadline(self) -> float:
+        """When time is over, in seconds of `time.monotonic`: for kernels (clock.py); infinite without a time limit."""
+        return np.inf if self.time_limit is None else time.monotonic() + self.remaining()
+
+    def should_stop(self) -> bool:
+        """Whether the time is over or the callback asked to stop; ``stopped_by`` says which."""
+        if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:
+            self.stopped_by = "time_limit"
+        return bool(self.stopped_by)
+
+    def record(self, iteration: int, weight: float, bound: float) -> None:
+        """Add a point to the trace; weight and bound are those of the packing, without the offset."""
+        point = TracePoint(iteration, self.elapsed(), weight + self.offset, bound + self.offset)
+        self.trace.append(point)
+        if len(self.trace) > _TRACE:
+            # a search that improves for days: every second point is enough to see how, the first and last stay
+            self.trace[1:-1] = self.trace[2:-1:2]
+        if self.callback is not None and self.callback(point):
+            self.stopped_by = self.stopped_by or "callback"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a solver found.
+
+    Attributes
+    ----------
+    columns : int array
+        Chosen columns of the packing.
+    iterations : int
+        Iterations used.
+    lower_bound : float
+        A valid lower bound on the packing's optimum; -inf leaves the bound to the caller.
+    duals : float array or None
+        Multipliers of the packing's rows that prove the bound, where they do.
+    """
+
+    columns: NDArray[np.integer]
+    iterations: int
+    lower_bound: float = -np.inf
+    duals: NDArray[np.float64] | None = None
+
+
+class Parameters:
+    """Base of the parameter dataclasses; gives them one way to check and to complain."""
+
+    __slots__ = ()
+
+    def _require(self, condition: bool, name: str, expected: str) -> None:
+        if not condition:
+            raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+
+
+SolveFunction = Callable[["Packing", "Parameters", Run], Outcome]

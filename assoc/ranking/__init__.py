@@ -1,0 +1,1 @@
+"""The k best solutions, and the probability of each tuple."""

@@ -1,0 +1,93 @@
+"""Independent clusters of tuples, and their tuples in order: for problems of a million."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc.packing.kernels.sorting import ascending_whole
+from assoc.packing.packing import _find
+from assoc.problem import AssignmentProblem
+
+# tuples from which numbering by marks is quicker than by sorting
+_MANY = 2000
+
+
+def clusters_of(problem: AssignmentProblem) -> list[NDArray[np.int64]]:
+    """Return ``problem.components()``: rows of the tuples of each cluster, ascending, by their first tuple."""
+    sizes = problem.sizes.astype(np.int64)
+    order, start = _clusters(problem.tuples, np.cumsum(sizes) - sizes, int(sizes.sum()))
+    return [order[first:last] for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True)]
+
+
+def numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
+    """Number one sensor's measurements in a cluster from 1; 0 stays the dummy. Also how many there are."""
+    if column.size < _MANY:
+        used, number = np.unique(column, return_inverse=True)
+        alone = used[0] != 0
+        return number.reshape(-1) + int(alone), used.size - int(not alone)
+    seen = np.zeros(int(column.max()) + 1, dtype=np.int64)
+    seen[column] = 1
+    seen[0] = 0
+    return np.cumsum(seen)[column] * (column > 0), int(seen.sum())
+
+
+def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the different tuples in lexicographic order, and the place of each tuple among them."""
+    sides = tuples.max(axis=0, initial=0).astype(np.int64) + 1
+    order = np.arange(len(tuples), dtype=np.int32)
+    if float(np.prod(sides, dtype=float)) < 2.0**62:
+        # one number for each tuple
+        order = ascending_whole(np.ravel_multi_index(tuple(tuples.T.astype(np.int64)), tuple(sides)))
+    else:
+        for column in tuples.T[::-1]:
+            order = order[ascending_whole(column[order].astype(np.int64))]
+    ordered = tuples[order]
+    new = np.ones(order.size, dtype=np.bool_)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    place = np.empty(order.size, dtype=np.int64)
+    place[order] = np.cumsum(new) - 1
+    return ordered[new], place
+
+
+@njit
+def _clusters(tuples: Any, offsets: Any, total: int) -> Any:
+    """Rows of tuples by cluster, and where each cluster begins."""
+    num, num_sensors = tuples.shape
+    parent = np.arange(total).astype(np.int32)
+    for j in range(num):
+        first = -1
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                root = _find(parent, offsets[s] + tuples[j, s] - 1)
+                if first < 0:
+                    first = root
+                elif root != first:
+                    parent[max(root, first)] = min(root, first)
+                    first = min(root, first)
+    label = np.full(total, -1, np.int64)
+    own = np.empty(num, np.int64)
+    count = 0
+    for j in range(num):
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                root = _find(parent, offsets[s] + tuples[j, s] - 1)
+                if label[root] < 0:
+                    label[root] = count
+                    count += 1
+                own[j] = label[root]
+                break
+    start = np.zeros(count + 1, np.int64)
+    for j in range(num):
+        start[own[j] + 1] += 1
+    for c in range(count):
+        start[c + 1] += start[c]
+    place = start[:-1].copy()
+    order = np.empty(num, np.int64)
+    for j in range(num):
+        order[place[own[j]]] = j
+        place[own[j]] += 1
+    return order, start

@@ -1,0 +1,198 @@
+"""The packing in which every solution counts, not only the best.
+
+To find an optimum, columns of weight >= 0 can be left out of a problem with dummies (packing.py). To rank
+or to count solutions they cannot; and a tuple that is listed twice must count once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc.packing.bounds.dual_ascent import dual_bound, hard_pass
+from assoc.packing.packing import Packing, assemble, prepare
+from assoc.packing.run import Run
+from assoc.problem import AssignmentProblem
+from assoc.solvers.greedy.fallback import provide
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Complete:
+    """All distinct columns of a problem over its measurements, with multipliers that price them.
+
+    Attributes
+    ----------
+    rows : int32 array, shape (N, S)
+        Measurements of each column, numbered through all sensors; -1 where the sensor missed.
+    weights : float array, shape (N,)
+        Cost of the tuple, with dummies less the costs of its singletons.
+    origin : int32 array, shape (N,)
+        Its row of ``problem.tuples``.
+    slack : bool array, shape (R,)
+        Whether a measurement may stay uncovered (at weight 0).
+    duals : float array, shape (R,)
+        Multipliers, <= 0 where there is slack.
+    reduced, slack_reduced : float arrays, shapes (N,) and (R,)
+        Reduced costs >= 0 of the columns and of leaving a row uncovered (``inf``: not allowed).
+    bound : float
+        Sum of the multipliers: no solution weighs less.
+    offset : float
+        Weight plus this is the cost.
+    single : int64 array
+        The cheapest singleton tuple of each row, for problems with dummies; empty without.
+    """
+
+    rows: NDArray[np.int32]
+    weights: Floats
+    origin: NDArray[np.int32]
+    slack: NDArray[np.bool_]
+    duals: Floats
+    reduced: Floats
+    slack_reduced: Floats
+    bound: float
+    offset: float
+    single: NDArray[np.int64]
+
+    def keep(self, excess: float) -> Packing:
+        """Return the packing of the columns whose reduced cost is at most ``excess``, by components."""
+        chosen = np.flatnonzero(self.reduced <= excess).astype(np.int32)
+        return assemble(self.rows[chosen], self.weights[chosen], self.slack, chosen)
+
+    def indices(self, columns: NDArray[np.integer]) -> NDArray[np.intp]:
+        """Return the rows of ``problem.tuples`` of a choice of columns, completed by singletons."""
+        indices = self.origin[columns].astype(np.intp)
+        if self.single.size:
+            alone = np.ones(self.single.size, dtype=bool)
+            used = self.rows[columns]
+            alone[used[used >= 0]] = False
+            indices = np.concatenate([indices, self.single[alone]])
+        return indices
+
+
+def complete(problem: AssignmentProblem, run: Run) -> Complete:
+    """Collect the distinct columns of a problem and price them by the dual bound's multipliers."""
+    prepared = prepare(problem)
+    packing = prepared.packing
+    slack = slack_of(problem)
+    # before the ascent, which takes the time that is left
+    rows, weights, origin = distinct_columns(problem)
+    if run.time_limit is not None:
+        # what stands for the best when time is over: the ascent would leave no time for it
+        provide(packing, run)
+    # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
+    duals = np.zeros(slack.size)
+    own = dual_bound(packing, run=run)
+    hard_pass(packing, own, np.empty(packing.num_columns), 1)
+    duals[packing.row_origin] = own
+    return priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
+
+
+def slack_of(problem: AssignmentProblem) -> NDArray[np.bool_]:
+    """Whether each measurement, numbered through all sensors, may stay uncovered."""
+    sizes = problem.sizes
+    return np.ones(int(sizes.sum()), dtype=np.bool_) if problem.dummy else np.repeat(sizes > sizes.min(), sizes)
+
+
+def distinct_columns(problem: AssignmentProblem) -> tuple[NDArray[np.int32], Floats, NDArray[np.int32]]:
+    """Return rows, weights and origin of all columns (see ``Complete``)."""
+    prepared = prepare(problem)
+    sizes = problem.sizes.astype(np.int64)
+    # uncompiled, numpy would warn of the hash's overflow, which is meant
+    with np.errstate(over="ignore"):
+        return _distinct_columns(
+            problem.tuples, problem.costs, np.cumsum(sizes) - sizes, prepared.single_cost, problem.dummy
+        )
+
+
+def priced(
+    rows: NDArray[np.int32],
+    weights: Floats,
+    origin: NDArray[np.int32],
+    slack: NDArray[np.bool_],
+    duals: Floats,
+    offset: float,
+    single: NDArray[np.int64],
+) -> Complete:
+    """Put columns and multipliers together; what is negative in the reduced costs must be rounding."""
+    duals = np.where(slack, np.minimum(duals, 0.0), duals)
+    return Complete(
+        rows,
+        weights,
+        origin,
+        slack,
+        duals,
+        _reduced(rows, weights, duals),
+        np.where(slack, -duals, np.inf),
+        float(duals.sum()),
+        offset,
+        single,
+    )
+
+
+@njit
+def _reduced(rows: Any, weights: Floats, duals: Floats) -> Floats:
+    """Reduced costs; what is negative must be rounding."""
+    reduced = np.empty(weights.size)
+    for j in range(weights.size):
+        total = 0.0
+        for s in range(rows.shape[1]):
+            if rows[j, s] >= 0:
+                total += duals[rows[j, s]]
+        reduced[j] = max(weights[j] - total, 0.0)
+    return reduced
+
+
+@njit
+def _distinct_columns(tuples: Any, costs: Floats, offsets: Any, single_cost: Floats, dummy: bool) -> Any:
+    """Columns of two or more measurements (without dummies: all), each once, at its smallest cost."""
+    num, num_sensors = tuples.shape
+    size = 16
+    while size < 2 * num:
+        size *= 2
+    table = np.full(size, -1, np.int32)
+    origin = np.empty(num, np.int32)
+    count = 0
+    for j in range(num):
+        measurements = 0
+        mark = np.uint64(1469598103934665603)
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                measurements += 1
+            mark = (mark ^ np.uint64(tuples[j, s])) * np.uint64(0x9E3779B97F4A7C15)
+            mark ^= mark >> np.uint64(29)
+        if dummy and measurements < 2:
+            continue
+        place = np.int64(mark & np.uint64(size - 1))
+        while table[place] >= 0:
+            other = origin[table[place]]
+            same = True
+            for s in range(num_sensors):
+                if tuples[other, s] != tuples[j, s]:
+                    same = False
+                    break
+            if same:
+                break
+            place = (place + 1) & (size - 1)
+        if table[place] < 0:
+            table[place] = count
+            origin[count] = j
+            count += 1
+        elif costs[j] < costs[origin[table[place]]]:
+            origin[table[place]] = j
+    rows = np.empty((count, num_sensors), np.int32)
+    weights = np.empty(count)
+    for n in range(count):
+        j = origin[n]
+        weights[n] = costs[j]
+        for s in range(num_sensors):
+            i = tuples[j, s]
+            rows[n, s] = offsets[s] + i - 1 if i > 0 else -1
+            if dummy and i > 0:
+                weights[n] -= single_cost[rows[n, s]]
+    return rows, weights, origin[:count].copy()

@@ -1,0 +1,294 @@
+"""All solutions of a small packing below a limit, the k lightest kept: depth first over rows.
+
+With feasible multipliers u (bounds.py) a solution x weighs
+
+    w(x) = sum(u) + sum of the reduced costs of its columns + sum of -u_r over its uncovered rows with slack,
+
+all terms but the first >= 0. The search decides row by row (always the row with the fewest choices left)
+and gives up where the terms so far exceed what the limit allows. The limit falls to the weight of the k-th
+lightest solution known, so that only ties and better ones are looked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import is_over
+from assoc._system.compiled import njit
+from assoc.packing.kernels.matching import _pop, _push
+
+Floats = NDArray[np.float64]
+
+NOT_COMPLETE = -1
+_ALONE = -1
+# columns of a row that insertion would take too long to sort; decisions between two looks at the clock
+_LONG = 40
+_LOOK = 8
+
+
+@njit
+def new_store(num_rows: int) -> Any:
+    """Room for solutions: a heap of (-weight, slot), and for each slot its hash and its columns.
+
+    ``meta`` is [number of solutions]; column lists end with -1.
+    """
+    capacity = 4
+    return (
+        np.empty(capacity),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.uint64),
+        np.empty((capacity, num_rows + 1), np.int32),
+        np.zeros(1, np.int64),
+    )
+
+
+@njit
+def _grown(store: Any) -> Any:
+    key, slot, marks, chosen, meta = store
+    capacity = 2 * key.size
+    new_key = np.empty(capacity)
+    new_slot = np.empty(capacity, np.int64)
+    new_marks = np.empty(capacity, np.uint64)
+    new_chosen = np.empty((capacity, chosen.shape[1]), np.int32)
+    new_key[: key.size] = key
+    new_slot[: key.size] = slot
+    new_marks[: key.size] = marks
+    new_chosen[: key.size] = chosen
+    return new_key, new_slot, new_marks, new_chosen, meta
+
+
+@njit
+def cut_of(store: Any, k: int, limit: float, tolerance: float) -> float:
+    """Only solutions that weigh less than this are still of interest."""
+    if store[4][0] >= k:
+        return min(limit, -store[0][0] - tolerance)
+    return limit
+
+
+@njit
+def _mark(column: int) -> np.uint64:
+    """Well mixed bits for a column number (splitmix64), so that their xor identifies a set."""
+    z = np.uint64(column + 1) * np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@njit
+def _keep(store: Any, k: int, weight: float, columns: Any, count: int, check: bool) -> Any:
+    """Add a solution, in the place of the heaviest if there are k; with ``check`` only if it is new."""
+    key, slot, marks, chosen, meta = store
+    mark = np.uint64(0)
+    for t in range(count):
+        mark ^= _mark(columns[t])
+    own = np.sort(columns[:count])
+    if check:
+        for i in range(meta[0]):
+            at = slot[i]
+            if marks[at] == mark and chosen[at, count] < 0:
+                same = True
+                for t in range(count):
+                    if chosen[at, t] != own[t]:
+                        same = False
+                        break
+                if same:
+                    return store
+    if meta[0] < k:
+        if meta[0] == key.size:
+            store = _grown(store)
+            key, slot, marks, chosen, meta = store
+        at = meta[0]
+        _push(key, slot, meta[0], -weight, at)
+        meta[0] += 1
+    else:
+        at = slot[0]
+        _pop(key, slot, k - 1)
+        _push(key, slot, k - 1, -weight, at)
+    marks[at] = mark
+    chosen[at, :count] = own
+    chosen[at, count] = -1
+    return store
+
+
+@njit
+def enumerate_solutions(
+    cols: Any, names: Any, reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, top: int, end: int,
+    base: float, k: int, limit: float, tolerance: float, budget: int, check: bool, store: Any, blocked: Any,
+    deadline: float
+) -> Any:  # fmt: skip
+    """Search rows ``top:end`` for solutions lighter than ``limit``.
+
+    Parameters
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of each column.
+    names : int32 array, shape (N,)
+        What the store calls the columns.
+    reduced : float array, shape (N,)
+        Reduced costs (what rounding left below 0 counts as 0).
+    slack, duals : arrays, shape (R,)
+        Whether a row may stay uncovered, and the multipliers.
+    row_ptr, row_cols : int arrays
+        Columns of each row; each row's part of ``row_cols`` is put in order of reduced cost.
+    top, end : int
+        The rows to cover; no column of theirs uses others.
+    base : float
+        Sum of the rows' multipliers.
+    k : int
+        Solutions to keep.
+    limit : float
+        Only solutions that weigh less.
+    tolerance : float
+        Differences of weight that are ties.
+    budget : int
+        Decisions at the most.
+    check : bool
+        Whether solutions may have been found before.
+    store : tuple of arrays
+        See ``new_store``.
+    blocked : int32 array, shape (N,)
+        Room for work.
+    deadline : float
+        When time is over (clock.py).
+
+    Returns
+    -------
+    steps, store
+        Decisions made, ``NOT_COMPLETE`` if the budget or the time did not suffice.
+    """
+    num_rows = end - top
+    for r in range(top, end):
+        if is_over(deadline):
+            return NOT_COMPLETE, store
+        if row_ptr[r + 1] - row_ptr[r] > _LONG:
+            _sort_row(reduced, row_cols[row_ptr[r] : row_ptr[r + 1]])
+            continue
+        # insertion sort: the lists are short
+        for x in range(row_ptr[r] + 1, row_ptr[r + 1]):
+            a = row_cols[x]
+            y = x
+            while y > row_ptr[r] and reduced[row_cols[y - 1]] > reduced[a]:
+                row_cols[y] = row_cols[y - 1]
+                y -= 1
+            row_cols[y] = a
+    done = np.zeros(num_rows, np.bool_)
+    # how many of a column's rows are decided: it can be taken while there are none
+    for x in range(row_ptr[top], row_ptr[end]):
+        blocked[row_cols[x]] = 0
+    row_at = np.empty(num_rows, np.int64)
+    cursor = np.empty(num_rows, np.int64)
+    taken = np.empty(num_rows, np.int64)
+    slack_left = np.empty(num_rows, np.bool_)
+    spent = np.empty(num_rows + 1)
+    chosen = np.empty(num_rows + 1, np.int32)
+    count = 0
+    depth = 0
+    steps = 0
+    spent[0] = base
+    cut = cut_of(store, k, limit, tolerance)
+    forward = True
+    while True:
+        if forward:
+            row, choices = _next_row(
+                reduced, slack, duals, row_ptr, row_cols, top, end, done, blocked, cut - spent[depth]
+            )
+            if row < 0 or choices == 0:
+                if row < 0 and spent[depth] < cut:
+                    store = _keep(store, k, spent[depth], chosen, count, check)
+                    cut = cut_of(store, k, limit, tolerance)
+                forward = False
+                depth -= 1
+                continue
+            row_at[depth] = row
+            cursor[depth] = row_ptr[row]
+            slack_left[depth] = slack[row]
+        else:
+            if depth < 0:
+                return steps, store
+            count -= _decide(cols, row_ptr, row_cols, top, row_at[depth], taken[depth], done, blocked, False)
+        row = row_at[depth]
+        room = cut - spent[depth]
+        place = cursor[depth]
+        while place < row_ptr[row + 1] and blocked[row_cols[place]] > 0:
+            place += 1
+        cost = max(reduced[row_cols[place]], 0.0) if place < row_ptr[row + 1] else np.inf
+        alone = max(-duals[row], 0.0) if slack_left[depth] else np.inf
+        if min(cost, alone) >= room:
+            forward = False
+            depth -= 1
+            continue
+        if alone <= cost:
+            slack_left[depth] = False
+            taken[depth] = _ALONE
+            cost = alone
+        else:
+            taken[depth] = row_cols[place]
+            chosen[count] = names[taken[depth]]
+            place += 1
+        cursor[depth] = place
+        count += _decide(cols, row_ptr, row_cols, top, row, taken[depth], done, blocked, True)
+        spent[depth + 1] = spent[depth] + cost
+        depth += 1
+        forward = True
+        steps += 1
+        if steps > budget or (steps % _LOOK == 0 and is_over(deadline)):
+            return NOT_COMPLETE, store
+
+
+@njit
+def _sort_row(reduced: Floats, own: Any) -> None:
+    """Put columns in order of reduced cost, in place; ties stay in their order."""
+    ordered = True
+    for x in range(1, own.size):
+        if reduced[own[x - 1]] > reduced[own[x]]:
+            ordered = False
+            break
+    if not ordered:
+        own[:] = own[np.argsort(reduced[own], kind="mergesort")]
+
+
+@njit
+def _next_row(
+    reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, top: int, end: int, done: Any,
+    blocked: Any, room: float
+) -> Any:  # fmt: skip
+    """Return the row with the fewest choices left (-1: all are decided), and how many these are."""
+    row, least = -1, 1 << 60
+    for r in range(top, end):
+        if done[r - top]:
+            continue
+        choices = 1 if slack[r] and max(-duals[r], 0.0) < room else 0
+        for x in range(row_ptr[r], row_ptr[r + 1]):
+            a = row_cols[x]
+            if reduced[a] >= room or choices >= least:
+                break
+            if blocked[a] == 0:
+                choices += 1
+        if choices < least:
+            row, least = r, choices
+            if choices <= 1:
+                break
+    return row, least
+
+
+@njit
+def _decide(
+    cols: Any, row_ptr: Any, row_cols: Any, top: int, row: int, taken: int, done: Any, blocked: Any, do: bool
+) -> int:
+    """Take a column, or leave a row alone, or take that back; the number of columns this concerns."""
+    step = 1 if do else -1
+    if taken == _ALONE:
+        done[row - top] = do
+        for x in range(row_ptr[row], row_ptr[row + 1]):
+            blocked[row_cols[x]] += step
+        return 0
+    for s in range(cols.shape[1]):
+        q = cols[taken, s]
+        if q >= 0:
+            done[q - top] = do
+            for x in range(row_ptr[q], row_ptr[q + 1]):
+                blocked[row_cols[x]] += step
+    return 1

@@ -1,0 +1,220 @@
+"""The k lightest solutions of a whole problem: rounds of growing excess, component by component."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.packing import Packing
+from assoc.packing.run import Run
+from assoc.ranking.columns import Complete
+from assoc.ranking.component_ranking import FIRST_BUDGET, ComponentRanking, rank_components
+from assoc.ranking.head_start import HeadStart
+from assoc.ranking.merging import merge
+
+Floats = NDArray[np.float64]
+Columns = NDArray[np.int32]
+
+
+@dataclass(slots=True)
+class Found:
+    """Solutions that are proved to be the lightest.
+
+    Attributes
+    ----------
+    chosen : list of int32 arrays
+        Columns of each solution, lightest first.
+    rest : float
+        No other solution weighs less.
+    nodes : int
+        Nodes of branch and bound.
+    known : int32 array or None
+        Columns of the lightest solution that was met, where none is proved to be the lightest.
+    """
+
+    chosen: list[Columns]
+    rest: float
+    nodes: int = 0
+    known: Columns | None = None
+
+
+@dataclass(slots=True)
+class _Lists:
+    """Ranked solutions of each component: weights, columns, and what all others weigh at least."""
+
+    weights: list[Floats] = field(default_factory=list)
+    columns: list[list[Columns]] = field(default_factory=list)
+    proven: list[float] = field(default_factory=list)
+
+
+class Deepening:
+    """Rounds of growing excess D until k solutions are proved to be the lightest.
+
+    Parameters
+    ----------
+    columns : Complete
+        The problem.
+    k : int
+        Solutions wanted.
+    run : Run
+        Clock.
+    ahead : HeadStart
+        Taken before the first branching.
+    """
+
+    def __init__(self, columns: Complete, k: int, run: Run, ahead: HeadStart) -> None:
+        self._columns = columns
+        self._k = k
+        self._run = run
+        self._ahead = ahead
+        self._nodes = 0
+        scale = max(float(np.abs(columns.weights).max(initial=0.0)), abs(columns.bound))
+        self._tolerance = 1e-12 * scale
+        self._known: Columns | None = None
+        self._known_weight = np.inf
+
+    def run(self) -> Found:
+        """Return the k lightest solutions, or as many as are proved when time is over.
+
+        Raises
+        ------
+        InfeasibleError
+            There is no solution.
+        """
+        columns = self._columns
+        if self._run.should_stop():
+            return Found([], columns.bound)
+        steps = np.concatenate([columns.reduced, columns.slack_reduced[columns.slack]])
+        steps = np.unique(steps[steps > self._tolerance])
+        # two deviations of a row for each solution wanted are a fair guess of how far one must look
+        place = 2 * self._k
+        best = Found([], columns.bound)
+        while True:
+            excess = self._excess(steps, place)
+            found = self._round(excess)
+            if (len(found.chosen), found.rest) > (len(best.chosen), best.rest):
+                best = found
+            best.nodes, best.known = self._nodes, self._known
+            if len(best.chosen) >= self._k or excess == np.inf or self._run.should_stop():
+                break
+            # a head start may have gone further than twice as many deviations
+            place = 2 * max(place, int(np.searchsorted(steps, excess)) if self._ahead.weight < np.inf else 0)
+        if not best.chosen and best.rest == np.inf:
+            raise infeasible(columns.keep(np.inf))
+        return best
+
+    def _excess(self, steps: Floats, place: int) -> float:
+        """Return the excess of a round: so many deviations, and no less than a solution is known to have."""
+        if place >= steps.size:
+            return np.inf
+        known = self._ahead.weight - self._columns.bound + 4.0 * self._tolerance
+        return max(float(steps[place]), known) if known < np.inf else float(steps[place])
+
+    def _round(self, excess: float) -> Found:
+        """Rank all solutions of at most this excess; fewer than k if there are fewer."""
+        columns = self._columns
+        beyond = columns.bound + excess
+        packing = columns.keep(excess)
+        if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
+            return Found([], beyond)
+        duals = columns.duals[packing.row_origin]
+        # rows without columns stay uncovered and use up their share
+        room = excess + (columns.bound - float(duals.sum())) + self._tolerance
+        if room <= 0.0:
+            return Found([], beyond)
+        lists = self._rank_components(packing, duals, room)
+        if lists is None:
+            return Found([], columns.bound)
+        lower = np.array(
+            [
+                min(own[0], proven) if own.size else proven
+                for own, proven in zip(lists.weights, lists.proven, strict=True)
+            ]
+        )
+        if np.isposinf(lower).any():
+            return Found([], np.inf)
+        total_lower = float(lower.sum())
+        unlisted = total_lower + (np.array(lists.proven) - lower)
+        rest = min(beyond, float(unlisted.min(initial=np.inf)))
+        if any(own.size == 0 for own in lists.weights):
+            return Found([], rest)
+        start = np.concatenate([[0], np.cumsum([own.size for own in lists.weights])]).astype(np.int64)
+        weights = np.concatenate([*lists.weights, np.zeros(0)])
+        total, choice = merge(start, weights, self._k + 1)
+        if total[0] < self._known_weight:
+            self._known, self._known_weight = _origins(packing, lists, choice[0]), float(total[0])
+        # a full list excludes what is lighter than its last by more than a tie
+        proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance, side="right")), self._k)
+        if proved < total.size:
+            rest = min(rest, float(total[proved]))
+        return Found([_origins(packing, lists, pick) for pick in choice[:proved]], rest)
+
+    def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists | None:
+        """Rank every component; None where the head start says that more excess is needed anyway."""
+        reduced = self._columns.reduced[packing.origin]
+        start, weights, pointer, columns, proven = rank_components(
+            packing.cols,
+            reduced,
+            packing.slack,
+            duals,
+            packing.row_ptr,
+            packing.row_cols,
+            packing.row_start,
+            FIRST_BUDGET,
+            self._k,
+            room,
+            self._tolerance,
+            self._run.deadline(),
+        )
+        lists = _Lists()
+        for c in range(packing.num_components):
+            own = slice(start[c], start[c + 1])
+            lists.weights.append(weights[own])
+            lists.columns.append([columns[pointer[i] : pointer[i + 1]] for i in range(start[c], start[c + 1])])
+            lists.proven.append(float(proven[c]))
+        hard = np.flatnonzero(np.isneginf(proven))
+        if hard.size and not self._ahead.taken:
+            self._ahead.take()
+            if np.inf > self._ahead.weight - self._columns.bound > room:
+                return None
+        bounds = np.add.reduceat(duals, packing.row_start[:-1]) if hard.size else np.zeros(0)
+        # what the components done need above their bounds the others cannot use
+        used = sum(own[0] - bound for own, bound in zip(lists.weights, bounds, strict=False) if own.size)
+        for index in hard:
+            # its multipliers bound a component that there was no time for
+            lists.proven[index] = float(bounds[index])
+            if not self._run.should_stop():
+                self._branch(packing, duals, int(index), float(bounds[index] + room - used), lists)
+                if lists.weights[index].size:
+                    used += lists.weights[index][0] - bounds[index]
+        return lists
+
+    def _branch(self, packing: Packing, duals: Floats, c: int, limit: float, lists: _Lists) -> None:
+        """Rank a component that was too much for enumeration; the lists are filled in."""
+        piece = packing.component(c)
+        own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
+        ranking = ComponentRanking(
+            piece, own_duals, self._k, limit, self._tolerance, deadline=self._run.deadline()
+        )
+        # about ten milliseconds of work between two looks at the clock
+        turn = max(1, 100_000 // max(piece.num_columns, 1))
+        while not ranking.done and not self._run.should_stop():
+            ranking.run(turn)
+        self._nodes += ranking.nodes
+        if ranking.out_of_memory:
+            self._run.stopped_by = self._run.stopped_by or "memory_limit"
+        first = int(packing.col_start[c])
+        found, chosen = ranking.solutions()
+        lists.weights[c] = found
+        lists.columns[c] = [own + np.int32(first) for own in chosen]
+        # before its first node is done the search has no bound of its own
+        lists.proven[c] = max(ranking.proven, lists.proven[c])
+
+
+def _origins(packing: Packing, lists: _Lists, pick: NDArray[np.int32]) -> Columns:
+    """Return the columns of one solution from each component's list."""
+    own = [columns[i] for columns, i in zip(lists.columns, pick, strict=True)]
+    return packing.origin[np.concatenate([np.zeros(0, np.int32), *own])]

@@ -1,0 +1,230 @@
+"""Association probabilities of tuples, as intervals that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.interrupts import interruptible
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.packing import prepare
+from assoc.packing.run import Run
+from assoc.problem import AssignmentProblem
+from assoc.ranking.clusters import clusters_of, distinct, numbered
+from assoc.ranking.columns import Complete
+from assoc.ranking.kbest import checked_k, rank
+from assoc.ranking.partition_function import log_partition
+from assoc.solution import Solution
+from assoc.solvers.assign import _limit
+from assoc.solvers.greedy.fallback import greedy_choice, provide
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = NDArray[np.float64]
+
+# inverse temperatures at which the unseen weight is bounded
+_EXPONENTS = (1.0, 0.75, 0.5, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Marginals:
+    """Probability of each tuple to be an association.
+
+    Attributes
+    ----------
+    tuples : int32 array, shape (T, S)
+        Every distinct tuple of the problem, false alarms (singletons) among them.
+    probability : float array, shape (T,)
+        Share of the tuple's solutions in the weight of the k best of its cluster.
+    lower, upper : float arrays, shape (T,)
+        The probability among all solutions lies between.
+    unseen : float
+        Share of the weight that solutions beyond the k best can have at most, in the cluster where that is
+        largest: the width of the widest interval.
+    listed : int
+        Solutions that were listed, of all clusters together.
+    """
+
+    tuples: NDArray[np.int32]
+    probability: Floats
+    lower: Floats
+    upper: Floats
+    unseen: float
+    listed: int
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per tuple that can have a probability: the sensors' indices, probability, lower, upper."""
+        import pandas as pd
+
+        columns = {f"sensor_{s + 1}": self.tuples[:, s] for s in range(self.tuples.shape[1])}
+        frame = pd.DataFrame({**columns, "probability": self.probability, "lower": self.lower, "upper": self.upper})
+        return frame[frame["upper"] > 0.0].reset_index(drop=True)
+
+
+@interruptible()
+def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
+    """Return the association probability of every tuple, from the k best solutions.
+
+    Parameters
+    ----------
+    problem : AssignmentProblem
+        Costs are negative log likelihood ratios, so that a solution weighs exp(-cost).
+    k : int, default 100
+        Solutions to list for each cluster of tuples (``problem.components()``); clusters are independent, so
+        that k of each say more than any number of the whole.
+    time_limit : float, optional
+        Seconds for the rankings; with fewer solutions proved the intervals are wider.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution, or none was found in the time.
+    InvalidInputError
+        ``k`` is not a whole number >= 1, or the time limit is not positive.
+
+    Notes
+    -----
+    With all solutions x of a cluster and their costs c(x),
+
+        P(t) = sum_{x contains t} exp(-c(x)) / sum_x exp(-c(x)).
+
+    Let W be the weight of the k best (relative to the best), W(t) that of those with tuple t, and U an upper
+    bound on the weight of all others. Each of the others may contain t or not, therefore
+
+        W(t) / (W + U)  <=  P(t)  <=  (W(t) + U) / (W + U),
+
+    and W(t) / W lies between. Two things are known of the others: their excess E over the dual bound is at
+    least d, where the ranking stopped; and Z(a), the sum of exp(-a E) over all solutions, is at most what
+    ``partition.log_partition`` says. For any a in [0, 1], since E >= d,
+
+        sum_{others} exp(-E)  <=  exp(-(1 - a) d) ( Z(a) - sum_{k best} exp(-a E) ).
+
+    a = 1 is the plain partition function, a = 0 the number of solutions times the weight of the next; U is
+    the least of several.
+    """
+    checked_k(k)
+    run = Run(0, time_limit=_limit(time_limit))
+    # what stands for clusters that there is no time for
+    provide(prepare(problem).packing, run)
+    tuples, place = distinct(problem.tuples)
+    probability, lower, upper = np.ones((3, len(tuples)))
+    unseen, listed = 0.0, 0
+    waiting = np.ones(problem.num_tuples, dtype=bool)
+    for cluster, which in _clusters(problem):
+        if run.should_stop():
+            unseen, listed = 1.0, listed + 1
+            _guess(problem, place[waiting], place, probability, lower, upper, run)
+            break
+        waiting[which] = False
+        # a cluster that is the whole problem has its greedy solution already
+        clock = run if cluster is problem else Run(0, time_limit=run.time_limit, started=run.started)
+        own, share, count = _of_cluster(cluster, k, clock)
+        listed += count
+        unseen = max(unseen, share)
+        # tuples that are listed twice are one: each solution has it once, at whichever place
+        touched, total = _totals(place[which], own, len(tuples))
+        probability[touched] = np.minimum(total, 1.0)
+        lower[touched] = probability[touched] * (1.0 - share)
+        upper[touched] = np.minimum(lower[touched] + share, 1.0)
+    return Marginals(tuples.astype(np.int32), probability, lower, upper, unseen, listed)
+
+
+def _guess(
+    problem: AssignmentProblem, waiting: NDArray[np.int64], place: NDArray[np.int64], probability: Floats,
+    lower: Floats, upper: Floats, run: Run,
+) -> None:  # fmt: skip
+    """Fill in what is known of clusters when time is over: nothing; the greedy solution stands for the best."""
+    chosen = np.zeros(probability.size)
+    chosen[place[_greedy(problem, run)]] = 1.0
+    probability[waiting], lower[waiting], upper[waiting] = chosen[waiting], 0.0, 1.0
+
+
+def _greedy(problem: AssignmentProblem, run: Run) -> NDArray[np.int64]:
+    """Rows of the tuples of the greedy solution."""
+    prepared = prepare(problem)
+    packing = prepared.packing
+    columns = run.fallback if run.fallback is not None else greedy_choice(packing, run)
+    if columns is None:
+        raise infeasible(packing, run)
+    alone = np.ones(prepared.single.size, dtype=bool)
+    if alone.size:
+        used = packing.cols[columns]
+        alone[packing.row_origin[used[used >= 0]]] = False
+    return np.concatenate([packing.origin[columns].astype(np.int64), prepared.single[alone]])
+
+
+def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
+    """Independent clusters as problems of their own, small ones first, and the rows of their tuples.
+
+    A single measurement that no tuple connects has nothing to decide and is left out. Without dummies the
+    measurements of the smallest sensor bind all clusters together.
+    """
+    if not problem.dummy:
+        yield problem, np.arange(problem.num_tuples)
+        return
+    clusters = clusters_of(problem)
+    if len(clusters) == 1 and problem.sizes.sum() > 1:
+        yield problem, clusters[0]
+        return
+    for which in sorted(clusters, key=len):
+        columns, sizes = zip(*(numbered(column) for column in problem.tuples[which].T), strict=True)
+        if sum(sizes) > 1:
+            yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
+
+
+def _totals(place: NDArray[np.int64], own: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return which distinct tuples a cluster has, and the sums of what its tuples have."""
+    if 10 * place.size > num:
+        seen = np.zeros(num, dtype=bool)
+        seen[place] = True
+        touched = np.flatnonzero(seen)
+        return touched, np.asarray(np.bincount(place, own, num), dtype=np.float64)[touched]
+    touched, number = np.unique(place, return_inverse=True)
+    return touched, np.asarray(np.bincount(number.reshape(-1), own), dtype=np.float64)
+
+
+def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, float, int]:
+    """Each tuple's share in the weight of the k best, the share of the unseen rest, and how many are listed."""
+    # one more than is listed: its cost bounds all that are not
+    ranking = rank(problem, k + 1, None, run)
+    solutions = ranking.solutions[:k]
+    rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
+    best = min(solution.cost for solution in solutions)
+    weights = np.exp(best - np.array([solution.cost for solution in solutions]))
+    total = float(weights.sum())
+    own = np.zeros(problem.num_tuples)
+    for solution, weight in zip(solutions, weights, strict=True):
+        own[solution.indices] += weight
+    others = _others(problem, ranking.columns, solutions, rest, run)
+    share = others / (total + others) if others < np.inf else 1.0
+    # what every listed solution has, it has with certainty up to the others; sums lose digits
+    return np.minimum(own / total, 1.0), share, len(solutions)
+
+
+def _others(problem: AssignmentProblem, columns: Complete, listed: list[Solution], rest: float, run: Run) -> float:
+    """Bound the weight, relative to that of the best, of all solutions that are not listed and cost ``rest``."""
+    if rest == np.inf:
+        return 0.0
+    bound = columns.bound + columns.offset
+    excess = np.maximum(np.array([solution.cost for solution in listed]) - bound, 0.0)
+    least = max(rest - bound, 0.0)
+    smallest = np.inf
+    if run.should_stop():
+        return smallest
+    sensor_of = np.repeat(np.arange(problem.num_sensors), problem.sizes)
+    packing = columns.keep(np.inf)
+    for a in _EXPONENTS:
+        if run.should_stop():
+            break
+        log_all = log_partition(columns, sensor_of, a, deadline=run.deadline(), packing=packing)
+        # all in logarithms: counts of solutions overflow
+        seen = float(np.exp(-a * excess - log_all).sum())
+        left = max(1.0 - seen, 0.0) + 1e-12
+        with np.errstate(over="ignore"):
+            smallest = min(smallest, float(np.exp(log_all + np.log(left) - (1.0 - a) * least + excess.min())))
+    return smallest

@@ -1,0 +1,95 @@
+"""The lightest combinations of one solution from each of several ranked lists."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc.packing.kernels.matching import _pop, _push
+
+Floats = NDArray[np.float64]
+
+
+@njit
+def merge(start: Any, weights: Floats, k: int) -> Any:
+    """Combine the ranked lists of independent components into the k lightest choices of one of each.
+
+    Parameters
+    ----------
+    start, weights
+        List c is ``weights[start[c]:start[c + 1]]``, ascending and not empty.
+    k : int
+        Combinations wanted.
+
+    Returns
+    -------
+    total : float array, shape (m,), m <= k
+        Their weights, ascending.
+    choice : int32 array, shape (m, C)
+        For each component, which of its list.
+    """
+    num_lists = start.size - 1
+    total = np.zeros(1)
+    steps = 0
+    for c in range(num_lists):
+        if start[c + 1] - start[c] > 1:
+            steps += 1
+    # one level for each list with a choice: which combination of the lists before, which of this one
+    before = np.empty((steps, 1), np.int32)
+    which = np.empty((steps, 1), np.int32)
+    level = 0
+    for c in range(num_lists):
+        first = start[c]
+        length = start[c + 1] - first
+        if length == 1:
+            total += weights[first]
+            continue
+        room = min(k, total.size * length)
+        if room > before.shape[1]:
+            before = _wider(before, room)
+            which = _wider(which, room)
+        result = np.empty(room)
+        heap = np.empty(total.size)
+        item = np.empty(total.size, np.int64)
+        place = np.zeros(total.size, np.int64)
+        size = 0
+        # combination t of the lists before enters when t - 1 has been used with this list's first
+        _push(heap, item, size, total[0] + weights[first], 0)
+        size += 1
+        for n in range(room):
+            value = heap[0]
+            t = item[0]
+            size -= 1
+            _pop(heap, item, size)
+            result[n] = value
+            before[level, n] = t
+            which[level, n] = place[t]
+            if place[t] == 0 and t + 1 < total.size:
+                _push(heap, item, size, total[t + 1] + weights[first], t + 1)
+                size += 1
+            place[t] += 1
+            if place[t] < length:
+                _push(heap, item, size, total[t] + weights[first + place[t]], t)
+                size += 1
+        total = result
+        level += 1
+    choice = np.zeros((total.size, num_lists), np.int32)
+    for n in range(total.size):
+        t = n
+        level = steps
+        for c in range(num_lists - 1, -1, -1):
+            if start[c + 1] - start[c] > 1:
+                level -= 1
+                choice[n, c] = which[level, t]
+                t = before[level, t]
+    return total, choice
+
+
+@njit
+def _wider(array: Any, columns: int) -> Any:
+    result = np.empty((array.shape[0], columns), np.int32)
+    result[:, : array.shape[1]] = array
+    return result

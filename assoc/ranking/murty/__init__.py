@@ -1,0 +1,1 @@
+"""Murty's ranking of two-dimensional assignments."""

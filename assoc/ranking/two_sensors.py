@@ -1,0 +1,51 @@
+"""The k best of problems with two sensors, by Murty's algorithm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.packing import prepare
+from assoc.packing.run import Run
+from assoc.problem import AssignmentProblem
+from assoc.ranking.columns import Complete, distinct_columns, priced, slack_of
+from assoc.ranking.iterative_deepening import Found
+from assoc.ranking.murty.murty import Murty
+
+
+def rank_planar(problem: AssignmentProblem, k: int, run: Run) -> tuple[Complete, Found]:
+    """Return the columns of a problem with two sensors and its k lightest solutions.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution.
+    """
+    rows, weights, origin = distinct_columns(problem)
+    slack = slack_of(problem)
+    n, m = (int(size) for size in problem.sizes)
+    # Murty's rows are the sensor with fewer measurements: they have fewer choices to split by
+    own, other = rows[:, 0], rows[:, 1] - np.int32(n)
+    own_alone, other_alone = slack[:n], slack[n:]
+    turned = n > m
+    if turned:
+        own, other, own_alone, other_alone = other, own, other_alone, own_alone
+    murty = Murty(
+        np.ascontiguousarray(own),
+        np.ascontiguousarray(other),
+        weights,
+        np.ascontiguousarray(own_alone),
+        np.ascontiguousarray(other_alone),
+        k,
+    )
+    prepared = prepare(problem)
+    if not murty.feasible:
+        raise infeasible(prepared.packing)
+    # shortest paths of some ten milliseconds between two looks at the clock
+    turn = min(2000, max(1, 5_000_000 // max(weights.size, 1)))
+    while not murty.done and not run.should_stop():
+        murty.run(turn)
+    u, v = murty.duals
+    duals = np.concatenate([v, u] if turned else [u, v])
+    columns = priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
+    return columns, Found([murty.edges(place) for place in range(murty.num_found)], murty.rest, murty.evaluations)

@@ -1,0 +1,193 @@
+"""The layout of a scene file: flat arrays in an npz, documented in docs/formats.md."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._files.npz import Field, load_npz, save_npz
+from assoc.errors import InvalidInputError
+from assoc.sensors import KINDS
+
+if TYPE_CHECKING:
+    from assoc.scene.scene import Scene
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+FORMAT = "assoc.scene"
+VERSION = 1
+
+_FIELDS = {
+    "name": Field("str", 0, required=False),
+    "times": Field("float", 1),
+    "region": Field("float", 2, required=False),
+    "sensor_kind": Field("str", 1),
+    "sensor_name": Field("str", 1),
+    "sensor_position": Field("float", 2),
+    "sensor_dim": Field("int", 1),
+    "sensor_covariance": Field("float", 1),
+    "sensor_field_of_view": Field("float", 2),
+    "sensor_detection_probability": Field("float", 1),
+    "sensor_false_alarm_rate": Field("float", 1),
+    "measurement_values": Field("float", 1),
+    "measurement_offsets": Field("int", 2),
+    "measurement_sources": Field("int", 1, required=False),
+    "truth_offsets": Field("int", 1, required=False),
+    "truth_ids": Field("int", 1, required=False),
+    "truth_positions": Field("float", 2, required=False),
+}
+
+
+def save_parts(path: str | os.PathLike[str], scene: Scene) -> None:
+    """Write a scene; see `assoc.scene.Scene.save`."""
+    save_npz(path, FORMAT, VERSION, _to_arrays(scene))
+
+
+def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the arguments of `assoc.scene.Scene`; "truth" holds those of `assoc.scene.Truth` or None."""
+    arrays = load_npz(path, FORMAT, VERSION, _FIELDS)
+    try:
+        return _from_arrays(arrays)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+
+
+def _to_arrays(scene: Scene) -> dict[str, Array | str | int]:
+    sensors, scans = scene.sensors, scene.measurements
+    blocks = [[scan[s] for scan in scans] for s in range(len(sensors))]
+    counts = np.array([[len(z) for z in block] for block in blocks], dtype=np.int64)
+    arrays: dict[str, Array | str | int] = {
+        "name": scene.name,
+        "times": scene.times,
+        "region": scene.region,
+        "sensor_kind": np.array([sensor.kind for sensor in sensors]),
+        "sensor_name": np.array([sensor.name for sensor in sensors]),
+        "sensor_position": np.array([sensor.position for sensor in sensors]),
+        "sensor_dim": np.array([sensor.dim for sensor in sensors], dtype=np.int64),
+        "sensor_covariance": np.concatenate([sensor.covariance.ravel() for sensor in sensors]),
+        "sensor_field_of_view": np.concatenate([sensor.field_of_view for sensor in sensors]),
+        "sensor_detection_probability": np.array([sensor.detection_probability for sensor in sensors]),
+        "sensor_false_alarm_rate": np.array([sensor.false_alarm_rate for sensor in sensors]),
+        "measurement_values": np.concatenate([z.ravel() for block in blocks for z in block]),
+        "measurement_offsets": np.concatenate(
+            [np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1
+        ),
+    }
+    truth = scene.truth
+    if truth is not None:
+        arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth.target_ids)], dtype=np.int64)
+        arrays["truth_ids"] = np.concatenate(truth.target_ids)
+        arrays["truth_positions"] = np.concatenate(truth.positions)
+        if truth.sources is not None:
+            flat = [scan[s] for s in range(len(sensors)) for scan in truth.sources]
+            arrays["measurement_sources"] = np.concatenate(flat)
+    return arrays
+
+
+def _check_shape(arrays: dict[str, Array], name: str, shape: tuple[int, ...]) -> None:
+    if arrays[name].shape != shape:
+        raise InvalidInputError(f"the field {name!r} has shape {arrays[name].shape}, expected {shape}")
+
+
+def _check_offsets(offsets: Array, name: str) -> None:
+    if (offsets[..., 0] != 0).any() or (np.diff(offsets, axis=-1) < 0).any():
+        raise InvalidInputError(f"the field {name!r} must begin with 0 and not decrease")
+
+
+def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
+    count, scans = len(arrays["sensor_kind"]), len(arrays["times"])
+    if not count:
+        raise InvalidInputError("the field 'sensor_kind' is empty, expected at least one sensor")
+    for name in ("sensor_name", "sensor_dim", "sensor_detection_probability", "sensor_false_alarm_rate"):
+        _check_shape(arrays, name, (count,))
+    _check_shape(arrays, "sensor_position", (count, 3))
+    dims = arrays["sensor_dim"]
+    if dims.min() < 1 or dims.max() > 3:
+        raise InvalidInputError(
+            f"the field 'sensor_dim' must hold 1, 2 or 3, got {dims.min()} to {dims.max()}"
+        )
+    _check_shape(arrays, "sensor_covariance", (int((dims**2).sum()),))
+    _check_shape(arrays, "sensor_field_of_view", (int(dims.sum()), 2))
+    sensors = []
+    square, row = 0, 0
+    for s, dim in enumerate(int(d) for d in dims):
+        kind = str(arrays["sensor_kind"][s])
+        if kind not in KINDS:
+            raise InvalidInputError(
+                f"the field 'sensor_kind' has {kind[:40]!r} for sensor {s}, "
+                f"expected one of {', '.join(KINDS)}"
+            )
+        covariance = arrays["sensor_covariance"][square : square + dim * dim].reshape(dim, dim)
+        try:
+            sensors.append(
+                KINDS[kind](
+                    name=str(arrays["sensor_name"][s]),
+                    position=arrays["sensor_position"][s],
+                    noise=covariance,
+                    detection_probability=float(arrays["sensor_detection_probability"][s]),
+                    false_alarm_rate=float(arrays["sensor_false_alarm_rate"][s]),
+                    field_of_view=arrays["sensor_field_of_view"][row : row + dim],
+                )
+            )
+        except InvalidInputError as error:
+            raise InvalidInputError(f"sensor {s}: {error}") from error
+        square, row = square + dim * dim, row + dim
+    measurements, rows = _split_measurements(arrays, dims, scans)
+    return {
+        "sensors": sensors,
+        "times": arrays["times"],
+        "measurements": measurements,
+        "region": arrays.get("region"),
+        "truth": _read_truth(arrays, scans, rows),
+        "name": str(arrays["name"][()]) if "name" in arrays else "",
+    }
+
+
+def _split_measurements(arrays: dict[str, Array], dims: Array, scans: int) -> tuple[list[list[Array]], Array]:
+    offsets, values = arrays["measurement_offsets"], arrays["measurement_values"]
+    _check_shape(arrays, "measurement_offsets", (len(dims), scans + 1))
+    _check_offsets(offsets, "measurement_offsets")
+    # Python integers: hostile offsets must not wrap around
+    total = sum(int(n) * int(d) for n, d in zip(offsets[:, -1], dims, strict=True))
+    _check_shape(arrays, "measurement_values", (total,))
+    measurements: list[list[Array]] = [[] for _ in range(scans)]
+    start = 0
+    for dim, bounds in zip(dims, offsets, strict=True):
+        block = values[start : start + int(bounds[-1] * dim)].reshape(-1, int(dim))
+        start += block.size
+        for k in range(scans):
+            measurements[k].append(block[bounds[k] : bounds[k + 1]])
+    return measurements, offsets
+
+
+def _read_truth(arrays: dict[str, Array], scans: int, rows: Array) -> dict[str, Any] | None:
+    names = ("truth_offsets", "truth_ids", "truth_positions")
+    present = [name for name in names if name in arrays]
+    if not present:
+        if "measurement_sources" in arrays:
+            raise InvalidInputError("the field 'measurement_sources' needs the fields 'truth_...'")
+        return None
+    if len(present) < len(names):
+        missing = next(name for name in names if name not in arrays)
+        raise InvalidInputError(f"the field {missing!r} is missing")
+    bounds = arrays["truth_offsets"]
+    _check_shape(arrays, "truth_offsets", (scans + 1,))
+    _check_offsets(bounds, "truth_offsets")
+    _check_shape(arrays, "truth_ids", (int(bounds[-1]),))
+    _check_shape(arrays, "truth_positions", (int(bounds[-1]), 3))
+    sources = None
+    if "measurement_sources" in arrays:
+        totals = [int(n) for n in rows[:, -1]]
+        _check_shape(arrays, "measurement_sources", (sum(totals),))
+        blocks = np.split(arrays["measurement_sources"], np.cumsum(totals)[:-1])
+        sources = [
+            [block[row[k] : row[k + 1]] for block, row in zip(blocks, rows, strict=True)]
+            for k in range(scans)
+        ]
+    return {
+        "target_ids": [arrays["truth_ids"][bounds[k] : bounds[k + 1]] for k in range(scans)],
+        "positions": [arrays["truth_positions"][bounds[k] : bounds[k + 1]] for k in range(scans)],
+        "sources": sources,
+    }

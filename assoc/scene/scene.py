@@ -1,0 +1,322 @@
+"""A scene: sensors, what they measured in every scan, and the truth where it is known."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.scene.file import load_parts, save_parts
+from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
+from assoc.sensors.base import ANGLES, finite_array
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+# a planar scene still needs some height for the prior; radars see aircraft up to about here (metres)
+_DEFAULT_HEIGHT = 20_000.0
+
+
+def _integers(value: object, what: str, length: int) -> Array:
+    array = np.asarray(value)
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu" or array.shape != (length,):
+        raise InvalidInputError(
+            f"{what} must be integers of shape ({length},), got {array.dtype} of shape {array.shape}"
+        )
+    array = array.astype(np.int64)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth:
+    """What really was there.
+
+    Parameters
+    ----------
+    target_ids : sequence over scans of int arrays (T_k,)
+        The targets present, each id (0 or more) once per scan.
+    positions : sequence over scans of arrays (T_k, 3)
+        Where they were, metres.
+    sources : sequence over scans of sequences over sensors of int arrays (n,), optional
+        The target that caused each measurement, or -1 for a false alarm.
+    """
+
+    target_ids: Sequence[Array]
+    positions: Sequence[Array]
+    sources: Sequence[Sequence[Array]] | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.target_ids) != len(self.positions):
+            raise InvalidInputError(
+                f"truth: target_ids has {len(self.target_ids)} scans, positions has {len(self.positions)}"
+            )
+        ids, places = [], []
+        for k, (one, where) in enumerate(zip(self.target_ids, self.positions, strict=True)):
+            checked = _integers(one, f"truth: target_ids of scan {k}", len(one))
+            if checked.size and (checked.min() < 0 or len(np.unique(checked)) != len(checked)):
+                raise InvalidInputError(f"truth: target_ids of scan {k} must be 0 or more and different")
+            ids.append(checked)
+            place = np.zeros((0, 3)) if len(one) == 0 and np.size(where) == 0 else where
+            places.append(finite_array(place, f"truth: positions of scan {k}", (len(one), 3)))
+        object.__setattr__(self, "target_ids", tuple(ids))
+        object.__setattr__(self, "positions", tuple(places))
+        if self.sources is not None:
+            sources = []
+            for k, scan in enumerate(self.sources):
+                row = [
+                    _integers(s, f"truth: sources of scan {k}, sensor {i}", len(s))
+                    for i, s in enumerate(scan)
+                ]
+                if any(s.size and s.min() < -1 for s in row):
+                    raise InvalidInputError(
+                        f"truth: sources of scan {k} must be target ids or -1 (false alarm)"
+                    )
+                sources.append(tuple(row))
+            object.__setattr__(self, "sources", tuple(sources))
+
+    def __repr__(self) -> str:
+        targets = len({int(i) for one in self.target_ids for i in one})
+        return f"Truth({targets} targets, {len(self.target_ids)} scans)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scan:
+    """All measurements of one instant.
+
+    Attributes
+    ----------
+    index, time : int, float
+        Number of the scan from 0, time stamp in seconds.
+    measurements : tuple over sensors of arrays (n_s, d_s)
+    sources : tuple over sensors of int arrays (n_s,), or None
+        Target id of each measurement, -1 for a false alarm; None where it is not known.
+    truth_ids, truth_positions : arrays (T,) and (T, 3), or None
+    """
+
+    index: int
+    time: float
+    measurements: tuple[Array, ...]
+    sources: tuple[Array, ...] | None = None
+    truth_ids: Array | None = None
+    truth_positions: Array | None = None
+
+    @property
+    def sizes(self) -> Array:
+        """Measurements per sensor, int32 (S,)."""
+        return np.array([len(z) for z in self.measurements], dtype=np.int32)
+
+    def __repr__(self) -> str:
+        sizes = " + ".join(str(len(z)) for z in self.measurements)
+        return f"Scan({self.index}, t = {self.time:g} s, {sizes} measurements)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene:
+    """Sensors and their measurements over a number of scans.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+        At least one.
+    times : array_like (K,)
+        Time stamps in seconds, not decreasing; at least one scan.
+    measurements : sequence over scans of sequences over sensors of arrays (n, d_s)
+        What each sensor reported; n may be 0.
+    region : array_like (3, 2), optional
+        Lower and upper bounds of x, y, z in metres. It is the prior for what the measurements leave
+        open (the height for range-azimuth radars). By default the box around the sensors'
+        fields of view, from the lowest sensor to 20 km above it.
+    truth : Truth, optional
+    name : str, optional
+
+    Raises
+    ------
+    InvalidInputError
+        One line that names the argument and what was expected.
+    """
+
+    sensors: Sequence[Sensor]
+    times: Array
+    measurements: Sequence[Sequence[Array]]
+    region: Array = None  # type: ignore[assignment]  # always an array once made
+    truth: Truth | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "sensors", tuple(self.sensors))
+        if not self.sensors:
+            raise InvalidInputError("sensors: the scene has none, expected at least one")
+        for s, sensor in enumerate(self.sensors):
+            if not isinstance(sensor, Sensor):
+                raise InvalidInputError(
+                    f"sensors: number {s} is a {type(sensor).__name__}, expected a Sensor"
+                )
+        if not isinstance(self.name, str):
+            raise InvalidInputError(f"name must be text, got {type(self.name).__name__}")
+        times = finite_array(self.times, "times")
+        if times.ndim != 1 or not times.size:
+            raise InvalidInputError(f"times must have shape (K,) with K >= 1, got {times.shape}")
+        if (np.diff(times) < 0).any():
+            raise InvalidInputError(
+                f"times must not decrease, scan {int(np.argmax(np.diff(times) < 0)) + 1} does"
+            )
+        put(self, "times", times)
+        put(self, "measurements", self._checked_measurements())
+        put(self, "region", self._checked_region())
+        if self.truth is not None:
+            self._check_truth(self.truth)
+
+    def _checked_measurements(self) -> tuple[tuple[Array, ...], ...]:
+        if len(self.measurements) != self.num_scans:
+            raise InvalidInputError(
+                f"measurements: {len(self.measurements)} scans, but times has {self.num_scans}"
+            )
+        result = []
+        for k, scan in enumerate(self.measurements):
+            if len(scan) != len(self.sensors):
+                raise InvalidInputError(
+                    f"measurements: scan {k} has {len(scan)} sensors, expected {len(self.sensors)}"
+                )
+            row = []
+            for s, (z, sensor) in enumerate(zip(scan, self.sensors, strict=True)):
+                what = f"measurements of scan {k}, sensor {s}"
+                array = finite_array(np.zeros((0, sensor.dim)) if np.size(z) == 0 else z, what)
+                if array.ndim != 2 or array.shape[1] != sensor.dim:
+                    raise InvalidInputError(f"{what} must have shape (n, {sensor.dim}), got {array.shape}")
+                row.append(array)
+            result.append(tuple(row))
+        return tuple(result)
+
+    def _checked_region(self) -> Array:
+        region = finite_array(
+            default_region(self.sensors) if self.region is None else self.region, "region", (3, 2)
+        )
+        if (region[:, 0] > region[:, 1]).any() or (region[:, 0] == region[:, 1]).all():
+            raise InvalidInputError("region must have lower <= upper for x, y, z, and some extent")
+        return region
+
+    def _check_truth(self, truth: Truth) -> None:
+        if not isinstance(truth, Truth):
+            raise InvalidInputError(f"truth is a {type(truth).__name__}, expected a Truth")
+        if len(truth.target_ids) != self.num_scans:
+            raise InvalidInputError(f"truth has {len(truth.target_ids)} scans, expected {self.num_scans}")
+        if truth.sources is None:
+            return
+        if len(truth.sources) != self.num_scans:
+            raise InvalidInputError(
+                f"truth: sources has {len(truth.sources)} scans, expected {self.num_scans}"
+            )
+        for k, (sources, scan) in enumerate(zip(truth.sources, self.measurements, strict=True)):
+            if [len(s) for s in sources] != [len(z) for z in scan]:
+                raise InvalidInputError(
+                    f"truth: sources of scan {k} are {[len(s) for s in sources]} per sensor, "
+                    f"the measurements {[len(z) for z in scan]}"
+                )
+
+    @property
+    def num_scans(self) -> int:
+        """Number of scans, K."""
+        return len(self.times)
+
+    def scan(self, k: int) -> Scan:
+        """Scan number `k`, counted from 0 (negative: from the end).
+
+        Raises
+        ------
+        InvalidInputError
+            There is no such scan.
+        """
+        if not isinstance(k, (int, np.integer)) or not -self.num_scans <= k < self.num_scans:
+            raise InvalidInputError(
+                f"scan {k!r} does not exist, the scene has scans 0 to {self.num_scans - 1}"
+            )
+        k = int(k) % self.num_scans
+        truth = self.truth
+        return Scan(
+            index=k,
+            time=float(self.times[k]),
+            measurements=tuple(self.measurements[k]),
+            sources=None if truth is None or truth.sources is None else tuple(truth.sources[k]),
+            truth_ids=None if truth is None else truth.target_ids[k],
+            truth_positions=None if truth is None else truth.positions[k],
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the scene as an npz file of format "assoc.scene"; the file appears whole or not at all."""
+        save_parts(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Scene:
+        """Read a scene file.
+
+        Raises
+        ------
+        InvalidInputError
+            The file is not a sound scene; the message begins with the path and names the field.
+        """
+        parts = load_parts(path)
+        try:
+            truth = parts.pop("truth")
+            return cls(**parts, truth=None if truth is None else Truth(**truth))
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{path}: {error}") from error
+
+    def __repr__(self) -> str:
+        name = f"{self.name!r}, " if self.name else ""
+        count = sum(len(z) for scan in self.measurements for z in scan)
+        known = f", {self.truth!r}" if self.truth is not None else ""
+        return (
+            f"Scene({name}{len(self.sensors)} sensors, {self.num_scans} scans, {count} measurements{known})"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks and reports show: one row a sensor."""
+        from assoc._text.html import escape, table
+
+        rows = []
+        for s, sensor in enumerate(self.sensors):
+            counts = [len(scan[s]) for scan in self.measurements]
+            place = ", ".join(f"{x:g}" for x in sensor.position)
+            sigmas = np.sqrt(np.diagonal(sensor.covariance))
+            noise = ", ".join(
+                f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} m"
+                for name, sigma in zip(sensor.components, sigmas, strict=False)
+            )
+            rows.append(
+                [sensor.name or s + 1, type(sensor).__name__, place, noise, f"{sensor.detection_probability:g}"]
+                + [f"{sensor.false_alarm_rate:g}", f"{np.mean(counts):.3g}"]
+            )
+        headers = ["sensor", "kind", "place (m)", "noise (1 σ)", "P_d"]
+        headers += ["false alarms per scan", "measurements per scan"]
+        return f"<p>{escape(repr(self))}</p>{table(headers, rows, numbers=(4, 5, 6))}"
+
+
+def default_region(sensors: Sequence[Sensor]) -> Array:
+    """Box of x, y, z around what the sensors can see, shape (3, 2), metres; see `Scene`."""
+    boxes = []
+    for sensor in sensors:
+        if isinstance(sensor, (Radar3D, Radar2D)):
+            reach = max(float(sensor.field_of_view[0, 1]), 1.0)
+            boxes.append(np.stack([sensor.position[:2] - reach, sensor.position[:2] + reach], axis=1))
+        elif isinstance(sensor, PositionSensor):
+            boxes.append(sensor.field_of_view[:2])
+    places = np.array([sensor.position for sensor in sensors])
+    if not boxes:
+        # bearings alone say nothing of distance: take the surroundings of the sensors, at least 100 km
+        reach = max(100_000.0, float(np.ptp(places[:, :2], axis=0).max()))
+        boxes.append(np.stack([places[:, :2].min(axis=0) - reach, places[:, :2].max(axis=0) + reach], axis=1))
+    floor = float(places[:, 2].min())
+    heights = [(floor, floor + _DEFAULT_HEIGHT)]
+    heights += [tuple(s.field_of_view[2]) for s in sensors if isinstance(s, PositionSensor) and s.dim == 3]
+    plane = np.stack([np.min(boxes, axis=0)[:, 0], np.max(boxes, axis=0)[:, 1]], axis=1)
+    return np.vstack([plane, [[min(h[0] for h in heights), max(h[1] for h in heights)]]])
+
+
+__all__ = ["Scan", "Scene", "Truth", "default_region"]

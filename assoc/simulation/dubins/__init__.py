@@ -1,0 +1,1 @@
+"""Dubins paths, and the way around obstacles."""

@@ -1,0 +1,1 @@
+"""The ant colony: the max-min colony and the paper's rule."""

@@ -1,0 +1,192 @@
+"""The ant colony of the paper, equations 7 to 11 to the letter.
+
+Nodes are the tuples, false alarms among them. In the first cycle each ant starts on a random different node
+and goes on to the allowed node of largest visibility eta = 1 / c (eq. 7). In later cycles an ant starts on a
+node of its own previous tour and draws the next node by eq. 8. A tour ends when no node is allowed; then
+pheromone evaporates and is laid, 1 / L_k on each node of ant k's tour (eqs. 9-11); it starts equal to the
+visibility. The search ends when all ants have walked the same tour.
+
+Eq. 7 needs positive costs, and eq. 5 gives negative ones: c is replaced by an order-keeping positive
+transform, which the parameter ``visibility`` selects; L_k is the sum of the transformed costs of a tour.
+Costs count from the false alarms: tuples that cost no less than their singletons are not nodes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system import memory
+from assoc._system.clock import now
+from assoc._system.compiled import njit
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.packing.components.component import bound_of_choice
+from assoc.packing.neighbourhoods.insertion import Cover
+from assoc.packing.packing import Packing
+from assoc.packing.run import Outcome, Run
+
+if TYPE_CHECKING:
+    from assoc.solvers.aco.solve import AcoParameters
+
+Floats = NDArray[np.float64]
+
+
+def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
+    """Run the paper's ant colony on the whole problem; one iteration is one cycle of all ants.
+
+    Raises
+    ------
+    InvalidInputError
+        ``visibility="reciprocal"`` with costs that are not positive.
+    InfeasibleError
+        No ant completed a tour (possible only without dummies).
+    """
+    nodes, costs = nodes_of(packing)
+    if costs.size == 0:
+        return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
+    positive = transformed(costs, parameters.visibility, parameters.scale)
+    visibility = 1.0 / positive  # eq. 7
+    pheromone = visibility.copy()
+    # their tours, and the owners of rows from which they are made
+    memory.require(
+        8.0 * parameters.ants * packing.num_rows,
+        f"ants = {parameters.ants} on {packing.num_rows} measurements",
+        "take fewer ants",
+    )
+    tours = np.full((parameters.ants, packing.num_rows), -1, dtype=np.int32)
+    lengths = np.zeros(parameters.ants, dtype=np.int64)
+    starts = run.rng.permutation(costs.size)[np.arange(parameters.ants) % costs.size]
+    best: NDArray[np.int32] | None = None
+    best_weight = np.inf
+    cycle, cut_off = 0, False
+    while cycle < parameters.iterations:
+        if cycle > 0:
+            starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
+        probability = pheromone**parameters.alpha * visibility**parameters.beta  # numerator of eq. 8
+        value = visibility if cycle == 0 else probability
+        owners = _cycle(nodes, value, cycle == 0, starts, tours, lengths, run.rng, run.deadline())
+        cycle += 1
+        complete = (owners[:, ~packing.slack] >= 0).all(axis=1)
+        for k in np.flatnonzero(complete):
+            tour = tours[k, : lengths[k]]
+            weight = float(costs[tour].sum())
+            if weight < best_weight:
+                best, best_weight = tour[tour < packing.num_columns].copy(), weight
+                run.record(cycle, weight, -np.inf)
+        _lay(pheromone, positive, tours, lengths, parameters.rho)
+        if run.watch is not None:
+            run.watch(cycle, pheromone.copy())
+        if (owners == owners[0]).all() or run.should_stop():
+            break
+    else:
+        cut_off = True
+    if best is None:
+        cover = Cover.empty(packing)
+        if not cover.complete(run):
+            raise InfeasibleError("no ant completed a tour: the problem may have no solution")
+        best = cover.columns()
+    bound, duals = bound_of_choice(packing, best, run)
+    run.record(cycle, float(packing.weights[best].sum()), bound)
+    if cut_off:
+        # said only now: a run that is stopped does not raise its bound
+        run.stopped_by = run.stopped_by or "iterations"
+    return Outcome(best, cycle, bound, duals)
+
+
+def nodes_of(packing: Packing) -> tuple[NDArray[np.int32], Floats]:
+    """Rows of the nodes, first the packing's columns, then a false alarm for each row with slack; their costs."""
+    free = np.flatnonzero(packing.slack)
+    alone = np.full((free.size, packing.cols.shape[1]), -1, dtype=np.int32)
+    alone[:, 0] = free
+    return np.concatenate([packing.cols, alone]), np.concatenate([packing.weights, np.zeros(free.size)])
+
+
+def transformed(costs: Floats, kind: str, scale: float) -> Floats:
+    """Return positive costs in the same order, for eq. 7.
+
+    Raises
+    ------
+    InvalidInputError
+        ``kind="reciprocal"`` and a cost is not positive.
+    """
+    if kind == "exponential":
+        # beyond e^600 differences of visibility no longer matter but powers of it would overflow
+        return np.exp(np.minimum((costs - costs.min()) / scale, 150.0))
+    if kind == "shifted":
+        return costs - costs.min() + scale
+    if costs.min() <= 0:
+        raise InvalidInputError("visibility: 'reciprocal' needs positive costs; take 'exponential' or 'shifted'")
+    return costs
+
+
+@njit
+def _cycle(
+    nodes: Any, value: Floats, greedy: bool, starts: Any, tours: Any, lengths: Any, rng: Any, deadline: float
+) -> Any:
+    """Walk all ants' tours; the owner (node) of each row for each ant. Ants that are late stay at home."""
+    num, num_sensors = nodes.shape
+    num_ants, num_rows = tours.shape
+    owners = np.full((num_ants, num_rows), -1, np.int32)
+    allowed = np.empty(num, np.int32)
+    for ant in range(num_ants):
+        if deadline < np.inf and now() > deadline:
+            lengths[ant] = 0
+            continue
+        count = num
+        for j in range(num):
+            allowed[j] = j
+        length = 0
+        node = starts[ant]
+        while not (deadline < np.inf and now() > deadline):
+            tours[ant, length] = node
+            length += 1
+            for s in range(num_sensors):
+                if nodes[node, s] >= 0:
+                    owners[ant, nodes[node, s]] = node
+            # the tabu list: nodes that share a measurement with the tour
+            kept = 0
+            total = 0.0
+            for i in range(count):
+                j = allowed[i]
+                fits = True
+                for s in range(num_sensors):
+                    if nodes[j, s] >= 0 and owners[ant, nodes[j, s]] >= 0:
+                        fits = False
+                        break
+                if fits:
+                    allowed[kept] = j
+                    kept += 1
+                    total += value[j]
+            count = kept
+            if count == 0:
+                break
+            if greedy:
+                node = allowed[0]
+                for i in range(1, count):
+                    if value[allowed[i]] > value[node]:
+                        node = allowed[i]
+            else:
+                draw = rng.random() * total
+                node = allowed[count - 1]
+                for i in range(count):
+                    draw -= value[allowed[i]]
+                    if draw < 0.0:
+                        node = allowed[i]
+                        break
+        lengths[ant] = length
+    return owners
+
+
+@njit
+def _lay(pheromone: Floats, positive: Floats, tours: Any, lengths: Any, rho: float) -> None:
+    """Eqs. 9-11."""
+    for j in range(pheromone.size):
+        pheromone[j] *= rho
+    for ant in range(tours.shape[0]):
+        total = 0.0
+        for i in range(lengths[ant]):
+            total += positive[tours[ant, i]]
+        for i in range(lengths[ant]):
+            pheromone[tours[ant, i]] += 1.0 / total

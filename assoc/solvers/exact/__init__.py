@@ -1,0 +1,1 @@
+"""Proven optima: reduction, dual bound, branch and bound."""

@@ -1,0 +1,87 @@
+"""Exact: bound, heuristic, reduced-cost fixing, then branch and bound on what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from assoc.packing.run import Outcome, Parameters, Run
+from assoc.solution import OPTIMALITY_TOLERANCE
+
+if TYPE_CHECKING:
+    from assoc.packing.packing import Packing
+
+# column visits of the search that closes what is left where costs cancel
+_VISITS = 20_000_000
+
+
+@dataclass(frozen=True)
+class ExactParameters(Parameters):
+    """Parameters of the exact solver.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of branch and bound at the most; what is then open keeps its gap.
+    patience : int
+        Iterations of tabu search without improvement on an open part, for every 60 measurements, before
+        branching starts; while it is branched on, one more iteration follows every three turns.
+    """
+
+    nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
+    patience: int = field(
+        default=10, metadata={"help": "iterations of tabu search without improvement before branching starts"}
+    )
+
+    def __post_init__(self) -> None:
+        self._require(self.nodes >= 0, "nodes", "a whole number >= 0")
+        self._require(self.patience >= 0, "patience", "a whole number >= 0")
+
+
+def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
+    """Find the optimum and prove it; at the time limit return the best solution and a valid bound.
+
+    One iteration is one node of branch and bound.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution (proved), or none was found in the time.
+    """
+    from assoc.solvers.exact.proof import prove
+
+    outcome = prove(packing, parameters.nodes, parameters.patience, run)
+    return outcome if run.stopped_by else _where_costs_cancel(packing, outcome, run)
+
+
+def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
+    """Close a gap that is small beside the weights but not beside the cost, which is their difference to the offset.
+
+    The parts were searched to 1e-9 of their weights. The incumbent is the optimum to that already, so that a search
+    which asks for more has little left to do.
+    """
+    last = run.trace[-1]
+    wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(last.cost))
+    if last.cost - last.lower_bound <= 4.0 * wanted:
+        return outcome
+    import numpy as np
+
+    from assoc.packing.bounds.dual_ascent import dual_bound
+    from assoc.packing.branching.search import Search
+
+    chosen = packing.weights[outcome.columns]
+    weight, size = float(chosen.sum()), float(np.abs(chosen).sum())
+    # a gap that another cause has left open, or that rounding alone would leave, is not closed so
+    if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
+        return outcome
+    search = Search(packing, dual_bound(packing, run=run), weight, wanted, run.deadline())
+    most = max(50, _VISITS // packing.num_columns)
+    while not search.done and search.nodes < most and not run.should_stop():
+        search.run(max(1, 20_000 // packing.num_columns))
+    columns = outcome.columns if search.columns is None else search.columns
+    bound = max(outcome.lower_bound, search.lower_bound)
+    nodes = outcome.iterations + search.nodes
+    return replace(outcome, columns=columns, iterations=nodes, lower_bound=bound, duals=None)
+
+
+parameters = ExactParameters

@@ -1,0 +1,1 @@
+"""The cheapest tuple that still fits, again and again."""

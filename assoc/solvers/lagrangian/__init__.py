@@ -1,0 +1,1 @@
+"""Successive Lagrangian relaxation down to two dimensions."""

@@ -1,0 +1,323 @@
+"""Lagrangian relaxation from S dimensions to two, and recovery upward again.
+
+The constraints of sensors 3..S are relaxed with multipliers u (u <= 0 where a measurement may stay
+unused, free where it must be used). For each pair of measurements of the first two sensors only the cheapest
+column, by weight less its u, matters; what remains is a two-dimensional assignment, solved to the optimum:
+
+    L(u) = sum(u) + min { 2-D assignment of c_ij = min_j' (w_j' - u of its rows in sensors 3..S) } <= optimum
+
+Its duals together with u are feasible multipliers of the whole problem, which is how the bound is
+certified. Multipliers move along the subgradient g_r = 1 - (times that r is used) by Polyak's step. From
+the pairs a solution is recovered sensor by sensor: the tuples so far are assigned to the measurements of
+the next sensor, those of later sensors still priced by u, each step again an exact 2-D assignment.
+
+The multipliers start from the smoothed dual ascent (bounds.py), which is near the LP bound in milliseconds;
+columns whose reduced cost exceeds the gap are dropped on the way.
+
+References
+----------
+S. Deb, M. Yeddanapudi, K. Pattipati and Y. Bar-Shalom, "A generalized S-D assignment algorithm for
+multisensor-multitarget state estimation", IEEE Trans. AES 33, 523-538 (1997).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.packing.run import Outcome, Parameters, Run
+
+if TYPE_CHECKING:
+    from assoc.packing.neighbourhoods.insertion import Cover
+    from assoc.packing.packing import Packing
+
+Floats = NDArray[np.float64]
+
+_COARSE_LEVELS = 4
+_COARSE_PASSES = 10
+_POLISH_STEPS = 50
+_POLISH_ROUNDS = 20
+_POLISH_TUPLES = 20
+
+
+@dataclass(frozen=True)
+class LagrangianParameters(Parameters):
+    """Parameters of ``lagrangian``.
+
+    Attributes
+    ----------
+    iterations : int
+        Subgradient steps, each with one 2-D relaxation and one recovery.
+    gap : float
+        Stop when cost - bound <= gap * max(1, abs(cost)).
+    step : float
+        Factor of Polyak's step; halved after ``patience`` iterations in which the bound did not rise.
+    patience : int
+        See ``step``; after ten halvings the method has converged.
+    warm_start : bool
+        Start from the smoothed dual ascent; else from u = 0, as in the paper.
+    polish : bool
+        Improve every recovered solution by dimensionwise search and insertion with ejection, and the
+        best one at the end by cluster search.
+    """
+
+    iterations: int = field(default=100, metadata={"help": "subgradient steps"})
+    gap: float = field(default=1e-9, metadata={"help": "stop at this relative gap"})
+    step: float = field(default=1.0, metadata={"help": "factor of Polyak's step"})
+    patience: int = field(default=5, metadata={"help": "steps without a better bound until the factor is halved"})
+    warm_start: bool = field(default=True, metadata={"help": "start from the smoothed dual ascent, not from 0"})
+    polish: bool = field(default=True, metadata={"help": "improve recovered solutions by local search"})
+
+    def __post_init__(self) -> None:
+        for name in ("iterations", "patience"):
+            value = getattr(self, name)
+            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+            self._require(whole and value >= 1, name, "a whole number >= 1")
+        for name, low, high in (("gap", 0.0, 1.0), ("step", 1e-6, 10.0)):
+            value = getattr(self, name)
+            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+            self._require(number and low <= value <= high, name, f"a number in {low:g}..{high:g}")
+        for name in ("warm_start", "polish"):
+            self._require(isinstance(getattr(self, name), (bool, np.bool_)), name, "true or false")
+
+
+def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outcome:
+    """Relax and recover; one iteration is one subgradient step.
+
+    Raises
+    ------
+    InfeasibleError
+        There is no solution, or none was found.
+    """
+    from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
+    from assoc.packing.branching.feasibility import infeasible
+    from assoc.packing.kernels.sorting import ascending
+    from assoc.packing.neighbourhoods.insertion import Cover
+
+    if packing.num_columns == 0:
+        if packing.is_axial:
+            raise infeasible(packing)
+        return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0, np.zeros(packing.num_rows))
+    if parameters.warm_start:
+        # coarse: it need only be good enough to drop most columns before the rest is done
+        duals = dual_bound(packing, levels=_COARSE_LEVELS, passes=_COARSE_PASSES, run=run)
+    else:
+        duals = np.zeros(packing.num_rows)
+        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+    bound = certified_bound(packing, duals)
+    if bound == math.inf:
+        raise infeasible(packing)
+    if run.fallback is not None and run.should_stop():
+        return Outcome(run.fallback, 0, min(bound, float(packing.weights[run.fallback].sum())), duals)
+    search = _Search(packing, duals, parameters, run, bound)
+    search.iterate()
+    if parameters.polish:
+        search.polish()
+    columns = search.columns
+    if columns is None and run.fallback is not None:
+        columns = run.fallback.astype(np.int64)
+    if columns is None:
+        cover = Cover.empty(packing)
+        cover.add_greedily(ascending(packing.weights))
+        if not cover.complete(run):
+            raise infeasible(packing, run)
+        columns = cover.columns().astype(np.int64)
+    # the proof of a bound over the columns that are left needs the columns that were dropped, too
+    proof = search.proof
+    bound = min(search.bound, float(packing.weights[columns].sum()))
+    if search.cut_off:
+        run.stopped_by = run.stopped_by or "iterations"
+    return Outcome(columns, search.iterations, bound, proof)
+
+
+class _Search:
+    """The state of the method: multipliers, best bound, best solution, and the columns that are left."""
+
+    def __init__(
+        self, packing: Packing, duals: Floats, parameters: LagrangianParameters, run: Run, bound: float
+    ) -> None:
+        self.parameters = parameters
+        self.run = run
+        self.whole = packing
+        self.bound = bound
+        self.proof: Floats | None = duals
+        self.columns: NDArray[np.int64] | None = None
+        self.weight = math.inf
+        self.iterations = 0
+        self.cut_off = False
+        self._focus(packing, duals, np.arange(packing.num_columns))
+
+    def _focus(self, packing: Packing, duals: Floats, place: NDArray[np.int64]) -> None:
+        """Work on these columns from now on; ``place`` are theirs in the whole problem."""
+        from assoc.solvers.lagrangian.relaxation import Relaxation
+
+        self.packing = packing
+        self.place = place
+        self.relaxation = Relaxation(packing)
+        self.duals = duals
+        self.best = duals
+
+    def iterate(self) -> None:
+        """Relax, recover, step, until the gap is closed or nothing moves any more."""
+        factor = self.parameters.step
+        stalled = 0
+        while self.iterations < self.parameters.iterations:
+            self.iterations += 1
+            before = self.bound
+            subgradient = self._relax()
+            if subgradient is None:
+                # the columns left allow no solution better than the best one
+                self._raise_bound(self.weight, None)
+                break
+            if self.run.should_stop() and (self.columns is not None or self.run.fallback is not None):
+                break
+            self._recover()
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed() or self.run.should_stop():
+                break
+            if self.bound > before + 1e-9 * max(1.0, abs(before)):
+                stalled = 0
+            else:
+                stalled += 1
+                if stalled % self.parameters.patience == 0:
+                    factor *= 0.5
+                    self.duals = self.best
+                    if factor < self.parameters.step / 1024.0:
+                        break
+                    continue
+            dropped = self._drop_columns()
+            if self.iterations == 1 and self.parameters.warm_start:
+                self._refine()
+            elif not dropped and not self._step(subgradient, factor):
+                break
+        else:
+            self.cut_off = True
+
+    def polish(self) -> None:
+        """Improve the best solution by cluster search, within the columns that are left."""
+        from assoc.packing.neighbourhoods.cluster import ClusterSearch
+        from assoc.packing.neighbourhoods.insertion import Cover
+
+        if self.columns is None or self._gap_closed() or self.run.should_stop():
+            return
+        search = ClusterSearch.of(self.packing, self.best)
+        cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.place, self.columns)))
+        for _ in range(_POLISH_ROUNDS):
+            if self.run.should_stop():
+                return
+            change, _ = search.run(
+                cover.owner,
+                self.run.rng,
+                _POLISH_STEPS,
+                _POLISH_TUPLES * self.packing.cols.shape[1],
+                deadline=self.run.deadline(),
+            )
+            if change == 0.0:
+                return
+            self.weight = cover.weight
+            self.columns = self.place[cover.columns()]
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed():
+                return
+
+    def _gap_closed(self) -> bool:
+        if self.weight == math.inf:
+            return False
+        closed = self.weight - self.bound <= self.parameters.gap * max(1.0, abs(self.weight + self.run.offset))
+        if closed and not self.run.stopped_by:
+            self.run.stopped_by = "gap"
+        return closed
+
+    def _relax(self) -> Floats | None:
+        """Solve the 2-D relaxation; returns the subgradient, None where it has no solution."""
+        from assoc.packing.bounds.dual_ascent import certified_bound
+
+        answer = self.relaxation.solve(self.duals)
+        if answer is None:
+            return None
+        self.duals, subgradient = answer
+        bound = certified_bound(self.packing, self.duals)
+        if bound > self.bound:
+            self._raise_bound(bound, self.duals if self.packing is self.whole else None)
+            self.best = self.duals
+        return subgradient
+
+    def _raise_bound(self, bound: float, proof: Floats | None) -> None:
+        self.bound, self.proof = max(self.bound, bound), proof
+
+    def _recover(self) -> None:
+        from assoc.packing.neighbourhoods.dimensionwise import improve
+        from assoc.packing.neighbourhoods.insertion import Cover
+
+        columns = self.relaxation.recover(self.duals)
+        if columns is None:
+            return
+        cover = Cover.of(self.packing, columns)
+        better = self._offer(cover)
+        if not self.parameters.polish:
+            return
+        if better:
+            # it may be good enough as it is, for the gap asked for or for the caller
+            self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
+            if self._gap_closed() or self.run.should_stop():
+                return
+        cover.improve(self.run.deadline())
+        improve(self.packing, cover.owner, deadline=self.run.deadline())
+        self._offer(cover)
+
+    def _offer(self, cover: Cover) -> bool:
+        """Keep a cover if it is the best so far; whether it was."""
+        weight = cover.weight
+        if weight >= self.weight:
+            return False
+        self.weight = weight
+        self.columns = self.place[cover.columns()]
+        return True
+
+    def _drop_columns(self) -> bool:
+        """Drop what no better solution can use; True if that was worth it."""
+        from assoc.packing.bounds.dual_ascent import reduced_costs
+
+        if self.weight == math.inf:
+            return False
+        room = self.weight - self.bound + 1e-9 * max(1.0, abs(self.weight))
+        reduced = reduced_costs(self.packing, self.best)
+        # the multipliers prove their own bound, which may be less than the best
+        slack = max(0.0, self.bound - float(self.best.sum()))
+        keep = reduced <= room + slack
+        if np.count_nonzero(keep) > 0.5 * keep.size:
+            return False
+        smaller = self.packing.restrict(keep)
+        place = self.place[smaller.origin]
+        self._focus(smaller, self.best[smaller.row_origin], place)
+        return True
+
+    def _refine(self) -> None:
+        """Do the smoothed dual ascent in full, on the columns that are left."""
+        from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+
+        duals = dual_bound(self.packing, run=self.run)
+        bound = certified_bound(self.packing, duals)
+        if bound > certified_bound(self.packing, self.best):
+            self.duals = self.best = duals
+            if bound > self.bound:
+                self._raise_bound(bound, duals if self.packing is self.whole else None)
+
+    def _step(self, subgradient: Floats, factor: float) -> bool:
+        """Polyak's step on the relaxed rows; False where the subgradient is 0 (u is optimal)."""
+        slack = self.packing.slack
+        direction = np.where(slack & (self.duals >= 0.0) & (subgradient > 0.0), 0.0, subgradient)
+        norm = float(direction @ direction)
+        if norm == 0.0:
+            return False
+        target = self.weight if self.weight < math.inf else self.bound + 0.1 * max(1.0, abs(self.bound))
+        moved = self.duals + factor * max(target - self.bound, 1e-9) / norm * direction
+        self.duals = np.where(slack, np.minimum(moved, 0.0), moved)
+        return True
+
+
+parameters = LagrangianParameters

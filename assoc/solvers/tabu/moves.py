@@ -1,0 +1,225 @@
+"""Moves of the tabu search: forced insertion with ejection, tenure, aspiration.
+
+The gain of every column is kept up to date: it changes only for columns on rows that changed. A move inserts
+the column of least gain that is not tabu; what it ejects may not return for ``tenure`` moves, unless it
+would lead to a solution better than the best (aspiration). Rows that a move leaves open are filled at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import now
+from assoc._system.compiled import njit
+from assoc.packing.components.component import Part, incomplete
+from assoc.packing.neighbourhoods.insertion import Cover, insert, insertion_gain, penalised
+from assoc.solvers.aco.max_min import random_cover
+
+if TYPE_CHECKING:
+    from assoc.solvers.tabu.solve import TabuParameters
+
+Floats = NDArray[np.float64]
+
+# every third restart is from a new solution, the others from the best
+_FRESH = 3
+# new solutions of which the best is taken
+_COVERS = 12
+
+
+class TabuSearch:
+    """The current solution of one part and its tabu list."""
+
+    def __init__(self, part: Part, parameters: TabuParameters) -> None:
+        self.parameters = parameters
+        self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
+        self.until = np.zeros(part.packing.num_columns, dtype=np.int64)
+        self.clock = 1
+        self.restarts = 0
+        self.owner: NDArray[np.int32] | None = None if part.best is None else part.best.copy()
+
+    def iterate(self, part: Part, rng: np.random.Generator) -> None:
+        """Some moves, then exact sub-steps on the best solution they met."""
+        packing, p = part.packing, self.parameters
+        forced = -1
+        if self.owner is None:
+            self.owner = self._afresh(part, rng)
+        elif part.best is not None and part.stalled and part.stalled % p.restart == 0:
+            self.restarts += 1
+            self.until[:] = 0
+            if self.restarts % _FRESH == 0:
+                # far from the best, where no chain of moves from it leads
+                self.owner = self._afresh(part, rng)
+            else:
+                self.owner = part.best.copy()
+                forced = self._force(part, rng)
+        best = self.owner.copy()
+        self.clock = _moves(
+            packing.cols,
+            self.weights,
+            packing.row_ptr,
+            packing.row_cols,
+            part.reduced,
+            self.owner,
+            best,
+            self.until,
+            self.clock,
+            p.moves,
+            p.tenure,
+            part.temperature,
+            forced,
+            rng,
+            part.deadline,
+        )
+        weight = part.polish(best)
+        part.offer(best, weight)
+        if p.clusters and not part.closed:
+            weight += part.improve(best, rng, p.clusters)
+            if part.offer(best, weight):
+                self.owner = best
+
+    def _afresh(self, part: Part, rng: np.random.Generator) -> NDArray[np.int32]:
+        """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
+        best, least = part.best, np.inf
+        for number in range(_COVERS):
+            owner = random_cover(part, self.weights, 2.0 ** (number % 6), rng)
+            weight = part.polish(owner)
+            if weight - part.bound > part.tolerance:
+                weight += part.improve(owner, rng, self.parameters.clusters)
+            part.offer(owner, weight)
+            if weight < least and not incomplete(part, owner):
+                best, least = owner, weight
+            if part.closed or part.late:
+                break
+        return Cover.empty(part.packing).owner if best is None else best.copy()
+
+    def _force(self, part: Part, rng: np.random.Generator) -> int:
+        """Return a column to insert and hold: on a row that costs much more than its multiplier allows.
+
+        The excess of the present solution over the bound is the sum of the reduced costs of its columns and
+        of -u over its uncovered rows: where a term is large, something better is near.
+        """
+        assert self.owner is not None
+        packing, owner = part.packing, self.owner
+        excess = np.where(owner >= 0, part.reduced[owner], -part.duals) + 1e-3 * part.temperature
+        excess = np.maximum(excess, 0.0)
+        row = int(rng.choice(excess.size, p=excess / excess.sum()))
+        columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
+        columns = columns[columns != owner[row]]
+        if columns.size == 0:
+            return -1
+        reduced = part.reduced[columns]
+        likely = np.exp(-(reduced - reduced.min()) / part.temperature)
+        return int(rng.choice(columns, p=likely / likely.sum()))
+
+
+@njit
+def _moves(
+    cols: Any,
+    weights: Floats,
+    row_ptr: Any,
+    row_cols: Any,
+    reduced: Floats,
+    owner: Any,
+    best: Any,
+    until: Any,
+    clock: int,
+    moves: int,
+    tenure: int,
+    temperature: float,
+    forced: int,
+    rng: Any,
+    deadline: float,
+) -> int:
+    """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
+
+    A ``forced`` column is inserted first and held for a third of the moves.
+    """
+    num, num_sensors = cols.shape
+    gain = np.empty(num)
+    for j in range(num):
+        gain[j] = insertion_gain(cols, weights, owner, j)
+    changed = np.empty(4 * num_sensors * (num_sensors + 1), np.int32)
+    ejected = np.empty(num_sensors, np.int32)
+    current = 0.0
+    record = 0.0
+    timed = deadline < np.inf
+    for move in range(moves):
+        if timed and now() > deadline:
+            break
+        clock += 1
+        held = forced if 3 * move < moves else -1
+        chosen = forced if move == 0 else -1
+        least = np.inf
+        for j in range(num if chosen < 0 else 0):
+            if gain[j] < least and (until[j] < clock or current + gain[j] < record - 1e-9):
+                inside = False
+                for s in range(num_sensors):
+                    if cols[j, s] >= 0:
+                        inside = owner[cols[j, s]] == j
+                        break
+                for s in range(num_sensors):
+                    if held >= 0 and cols[j, s] >= 0 and owner[cols[j, s]] == held:
+                        inside = True
+                if not inside:
+                    least = gain[j]
+                    chosen = j
+        if chosen < 0:
+            # everything is tabu: a random column is forced in
+            chosen = rng.integers(0, num)
+            if owner[_first(cols, chosen)] == chosen or chosen == held:
+                continue
+        current += gain[chosen]
+        count = 0
+        for s in range(num_sensors):
+            r = cols[chosen, s]
+            if r >= 0 and owner[r] >= 0:
+                seen = False
+                for i in range(count):
+                    seen = seen or ejected[i] == owner[r]
+                if not seen:
+                    ejected[count] = owner[r]
+                    count += 1
+        for i in range(count):
+            until[ejected[i]] = clock + tenure + rng.integers(0, tenure + 1)
+        num_changed = insert(cols, owner, chosen, changed, 0)
+        # rows left open take the best column that is free for them
+        last = num_changed
+        for i in range(last):
+            r = changed[i]
+            if owner[r] >= 0:
+                continue
+            fill, most = -1, -1e-12
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                j = row_cols[k]
+                if weights[j] < most and until[j] < clock and _free(cols, owner, j):
+                    fill, most = j, weights[j]
+            if fill >= 0 and num_changed + num_sensors <= changed.size:
+                current += weights[fill]
+                num_changed = insert(cols, owner, fill, changed, num_changed)
+        for i in range(num_changed):
+            r = changed[i]
+            for k in range(row_ptr[r], row_ptr[r + 1]):
+                gain[row_cols[k]] = insertion_gain(cols, weights, owner, row_cols[k])
+        if current < record - 1e-9:
+            record = current
+            best[:] = owner
+    return clock
+
+
+@njit
+def _first(cols: Any, j: int) -> int:
+    for s in range(cols.shape[1]):
+        if cols[j, s] >= 0:
+            return cols[j, s]
+    return 0
+
+
+@njit
+def _free(cols: Any, owner: Any, j: int) -> bool:
+    for s in range(cols.shape[1]):
+        if cols[j, s] >= 0 and owner[cols[j, s]] >= 0:
+            return False
+    return True

@@ -1,0 +1,78 @@
+"""Runs put together into batches that take about the same time, whatever a run takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from assoc.sweeps.setting import Setting
+from assoc.sweeps.worker import Batch, Result
+
+RunNumbers = tuple[int, int, int, int]
+"""Setting, source, repeat, scan; the first two as numbers."""
+
+MOST_RUNS = 2000
+
+
+class Batches:
+    """An iterator of batches; it learns from results how long runs take.
+
+    How runs are put together changes nothing in their results.
+
+    Parameters
+    ----------
+    settings : sequence of Setting
+    runs : iterator of (setting, source, repeat, scan)
+    seconds : float
+        What a batch should take.
+    """
+
+    def __init__(self, settings: Sequence[Setting], runs: Iterator[RunNumbers], seconds: float) -> None:
+        self._settings = settings
+        self._runs = runs
+        self._seconds = seconds
+        self._of_setting: dict[str, float] = {}
+        self._of_solver: dict[str, float] = {}
+        self._held: RunNumbers | None = None
+
+    def __iter__(self) -> Iterator[Batch]:
+        return self
+
+    def __next__(self) -> Batch:
+        chosen: list[RunNumbers] = []
+        expected = 0.0
+        while len(chosen) < MOST_RUNS:
+            run = self._held or next(self._runs, None)
+            self._held = None
+            if run is None:
+                break
+            expected += self._expected(self._settings[run[0]])
+            if chosen and expected > self._seconds:
+                self._held = run
+                break
+            chosen.append(run)
+        if not chosen:
+            raise StopIteration
+        local = {number: i for i, number in enumerate(dict.fromkeys(run[0] for run in chosen))}
+        settings = tuple(self._settings[number] for number in local)
+        return Batch(settings, [(local[run[0]], *run[1:]) for run in chosen])
+
+    def _expected(self, setting: Setting) -> float:
+        unknown = self._of_solver.get(setting.solver, self._seconds / 8)
+        return self._of_setting.get(setting.key, unknown)
+
+    def learn(self, result: Result) -> None:
+        """Take in how long a batch took; what is not the solvers' is shared among its runs."""
+        columns = result.columns
+        times = [time or 0.0 for time in columns["time"]]
+        beside = max(0.0, result.seconds - sum(times)) / len(times)
+        sums: dict[str, list[float]] = {}
+        for key, seconds in zip(columns["setting"], times, strict=True):
+            sums.setdefault(key, []).append(seconds + beside)
+        for setting in result.batch.settings:
+            mean = sum(sums[setting.key]) / len(sums[setting.key])
+            self._of_setting[setting.key] = _mixed(self._of_setting.get(setting.key), mean)
+            self._of_solver[setting.solver] = _mixed(self._of_solver.get(setting.solver), mean)
+
+
+def _mixed(old: float | None, new: float) -> float:
+    return new if old is None else (old + new) / 2

@@ -1,0 +1,163 @@
+"""Batches done by the workers of a dask.distributed scheduler."""
+
+from __future__ import annotations
+
+import queue
+import sys
+import time
+from collections.abc import Generator, Iterator
+from typing import Any
+
+from assoc.errors import AssocError, InvalidInputError
+from assoc.sweeps.worker import Batch, Job, Result, run_batch
+
+SECONDS_OF_A_BATCH = 0.5
+_CONNECT_SECONDS = 10.0
+_LOST = "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
+_ATTEMPTS = 5
+_BATCHES_PER_THREAD = 3
+
+
+def connect(address: str) -> Any:
+    """Connect to a scheduler.
+
+    Raises
+    ------
+    InvalidInputError
+        dask is not installed, or nobody answers there.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InvalidInputError(
+            "--scheduler: needs dask.distributed, which is not installed: python -m pip install 'assoc[dask]'"
+        ) from None
+    _quiet()
+    try:
+        client: Any = Client
+        return client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        raise InvalidInputError(f"--scheduler: no scheduler answers at {address} ({reason})") from None
+
+
+def _quiet() -> None:
+    """Keep distributed from writing its own account of lost connections to stderr: ours is one line."""
+    import logging
+
+    for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+class Cluster:
+    """The workers of a scheduler, at work on one job.
+
+    What all runs share is sent to every worker once. Workers may come and go: what a lost one had in hand
+    is done again by another, with the same result, because seeds belong to runs.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    job : Job
+    """
+
+    def __init__(self, client: Any, job: Job) -> None:
+        self._client = client
+        self._job = job
+        self._shared: Any = None
+        self._finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._running: dict[Any, tuple[Batch, int]] = {}
+
+    def run(self, batches: Iterator[Batch]) -> Iterator[Result]:
+        """Do batches and yield results as they come.
+
+        Raises
+        ------
+        InvalidInputError
+            The scheduler is lost, or a batch took several workers down with it.
+        """
+        self._wait_for_workers()
+        self._share()
+        left = True
+        while left or self._running:
+            while left and len(self._running) < self._room():
+                batch = next(batches, None)
+                if batch is None:
+                    left = False
+                else:
+                    self._submit(batch, 1)
+            try:
+                future = self._finished.get(timeout=1.0)
+            except queue.Empty:
+                self._check_scheduler()
+                continue
+            yield from self._take(future)
+
+    def _room(self) -> int:
+        return _BATCHES_PER_THREAD * max(1, sum(self._client.nthreads().values()))
+
+    def _share(self) -> None:
+        self._shared = self._client.scatter(self._job, broadcast=True, hash=False)
+
+    def _submit(self, batch: Batch, attempt: int) -> None:
+        future = self._client.submit(run_batch, self._shared, batch, pure=False)
+        self._running[future] = batch, attempt
+        future.add_done_callback(self._finished.put)
+
+    def _take(self, future: Any) -> Iterator[Result]:
+        from distributed import KilledWorker
+        from distributed.client import FutureCancelledError
+
+        batch, attempt = self._running.pop(future)
+        try:
+            yield future.result()
+        except AssocError:
+            raise
+        except (FutureCancelledError, KilledWorker) as error:
+            # the workers that held the job are gone, or they died of the batch
+            if attempt == _ATTEMPTS:
+                raise InvalidInputError(
+                    f"--scheduler: {attempt} attempts at a batch ended with the loss of workers "
+                    f"({' '.join(str(error).split())[:160]}); the same command goes on from there"
+                ) from None
+            self._check_scheduler()
+            self._wait_for_workers()
+            if self._shared.status != "finished":
+                self._share()
+            self._submit(batch, attempt + 1)
+        except Exception as error:
+            # a worker that cannot even import this package, say
+            self._check_scheduler()
+            raise InvalidInputError(
+                f"--scheduler: a worker failed: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+            ) from None
+
+    def _check_scheduler(self) -> None:
+        if self._client.status != "running":
+            raise InvalidInputError(_LOST)
+
+    def _wait_for_workers(self) -> None:
+        told = False
+        while not self._client.nthreads():
+            self._check_scheduler()
+            if not told:
+                print("assoc.sweep: the scheduler has no workers yet; waiting for one", file=sys.stderr)
+                told = True
+            time.sleep(0.2)
+
+
+def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator[Result]:
+    """Do batches on the workers of the scheduler at ``address``.
+
+    Raises
+    ------
+    InvalidInputError
+        See `connect` and `Cluster.run`.
+    """
+    client = connect(address)
+    try:
+        yield from Cluster(client, job).run(batches)
+    except OSError:  # timeouts and closed connections among them
+        raise InvalidInputError(_LOST) from None
+    finally:
+        client.close(timeout=2)

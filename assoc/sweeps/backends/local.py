@@ -1,0 +1,117 @@
+"""Batches done on this machine: in this process, or by joblib in several."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import signal
+import threading
+import uuid
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from assoc._system import temporary
+from assoc._system.processes import end_with, require_processes, signals_as_they_are
+from assoc.errors import InvalidInputError
+from assoc.sweeps.worker import Batch, Job, Result, run_batch
+
+SECONDS_OF_A_BATCH = 0.2
+_JOB = ".job-"
+
+
+def run_here(job: Job, batches: Iterable[Batch]) -> Generator[Result]:
+    """Do batches one after the other in this process."""
+    for batch in batches:
+        yield run_batch(job, batch)
+
+
+def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path) -> Generator[Result]:
+    """Do batches in processes, and yield results as they come.
+
+    What all runs share goes through a file in the study's folder that each process reads once; a task carries
+    its batch alone.
+
+    Raises
+    ------
+    InvalidInputError
+        A process was killed (by a lack of memory, say), or it raised this itself.
+    """
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    with _shared(job, folder) as (path, digest):
+        require_processes(jobs)
+        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
+        try:
+            with signals_as_they_are(), _interrupts_ignored():
+                # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
+                results = parallel(delayed(_run)(str(path), digest, os.getpid(), batch) for batch in batches)
+            yield from results
+        except BrokenProcessPool:
+            raise InvalidInputError(
+                "--jobs: a worker process was killed (is the memory used up?); fewer jobs need less; "
+                "finished runs are kept, and the same command goes on from there"
+            ) from None
+        finally:
+            stop_workers()
+
+
+@contextmanager
+def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
+    """A file of the job, and its digest, in the study's folder, which only one sweep at a time has open."""
+    # what a sweep that was killed together with its workers could not take away
+    for stale in folder.glob(_JOB + "*"):
+        stale.unlink(missing_ok=True)
+    path = folder / f"{_JOB}{uuid.uuid4().hex}"
+    content = pickle.dumps(job)
+    temporary.add(str(path))
+    try:
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        yield path, _digest(content)
+    finally:
+        temporary.remove(str(path))
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def stop_workers() -> None:
+    """End the worker processes now, whatever they are at."""
+    from joblib.externals.loky import reusable_executor
+
+    executor = reusable_executor._executor
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
+
+
+_job: tuple[str, Job] | None = None
+
+
+def _run(path: str, digest: str, parent: int, batch: Batch) -> Result:
+    global _job
+    if _job is None or _job[0] != path:
+        end_with(parent, path)
+        content = Path(path).read_bytes()
+        # others may be allowed to write in the study's folder, and a pickle can do anything
+        if _digest(content) != digest:
+            raise InvalidInputError(f"{path}: was changed by someone else")
+        _job = path, pickle.loads(content)
+    return run_batch(_job[1], batch)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,220 @@
+"""What a worker does: a batch of runs, each from a seed of its own, on scenes that it was given once."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._system.compiled import loaded
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.sweeps.code_digest import code_digest
+from assoc.sweeps.setting import Setting
+from assoc.sweeps.sources import Source
+from assoc.sweeps.store import COLUMNS
+
+if TYPE_CHECKING:
+    from assoc.problem import AssignmentProblem
+    from assoc.solution import Solution
+
+TRACE_POINTS = 16
+_CACHED_TUPLES = 10_000_000
+_WARM_UP_SECONDS = 1.0
+_ATTEMPTS = 4
+
+Tuples = set[tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Some runs.
+
+    Attributes
+    ----------
+    settings : tuple of Setting
+        Those that the runs refer to.
+    runs : list of (setting, source, repeat, scan)
+        Setting and source as numbers, within the batch and within the job.
+    """
+
+    settings: tuple[Setting, ...]
+    runs: list[tuple[int, int, int, int]]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came out of a batch: the columns of `store.COLUMNS`, and the seconds it all took."""
+
+    batch: Batch
+    columns: dict[str, list[Any]]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs share; a worker gets it once.
+
+    Parameters
+    ----------
+    sources : tuple of Source
+    seed : int
+        Of the study.
+    time_limit : float or None
+        Seconds for each run.
+    gating : mapping
+        Options of ``assoc.build_problem``.
+    package : str
+        Version of assoc, which the worker's must be.
+    code : str
+        Digest of its solvers, which the worker's must have, too.
+    """
+
+    sources: tuple[Source, ...]
+    seed: int
+    time_limit: float | None
+    gating: Mapping[str, Any]
+    package: str
+    code: str
+    _problems: OrderedDict[tuple[int, int], tuple[AssignmentProblem, Tuples | None]] = field(
+        default_factory=OrderedDict, compare=False
+    )
+    _held: list[int] = field(default_factory=lambda: [0], compare=False)
+    _warm: set[Any] = field(default_factory=set, compare=False)
+    _busy: Any = field(default_factory=threading.Lock, compare=False)
+
+    def __reduce__(self) -> Any:
+        # what a worker keeps beside stays with that worker
+        return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package, self.code)
+
+    def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
+        """Return a problem and its true tuples (None where they are not known); recent ones are kept."""
+        key = (source, scan)
+        with self._busy:
+            if key in self._problems:
+                self._problems.move_to_end(key)
+                return self._problems[key]
+        made = self._make(source, scan)
+        with self._busy:
+            if key not in self._problems:
+                self._problems[key] = made
+                self._held[0] += made[0].num_tuples
+            while len(self._problems) > 1 and self._held[0] > _CACHED_TUPLES:
+                self._held[0] -= self._problems.popitem(last=False)[1][0].num_tuples
+        return made
+
+    def _make(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
+        from assoc.association.plan import true_tuples
+        from assoc.costs import build_problem
+        from assoc.packing.packing import prepare
+        from assoc.problem import AssignmentProblem
+
+        content = self.sources[source].content
+        if isinstance(content, AssignmentProblem):
+            prepare(content)
+            return content, None
+        one = content.scan(scan)
+        problem, truth = build_problem(content, one, **self.gating), true_tuples(one)
+        # runs share the problem: the first one must not pay for its preparation in its time
+        prepare(problem)
+        return problem, None if truth is None else {*map(tuple, truth.tolist())}
+
+    def seed_of(self, setting: Setting, source: int, repeat: int, scan: int) -> int:
+        """Seed of a run: of what the run is, and not of where or when it is done."""
+        words = (*setting.words, int(self.sources[source].fingerprint[:8], 16), repeat, scan)
+        sequence = np.random.SeedSequence(self.seed, spawn_key=words)
+        return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+    def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
+        """Let a family of settings load most of its code on its first problem, at the most for a second."""
+        from assoc.solvers.assign import assign
+
+        if setting.family in self._warm:
+            return
+        limit = min(_WARM_UP_SECONDS, self.time_limit or _WARM_UP_SECONDS)
+        try:
+            assign(problem, setting.solver, time_limit=limit, **setting.parameters)
+        except InfeasibleError:
+            pass
+        self._warm.add(setting.family)
+
+    def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
+        """Solve a problem in a time that is the solver's own.
+
+        A run during which code was compiled or loaded, or a module imported, is done again: no choice of problems
+        to warm up on is sure to need all of the code that a later one needs.
+        """
+        from assoc.solvers.assign import assign
+
+        self.warm_up(setting, problem)
+        for _ in range(_ATTEMPTS):
+            before = loaded()
+            solution = assign(problem, setting.solver, seed=seed, time_limit=self.time_limit, **setting.parameters)
+            if loaded() == before:
+                break
+        return solution
+
+
+def run_batch(job: Job, batch: Batch) -> Result:
+    """Do some runs, one after the other.
+
+    Raises
+    ------
+    InvalidInputError
+        The worker's version of assoc is another one, or a solver refuses a setting on these costs.
+    """
+    import time
+
+    import assoc
+
+    started = time.perf_counter()
+    if assoc.__version__ != job.package:
+        raise InvalidInputError(f"a worker has version {assoc.__version__} of assoc, this is {job.package}")
+    if code_digest() != job.code:
+        raise InvalidInputError("a worker has other code of assoc than this process, though of the same version")
+    columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    for run in batch.runs:
+        for name, value in zip(COLUMNS, _row(job, batch.settings[run[0]], *run[1:]), strict=True):
+            columns[name].append(value)
+    return Result(batch, columns, time.perf_counter() - started)
+
+
+def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Sequence[Any]:
+    problem, truth = job.problem(source, scan)
+    seed = job.seed_of(setting, source, repeat, scan)
+    head = (setting.key, job.sources[source].fingerprint, repeat, scan, seed)
+    number = None if truth is None else len(truth)
+    try:
+        solution = job.solve(setting, problem, seed)
+    except InfeasibleError:
+        return (*head, None, None, None, None, "infeasible", number, None, [])
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{setting.solver} {dict(setting.parameters)}: {error}") from None
+    correct = None if truth is None else len(truth.intersection(map(tuple, solution.tuples.tolist())))
+    bound = solution.lower_bound if np.isfinite(solution.lower_bound) else None
+    return (
+        *head,
+        float(solution.cost),
+        None if bound is None else float(bound),
+        int(solution.iterations),
+        round(solution.runtime, 9),
+        solution.stopped_by,
+        number,
+        correct,
+        _thinned(solution),
+    )
+
+
+def _thinned(solution: Solution) -> list[tuple[int, float, float]]:
+    """Iteration, seconds and cost at some improvements; the first and the last are among them."""
+    points: list[tuple[int, float, float]] = []
+    for point in solution.trace:
+        if np.isfinite(point.cost) and (not points or point.cost < points[-1][2]):
+            points.append((int(point.iteration), round(point.seconds, 6), float(point.cost)))
+    if len(points) > TRACE_POINTS:
+        kept = np.linspace(0, len(points) - 1, TRACE_POINTS).round().astype(int)
+        points = [points[i] for i in kept]
+    return points

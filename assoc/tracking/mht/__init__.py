@@ -1,0 +1,1 @@
+"""Multiple hypothesis tracking, track-oriented and hypothesis-oriented."""

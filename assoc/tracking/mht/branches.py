@@ -1,0 +1,122 @@
+"""The tables of a track-oriented tracker after a scan of one sensor, in one compiled call.
+
+The next branches are those before, missed, then the pairs of a branch and a measurement, then the roots of new
+trees; of these the best of each tree are kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc.tracking.mht.pruning import _keep_best
+from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class Tables(NamedTuple):
+    """Branches without their states; see `Bank` and `TrackOrientedMHT`."""
+
+    numbers: Array
+    counts: Array
+    history: Array
+    born: Array
+
+
+class Hits(NamedTuple):
+    """Branches and measurements in their gates: row, 0-based number, gain of the score, seconds; each (K,)."""
+
+    branch: Array
+    measurement: Array
+    gain: Array
+    when: Array
+
+
+class Roots(NamedTuple):
+    """New trees: ids, 0-based measurements, seconds, each (K,), and the score that they begin with."""
+
+    ids: Array
+    measurement: Array
+    when: Array
+    score: float
+
+
+def extend(
+    tables: Tables, miss: float, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
+) -> tuple[Array, Tables]:
+    """Next branches, cut to the best of each tree.
+
+    Parameters
+    ----------
+    tables : Tables
+        Before.
+    miss : float
+        What a miss adds to a score.
+    hits, roots
+    column : int
+        Of the sensor in the history.
+    scan : int
+        In which the new trees begin.
+    most, drop
+        As for `keep_best`.
+
+    Returns
+    -------
+    kept, tables
+        Rows among branches missed, hits and roots, in this order; and what is known of them.
+    """
+    kept, *rest = _extend(*tables, miss, *hits, *roots, column, scan, most, drop)
+    return kept, Tables(*rest)
+
+
+@njit
+def _extend(
+    numbers: Any, counts: Any, history: Any, born: Any, miss: float, branch: Any, measurement: Any, gain: Any,
+    when: Any, ids: Any, number: Any, since: Any, first: float, column: int, scan: int, most: int, drop: float,
+) -> Any:  # fmt: skip
+    old, hits = born.size, branch.size
+    tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
+    for i in range(old):
+        tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss
+    for i in range(hits):
+        tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
+    for i in range(ids.size):
+        tree[old + hits + i], score[old + hits + i] = ids[i], first
+    kept = _keep_best(tree, score, most, drop)
+    new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
+    new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
+    for k in range(kept.size):
+        row = kept[k]
+        if row >= old + hits:
+            i = row - old - hits
+            new_numbers[k, SCORE] = new_numbers[k, BEST] = first
+            new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
+            new_counts[k, ID] = ids[i]
+            new_history[k, column] = number[i] + 1
+            continue
+        source = row if row < old else branch[row - old]
+        new_numbers[k] = numbers[source]
+        new_counts[k] = counts[source]
+        new_history[k] = history[source]
+        new_born[k] = born[source]
+        new_numbers[k, SCORE] = score[row]
+        new_numbers[k, BEST] = max(numbers[source, BEST], score[row])
+        if row >= old:
+            new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
+            new_history[k, column] = measurement[row - old] + 1
+    return kept, new_numbers, new_counts, new_history, new_born
+
+
+@njit
+def count_scan(counts: Any, history: Any, sensors: int) -> None:
+    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history."""
+    for i in range(counts.shape[0]):
+        seen = False
+        for s in range(sensors):
+            seen = seen or history[i, s] > 0
+        counts[i, BITS] = (counts[i, BITS] << 1) & MASK | seen
+        counts[i, MISSED] = 0 if seen else counts[i, MISSED] + 1
+        counts[i, HITS] += seen

@@ -1,0 +1,127 @@
+"""How track trees are cut: weak branches, and branches against what has been decided."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
+    """Rows of the best branches of each tree, ordered by tree, then score.
+
+    Parameters
+    ----------
+    tree, score : arrays (B,)
+    most : int
+        The most branches of a tree.
+    drop : float
+        Branches further than this below their tree's best are cut.
+    """
+    return np.asarray(_keep_best(tree, score, most, drop))
+
+
+@njit
+def _keep_best(tree: Any, score: Any, most: int, drop: float) -> Any:
+    order = np.argsort(tree, kind="mergesort")
+    kept = np.empty(order.size, np.int64)
+    count, begin = 0, 0
+    while begin < order.size:
+        end = begin + 1
+        while end < order.size and tree[order[end]] == tree[order[begin]]:
+            end += 1
+        group = order[begin:end]
+        group = group[np.argsort(-score[group], kind="mergesort")]
+        for rank in range(min(most, group.size)):
+            if score[group[rank]] >= score[group[0]] - drop:
+                kept[count] = group[rank]
+                count += 1
+        begin = end
+    return kept[:count].copy()
+
+
+def decide(tree: Array, score: Array, chosen: Array, old: Array, oldest: Array, sizes: Array) -> tuple[Array, Array]:
+    """Decide which tree each measurement of the oldest scan belongs to.
+
+    The trees of the best global hypothesis take theirs first. Trees that are not in it, but began in that
+    scan or before, take what is left in the order of their scores, and end if nothing fits; they are targets
+    in the making. Younger trees do not touch the scan and stay.
+
+    Parameters
+    ----------
+    tree, score : arrays (B,)
+        Of each branch; those of one tree stand together.
+    chosen : bool array (B,)
+        Whether it is in the best global hypothesis.
+    old : bool array (B,)
+        Whether its tree began in the oldest scan or before.
+    oldest : int array (B, S)
+        The oldest scan's measurements (1-based, 0: missed).
+    sizes : int array (S,)
+
+    Returns
+    -------
+    kept : bool array (B,)
+        Branches that agree with what was decided.
+    speakers : int array
+        One branch of each tree that has decided.
+    """
+    kept, speakers = _decide(tree, score, chosen, old, oldest, int(sizes.max(initial=0)))
+    return np.asarray(kept), np.asarray(speakers)
+
+
+@njit
+def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int) -> Any:
+    count, sensors = oldest.shape
+    number = np.zeros(count, np.int64)
+    for row in range(1, count):
+        number[row] = number[row - 1] + (tree[row] != tree[row - 1])
+    speaker = np.full(number[-1] + 1 if count else 0, -1, np.int64)
+    taken = np.zeros((sensors, most + 1), np.bool_)
+    for row in range(count):
+        if chosen[row] and old[row]:
+            speaker[number[row]] = row
+            for s in range(sensors):
+                taken[s, oldest[row, s]] = oldest[row, s] > 0
+    waiting = np.empty(count, np.int64)
+    size = 0
+    for row in range(count):
+        if old[row] and speaker[number[row]] < 0:
+            waiting[size] = row
+            size += 1
+    waiting = waiting[:size]
+    for row in waiting[np.argsort(-score[waiting], kind="mergesort")]:
+        free = speaker[number[row]] < 0
+        for s in range(sensors):
+            free = free and not taken[s, oldest[row, s]]
+        if free:
+            speaker[number[row]] = row
+            for s in range(sensors):
+                taken[s, oldest[row, s]] = oldest[row, s] > 0
+    kept = np.empty(count, np.bool_)
+    for row in range(count):
+        own = speaker[number[row]]
+        kept[row] = not old[row]
+        if own >= 0:
+            same = True
+            for s in range(sensors):
+                same = same and oldest[row, s] == oldest[own, s]
+            kept[row] = kept[row] or same
+    return kept, speaker[speaker >= 0]
+
+
+@njit
+def same_tree(tree: Any, mask: Any) -> Any:
+    """Branches of the trees of which a branch is in the mask; those of one tree stand together."""
+    result = mask.copy()
+    for row in range(1, tree.size):
+        if result[row - 1] and tree[row] == tree[row - 1]:
+            result[row] = True
+    for row in range(tree.size - 2, -1, -1):
+        if result[row + 1] and tree[row] == tree[row + 1]:
+            result[row] = True
+    return result

@@ -1,0 +1,263 @@
+"""Track-oriented multiple hypothesis tracking: a tree of branches for each possible target.
+
+Every measurement may start a tree; every branch grows by each measurement in its gate and by a miss. The best
+global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
+an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
+of the oldest scan of the window is then final (N-scan pruning).
+
+References
+----------
+T. Kurien, Issues in the design of practical multitarget tracking algorithms, in Y. Bar-Shalom (ed.),
+Multitarget-Multisensor Tracking: Advanced Applications, 1990.
+A. Poore, Multidimensional assignment formulation of data association problems arising from multitarget and
+multisensor tracking, Computational Optimization and Applications 3, 1994.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.costs.tracks.tuples import require_states
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.filters.batches import concatenate, predict_each
+from assoc.problem import AssignmentProblem
+from assoc.tracking.checkpoint import check_window, demand
+from assoc.tracking.defaults import MOST_SCANS
+from assoc.tracking.gated_pairs import look
+from assoc.tracking.mht.best_hypothesis import choose
+from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
+from assoc.tracking.mht.pruning import decide, same_tree
+from assoc.tracking.track import Decision, Step
+from assoc.tracking.track_batch import Bank
+from assoc.tracking.tracker import Tracker
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class TrackOrientedMHT(Tracker):
+    """Multiple hypothesis tracker with track trees.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`. Sensors of a scan are taken in one after the other; with a single sensor each
+        measurement may have its own time.
+    depth : int
+        Scans in the window, N: a measurement's track is final N - 1 scans later. 1 decides at once.
+    max_branches : int
+        The most branches of a tree.
+    branch_drop : float
+        A branch whose score is this far below its tree's best is cut.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "mht"
+
+    def __init__(
+        self, *arguments: Any, depth: int = 3, max_branches: int = 30, branch_drop: float = 15.0, **options: Any
+    ) -> None:
+        super().__init__(*arguments, **options)
+        for value, what in ((depth, "depth"), (max_branches, "max_branches")):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise InvalidInputError(f"{what} must be a whole number above 0, got {value!r}")
+        if depth > MOST_SCANS:
+            raise InvalidInputError(f"depth must be at most {MOST_SCANS} scans, got {depth}")
+        if not isinstance(branch_drop, (int, float)) or not branch_drop > 0:
+            raise InvalidInputError(f"branch_drop must be a number above 0, got {branch_drop!r}")
+        self.depth, self.max_branches, self.branch_drop = int(depth), int(max_branches), float(branch_drop)
+        self._history = np.zeros((0, self.depth * len(self.sensors)), dtype=np.int32)
+        """Measurements of each branch (1-based, 0 missed): the sensors of this scan, of the last, ..."""
+        self._born = np.zeros(0, dtype=np.int64)
+        """Scan in which each branch's tree began."""
+        self._chosen = np.zeros(0, dtype=np.bool_)
+        """Branches of the best global hypothesis."""
+        self._window: list[tuple[float, Array]] = []
+        """Times and sizes of the scans that are not yet final, the last one first."""
+
+    def _current(self) -> Bank:
+        rows = np.flatnonzero(self._chosen)
+        return self._bank[rows[np.argsort(self._bank.track_id[rows], kind="stable")]]
+
+    def _adopt(self, bank: Bank) -> None:
+        super()._adopt(bank)
+        self._history = np.zeros((len(bank), self._history.shape[1]), dtype=np.int32)
+        self._born, self._chosen = np.full(len(bank), -1), np.ones(len(bank), dtype=np.bool_)
+
+    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+        if times is not None and len(self.sensors) > 1:
+            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
+        self._grow(time, measurements, times)
+        self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
+        self._chosen = self._best_hypothesis()
+        self._confirm()
+        now = self._opinion(0, self._chosen)
+        final, kept = self._prune() if len(self._window) == self.depth else ((), None)
+        ended = self._end(time, kept)
+        return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
+
+    def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
+        """Grow every branch by the measurements in its gate and by misses, and start trees."""
+        count = len(self.sensors)
+        bank, before = self._bank, time if self._time is None else self._time
+        history = np.zeros_like(self._history)
+        history[:, count:] = self._history[:, : history.shape[1] - count]
+        states, tables = bank.states, Tables(bank.numbers, bank.counts, history, self._born)
+        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+            stamps = None if times is None else times[s]
+            frame = look(self.filter, states, before, time, z, stamps, sensor, self.gate_probability)
+            pairs = frame.pairs
+            gain = pairs.log_likelihood + self.terms.detection[s]
+            begun, roots = self._roots(s, z, time, stamps)
+            kept, tables = extend(
+                tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, frame.when), roots,
+                s, self._scan, self.max_branches, self.branch_drop,
+            )  # fmt: skip
+            require_states(states, len(kept))
+            states = concatenate([frame.predicted, pairs.states, begun])[kept]
+            before = time
+            if len(kept) > self.max_tuples:
+                raise LimitExceededError(
+                    f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
+                    "lower gate_probability, depth or max_branches, or raise max_tuples"
+                )
+        count_scan(tables.counts, tables.history, count)
+        self._bank = Bank(states, tables.numbers, tables.counts)
+        self._history, self._born = tables.history, tables.born
+
+    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Any, Roots]:
+        """New trees, one for each measurement that tells a position, and their states."""
+        states, fit, positions = self._singles(s, z)
+        numbers = np.flatnonzero(fit)
+        # numbered by place, so that the order of the measurements does not matter
+        if stamps is None:
+            when = np.full(len(numbers), time)
+            order = np.lexsort(positions.T)
+        else:
+            when = stamps[numbers]
+            order = np.lexsort((*positions.T, when))
+            states = predict_each(self.filter, states, time - when)
+        ids = np.empty(len(numbers), dtype=np.int64)
+        ids[order] = self._new_ids(len(numbers))
+        return states, Roots(ids, numbers, when, float(self._birth[s]))
+
+    def _best_hypothesis(self) -> Array:
+        """Branches of the best global hypothesis, as a mask."""
+        score, track_id = self._bank.score.copy(), self._bank.track_id.copy()
+        if self.solver == "exact" and not self.solver_parameters:
+            easy = choose(track_id, score, self._history)
+            if easy is not None:
+                return easy
+        chosen = np.zeros(len(self._bank), dtype=np.bool_)
+        # a branch of no positive score is better left to false alarms
+        rows = np.flatnonzero(score > 0)
+        if not len(rows):
+            return chosen
+        tuples = np.empty((len(rows), 1 + self._history.shape[1]), dtype=np.int64)
+        sizes = np.zeros(tuples.shape[1], dtype=np.int64)
+        trees, tuples[:, 0] = np.unique(track_id[rows], return_inverse=True)
+        tuples[:, 0] += 1
+        sizes[0] = len(trees)
+        for c in range(self._history.shape[1]):
+            # only measurements that some branch uses take part
+            column = self._history[rows, c]
+            used = np.zeros(int(column.max()) + 1, dtype=np.int64)
+            used[column] = 1
+            used[0] = 0
+            sizes[c + 1] = used.sum()
+            number = np.cumsum(used) * used
+            tuples[:, c + 1] = number[column]
+        solution = self._assign(AssignmentProblem(tuples, -score[rows], sizes))
+        picked = solution.indices[solution.indices < len(rows)]
+        chosen[rows[picked]] = True
+        return chosen
+
+    def _confirm(self) -> None:
+        bank = self._bank
+        before = bank.confirmed
+        new = self._chosen & ~before
+        new &= self.life_cycle.confirms(bank.score, bank.detections)
+        if new.any():
+            self._bank = bank.sure(before | same_tree(bank.track_id.copy(), new))
+
+    def _opinion(self, age: int, rows: Array) -> Decision:
+        """Which tracks the measurements of the scan `age` scans ago went to, by these branches."""
+        count = len(self.sensors)
+        time, sizes = self._window[age]
+        if rows.dtype == np.bool_:
+            rows = np.flatnonzero(rows)
+        ids, sure = self._bank.track_id[rows], self._bank.confirmed[rows]
+        history = self._history[rows]
+        assigned, confirmed = [], []
+        for s in range(count):
+            owner, known = np.zeros(int(sizes[s]) + 1, dtype=np.int64), np.zeros(int(sizes[s]) + 1, dtype=np.bool_)
+            column = history[:, age * count + s]
+            owner[column], known[column] = ids, sure
+            assigned.append(owner[1:])
+            confirmed.append(known[1:])
+        return Decision(self._scan - age, time, tuple(assigned), tuple(confirmed))
+
+    def _prune(self) -> tuple[tuple[Decision, ...], Array]:
+        """Decide the oldest scan of the window; the branches that do not contradict it."""
+        count = len(self.sensors)
+        oldest = np.ascontiguousarray(self._history[:, -count:])
+        kept, speakers = decide(
+            self._bank.track_id.copy(),
+            self._bank.score.copy(),
+            self._chosen,
+            self._born <= self._scan - self.depth + 1,
+            oldest,
+            self._window[-1][1],
+        )
+        final = self._opinion(self.depth - 1, speakers)
+        self._window.pop()
+        return (final,), kept
+
+    def _end(self, time: float, kept: Array | None) -> Array:
+        """Cut all branches but these and delete tracks; the ids of confirmed ones that are gone."""
+        stay = ~self._doomed(self._bank, time)
+        if kept is not None:
+            stay &= kept
+        if stay.all():
+            return np.zeros(0, dtype=np.int64)
+        ids = self._bank.track_id.copy()
+        lost = ids[self._bank.confirmed & ~same_tree(ids, stay)]
+        self._bank, self._history = self._bank[stay], self._history[stay]
+        self._born, self._chosen = self._born[stay], self._chosen[stay]
+        return np.unique(lost) if len(lost) else lost
+
+    def flush(self) -> tuple[Decision, ...]:
+        """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
+        self._scan -= 1
+        try:
+            return tuple(self._opinion(age, self._chosen) for age in reversed(range(len(self._window))))
+        finally:
+            self._scan += 1
+
+    def _settings(self) -> dict[str, str]:
+        own = {"depth": str(self.depth), "max_branches": str(self.max_branches), "branch_drop": repr(self.branch_drop)}
+        return super()._settings() | own
+
+    def _arrays(self) -> dict[str, Array]:
+        times = np.array([time for time, _ in self._window], dtype=np.float64)
+        sizes = np.array([sizes for _, sizes in self._window], dtype=np.int64).reshape(-1, len(self.sensors))
+        own: dict[str, Array] = {"history": self._history, "born": self._born, "chosen": self._chosen}
+        own |= {"window_times": times, "window_sizes": sizes}
+        return super()._arrays() | own
+
+    def _check(self, arrays: dict[str, Array]) -> None:
+        super()._check(arrays)
+        ids = arrays["bank.track_id"]
+        check_window(arrays, len(ids), len(self.sensors), self.depth)
+        demand((np.diff(ids) >= 0).all(), "bank.track_id", "the branches of one tree side by side")
+        born = arrays["born"]
+        demand(born.shape == ids.shape and (born <= int(arrays["scan"])).all(), "born", "a scan for each branch")
+        demand(arrays["chosen"].shape == ids.shape, "chosen", "a mark for each branch")
+
+    def _take(self, arrays: dict[str, Array]) -> None:
+        super()._take(arrays)
+        self._history = arrays["history"].astype(np.int32)
+        self._born, self._chosen = arrays["born"], arrays["chosen"]
+        self._window = [(float(t), n) for t, n in zip(arrays["window_times"], arrays["window_sizes"], strict=True)]

@@ -1,0 +1,1 @@
+"""Trackers that decide each scan by itself."""

@@ -1,0 +1,92 @@
+"""What trackers have in common that decide each scan, all sensors together, at once and for good."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc.costs.build import tuple_costs
+from assoc.costs.tracks.scores import log_birth
+from assoc.scene.scene import Scan
+from assoc.tracking.track import Decision, Step, decision
+from assoc.tracking.track_batch import Bank
+from assoc.tracking.tracker import Tracker
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class Outcome(NamedTuple):
+    """How a scan was associated with T tracks."""
+
+    states: Any
+    """The tracks' states after it, in their order."""
+    gain: Array
+    """What their scores gain, (T,)."""
+    rows: Array
+    """Their measurements, 1-based, 0 missed, (T, S)."""
+    born: Array
+    """Tuples of the measurements that no track took, (K, S)."""
+
+
+class SingleScanTracker(Tracker):
+    """Predict, associate (which the children do), start tracks, confirm, delete."""
+
+    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+        self._instant(times)
+        scan = self._scan_of(time, measurements)
+        bank = self._predicted(self._bank, self._elapsed(time))
+        outcome = self._associate(scan, bank.states, bank.score)
+        seen = outcome.rows.any(axis=1)
+        bank = bank.scored(outcome.states, outcome.gain, np.where(seen, time, np.nan))
+        new, rows = self._begin(scan, outcome.born)
+        bank = Bank.concatenate([bank, new]).counted(np.concatenate([seen, np.ones(len(new), dtype=np.bool_)]))
+        rows = np.concatenate([outcome.rows, rows])
+        bank = bank.confirm(self.life_cycle)
+        now = self._said(scan, bank, rows)
+        gone = self._doomed(bank, time)
+        self._bank = bank[~gone]
+        ended = np.sort(bank.track_id[gone & bank.confirmed])
+        return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
+
+    @abstractmethod
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+        """Associate a scan with predicted tracks of these scores."""
+
+    @property
+    def _volume(self) -> float:
+        """Of the region, m^3."""
+        region = self._place.region
+        return float(np.prod(region[:, 1] - region[:, 0]))
+
+    def _begin(self, scan: Scan, tuples: Array) -> tuple[Bank, Array]:
+        """New tracks of tuples that tell a position, numbered by place."""
+        tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
+        if not len(tuples):
+            return self._bank[:0], tuples
+        positions, covariances, fit = self._fused(scan, tuples)
+        order = np.flatnonzero(fit)
+        order = order[np.lexsort(positions[order].T)]
+        rows, positions, covariances = tuples[order], positions[order], covariances[order]
+        states = self.initiation.start(self.filter, positions, covariances)
+        seen = rows > 0
+        several = log_birth(covariances, self._volume, self.initiation.birth_rate)
+        score = np.where(
+            seen.sum(axis=1) == 1, self._single_scores(rows), several - tuple_costs(self._place, scan, rows)
+        )
+        return Bank.new(states, self._new_ids(len(order)), score, scan.time), rows
+
+    def _single_scores(self, rows: Array) -> Array:
+        """Scores of new tracks of single measurements, (K, S), that all other sensors missed."""
+        seen = rows > 0
+        scores: Array = seen @ self.terms.birth + ~seen @ self.terms.miss
+        return scores
+
+    def _said(self, scan: Scan, bank: Bank, rows: Array) -> Decision:
+        assigned = []
+        for s, size in enumerate(scan.sizes.tolist()):
+            ids = np.zeros(size + 1, dtype=np.int64)
+            ids[rows[:, s]] = bank.track_id
+            assigned.append(ids[1:])
+        return decision(scan.index, scan.time, assigned, bank.track_id[bank.confirmed])

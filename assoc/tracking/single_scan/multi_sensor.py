@@ -1,0 +1,69 @@
+"""The multi-sensor tracker: each scan is one assignment problem over tracks and all sensors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.costs.build import build_problem
+from assoc.costs.tracks.scores import doubted_gain, log_birth
+from assoc.costs.tracks.tuples import grow_track_tuples
+from assoc.problem import AssignmentProblem
+from assoc.scene.scene import Scan
+from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class MultiSensorTracker(SingleScanTracker):
+    """Tracks and S sensors in one (S+1)-D assignment problem for each scan.
+
+    Tracks are the first list. A tuple (track, z_1, ..., z_S) costs the negative log likelihood ratio of its
+    measurements under the track's predicted density, misses included, averaged over whether the track is a target
+    at all, which its score tells; a tuple without a track is a new target
+    and costs what `assoc.build_problem` says, with the birth density in it. Measurements in no tuple are false
+    alarms, and begin tentative tracks.
+
+    Parameters
+    ----------
+    sensors, filter, **options
+        As for `Tracker`.
+
+    References
+    ----------
+    Y. Bar-Shalom, P. Willett, X. Tian, Tracking and Data Fusion, 2011, chapter 9.
+    """
+
+    name = "multi-sensor"
+
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+        measurements = list(scan.measurements)
+        tuples = grow_track_tuples(
+            self.filter, states, measurements, self.sensors, self.terms,
+            gate_probability=self.gate_probability, max_tuples=self.max_tuples,
+        )  # fmt: skip
+        gain = -tuples.costs
+        value = doubted_gain(scores[tuples.track], gain)
+        rows, costs = self._new_targets(scan)
+        known = np.column_stack([tuples.track + 1, tuples.rows])
+        fresh = np.column_stack([np.zeros(len(rows), dtype=np.int64), rows])
+        sizes = np.concatenate([[len(states)], scan.sizes])
+        problem = AssignmentProblem(np.concatenate([known, fresh]), np.concatenate([-value, costs]), sizes)
+        solution = self._assign(problem)
+        kept = np.sort(solution.indices[solution.indices < len(known)])
+        born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
+        return Outcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
+
+    def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
+        """Tuples without a track that are better than false alarms, and their costs with the birth density."""
+        problem = build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
+        rows, costs = problem.tuples, np.array(problem.costs)
+        several = np.count_nonzero(rows, axis=1) > 1
+        # where false alarms are rarer than new targets a single measurement is one, too
+        costs[~several] = -self._single_scores(rows[~several])
+        if several.any():
+            covariances = self._fused(scan, rows[several])[1]
+            costs[several] -= log_birth(covariances, self._volume, self.initiation.birth_rate)
+        good = costs < 0
+        return rows[good], costs[good]

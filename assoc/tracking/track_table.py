@@ -1,0 +1,117 @@
+"""Tracks as a table: one row for each track and scan, the columns of tracks.csv."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc.scene.scene import Scene
+from assoc.tracking.track import Decision, Track
+from assoc.tracking.tracker import Tracker
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+COLUMNS = (
+    "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
+    "sigma_x", "sigma_y", "sigma_z",
+)  # fmt: skip
+"""Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position."""
+
+
+class TrackTable:
+    """Collects tracks of scan after scan.
+
+    It grows with what it is given; trackers do not. Write parts of it away where a recording never ends.
+    """
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(self, tracks: Iterable[Track], positions: Sequence[int] = (0, 1, 2)) -> None:
+        """Add the tracks of one scan.
+
+        Parameters
+        ----------
+        tracks : iterable of Track
+        positions : sequence of int
+            Where x, y (and z) stand in the state: ``filter.motion.position``.
+        """
+        for track in tracks:
+            sigma = np.zeros(3)
+            sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
+            self._rows.append(
+                (
+                    track.track_id,
+                    track.time,
+                    *track.position.tolist(),
+                    *track.velocity.tolist(),
+                    track.confirmed,
+                    track.score,
+                    track.hits,
+                    track.started,
+                    track.last_detection,
+                    *sigma.tolist(),
+                )  # fmt: skip
+            )
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table; see `COLUMNS`."""
+        import pandas as pd
+
+        frame = pd.DataFrame.from_records(self._rows, columns=list(COLUMNS))
+        kinds = dict.fromkeys(COLUMNS, "float64") | {"track_id": "int64", "confirmed": "bool", "hits": "int64"}
+        return frame.astype(kinds)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as CSV; the file appears whole or not at all."""
+        from assoc._files.output import write_text
+
+        text = self.to_frame().to_csv(index=False)
+        write_text(path, text)
+
+    def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
+        """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take."""
+        rows = [row for row in self._rows if row[8] or not confirmed]
+        times = np.array([row[1] for row in rows], dtype=np.float64)
+        ids = np.array([row[0] for row in rows], dtype=np.int64)
+        return times, ids, np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
+
+
+def track_scene(
+    tracker: Tracker, scene: Scene, *, confirmed: bool = True, scans: Iterable[int] | None = None
+) -> tuple[TrackTable, list[Decision]]:
+    """Run a tracker over the scans of a scene.
+
+    Parameters
+    ----------
+    tracker : Tracker
+    scene : Scene
+    confirmed : bool
+        Whether only confirmed tracks are listed.
+    scans : iterable of int, optional
+        Numbers of the scans; by default all.
+
+    Returns
+    -------
+    table, decisions
+        The tracks as they were after each scan, and the final decisions, the open ones at the end included.
+    """
+    table = TrackTable()
+    decisions: list[Decision] = []
+    for k in range(scene.num_scans) if scans is None else scans:
+        scan = scene.scan(k)
+        step = tracker.step(scan.time, scan.measurements)
+        decisions += step.final
+        table.add(
+            (track for track in tracker.tracks if track.confirmed or not confirmed), tracker.filter.motion.position
+        )
+    return table, [*decisions, *tracker.flush()]

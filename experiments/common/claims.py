@@ -1,0 +1,165 @@
+"""The shared result form of all experiments: what was claimed, what we measured, and whether it holds."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from assoc._files.output import write_text
+
+FORMAT = "assoc.claims"
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One quantity of a paper beside ours.
+
+    Parameters
+    ----------
+    quantity : str
+        What was measured, in words.
+    unit : str
+        Its unit; "" for a plain number.
+    paper : float or None
+        What the paper (or the goal) says; None where it gives no number.
+    ours : float
+        What we measured.
+    interval : (float, float) or None
+        Confidence interval of ours, low and high.
+    band : (float, float) or None
+        What is accepted, low and high; an open end is None inside.
+    holds : bool or None
+        Whether the claim holds. Left out, it is whether ours lies in the band, or None without a band.
+
+    Raises
+    ------
+    ValueError
+        A number that is NaN, or an interval or band whose low end is above its high end.
+    """
+
+    quantity: str
+    unit: str = ""
+    paper: float | None = None
+    ours: float = math.nan
+    interval: tuple[float, float] | None = None
+    band: tuple[float | None, float | None] | None = None
+    holds: bool | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "ours", float(self.ours))
+        if self.paper is not None:
+            put(self, "paper", float(self.paper))
+        if math.isnan(self.ours) or (self.paper is not None and math.isnan(self.paper)):
+            raise ValueError(f"claim {self.quantity!r}: NaN is not a measurement")
+        for name in ("interval", "band"):
+            ends = getattr(self, name)
+            if ends is None:
+                continue
+            low, high = (None if end is None else float(end) for end in ends)
+            if low is not None and high is not None and not low <= high:
+                raise ValueError(f"claim {self.quantity!r}: {name} must be (low, high), got ({low}, {high})")
+            put(self, name, (low, high))
+        if self.holds is None and self.band is not None:
+            low, high = self.band
+            inside = (low is None or self.ours >= low) and (high is None or self.ours <= high)
+            put(self, "holds", inside)
+        elif self.holds is not None:
+            put(self, "holds", bool(self.holds))
+
+
+def to_dict(claims: Iterable[Claim], experiment: str, seed: int) -> dict[str, Any]:
+    """Return the claims as the JSON form "assoc.claims", version 1."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "experiment": experiment,
+        "seed": seed,
+        "claims": [asdict(claim) for claim in claims],
+    }
+
+
+def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int) -> None:
+    """Write the claims as JSON (infinities are refused: they are not JSON)."""
+    write_text(path, json.dumps(to_dict(claims, experiment, seed), indent=2, allow_nan=False) + "\n")
+
+
+def load_json(path: str | Path) -> list[Claim]:
+    """Read claims written by `save_json`.
+
+    Raises
+    ------
+    ValueError
+        The file is not of this format or of a future version.
+    """
+    data = json.loads(Path(path).read_text(encoding="utf-8"))
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise ValueError(f"{path}: not an {FORMAT} file")
+    if data.get("version") != VERSION:
+        raise ValueError(f"{path}: version {data.get('version')} is not {VERSION}")
+    return [Claim(**claim) for claim in data["claims"]]
+
+
+def save_csv(path: str | Path, claims: Iterable[Claim]) -> None:
+    """Write one row per claim; interval and band become two columns each."""
+    columns: list[str] = []
+    for field in fields(Claim):
+        pair = field.name in ("interval", "band")
+        columns += [f"{field.name}_low", f"{field.name}_high"] if pair else [field.name]
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    for claim in claims:
+        row: list[object] = []
+        for field in fields(Claim):
+            value = getattr(claim, field.name)
+            row += list(value or (None, None)) if field.name in ("interval", "band") else [value]
+        writer.writerow(["" if value is None else value for value in row])
+    write_text(path, text.getvalue())
+
+
+def print_table(claims: Sequence[Claim], title: str) -> None:
+    """Print the claims as a table on stdout."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    for column in ("quantity", "unit"):
+        table.add_column(column)
+    for column in ("paper", "ours", "interval", "accepted band"):
+        table.add_column(column, justify="right")
+    table.add_column("holds")
+    for claim in claims:
+        table.add_row(
+            claim.quantity,
+            claim.unit,
+            _number(claim.paper),
+            _number(claim.ours),
+            _ends(claim.interval),
+            _ends(claim.band),
+            {True: "yes", False: "no", None: "-"}[claim.holds],
+        )
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=160)
+    console.print(table)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+def _ends(ends: tuple[float | None, float | None] | None) -> str:
+    if ends is None:
+        return "-"
+    low, high = ends
+    if low is None:
+        return f"<= {_number(high)}"
+    return f">= {_number(low)}" if high is None else f"{_number(low)} .. {_number(high)}"

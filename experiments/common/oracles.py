@@ -1,0 +1,298 @@
+"""What the tests compare against: exhaustive search, scipy's MILP, and generators of small problems.
+
+Nothing here uses a solver of the package. Exhaustive search is written over bit masks of measurements,
+so that "each measurement in exactly one tuple" is one integer comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.sparse import csc_array
+
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+from experiments.common.checking import check_answer, price_list
+
+__all__ = [
+    "Ranked",
+    "all_solutions",
+    "axial_problem",
+    "brute_force",
+    "check_answer",
+    "gated_problem",
+    "marginals",
+    "milp_optimum",
+    "small_problems",
+]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One solution of an enumeration: its cost and its tuples in lexicographic order."""
+
+    cost: float
+    tuples: tuple[tuple[int, ...], ...]
+
+
+def _masks(problem: AssignmentProblem) -> tuple[list[list[tuple[int, tuple[int, ...], float]]], int]:
+    """For every measurement that must be covered: the tuples to cover it with, as (mask, tuple, cost).
+
+    Dimensions that need not be covered (longer ones of axial problems) come last in the mask, so that
+    the lowest uncovered bit is always one that must be covered.
+    """
+    sizes = problem.sizes.tolist()
+    smallest = min(sizes)
+    must = [problem.dummy or size == smallest for size in sizes]
+    offset = [0] * len(sizes)
+    bits = 0
+    for wanted in (True, False):
+        for sensor, size in enumerate(sizes):
+            if must[sensor] is wanted:
+                offset[sensor] = bits
+                bits += size
+    to_cover = sum(size for size, needed in zip(sizes, must, strict=True) if needed)
+    covering: list[list[tuple[int, tuple[int, ...], float]]] = [[] for _ in range(to_cover)]
+    for key, cost in price_list(problem).items():
+        mask = 0
+        for sensor, index in enumerate(key):
+            if index:
+                mask |= 1 << (offset[sensor] + index - 1)
+        low = (mask & -mask).bit_length() - 1
+        if low < to_cover:
+            covering[low].append((mask, key, cost))
+    return covering, to_cover
+
+
+def all_solutions(problem: AssignmentProblem, limit: int = 300_000) -> list[Ranked]:
+    """Every solution, cheapest first (ties in lexicographic order of their tuples).
+
+    Raises
+    ------
+    MemoryError
+        There are more than ``limit``: the problem is too large for this oracle.
+    """
+    covering, to_cover = _masks(problem)
+    found: list[Ranked] = []
+
+    def extend(covered: int, cost: float, chosen: tuple[tuple[int, ...], ...]) -> None:
+        free = ~covered
+        low = (free & -free).bit_length() - 1
+        if low >= to_cover:
+            if len(found) >= limit:
+                raise MemoryError(f"more than {limit} solutions")
+            found.append(Ranked(cost, tuple(sorted(chosen))))
+            return
+        # A tuple is filed under its lowest bit, and everything below `low` is covered already.
+        for mask, key, price in covering[low]:
+            if not mask & covered:
+                extend(covered | mask, cost + price, (*chosen, key))
+
+    extend(0, 0.0, ())
+    return sorted(found, key=lambda s: (s.cost, s.tuples))
+
+
+def brute_force(problem: AssignmentProblem) -> float:
+    """Optimal cost by exhaustive recursion over the sets of covered measurements.
+
+    Raises
+    ------
+    InfeasibleError
+        The problem has no solution.
+    """
+    covering, to_cover = _masks(problem)
+
+    @cache
+    def rest(covered: int) -> float:
+        free = ~covered
+        low = (free & -free).bit_length() - 1
+        if low >= to_cover:
+            return 0.0
+        return min(
+            (price + rest(covered | mask) for mask, _, price in covering[low] if not mask & covered),
+            default=float("inf"),
+        )
+
+    cost = rest(0)
+    if cost == float("inf"):
+        raise InfeasibleError("no solution")
+    return cost
+
+
+def marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
+    """Probability of each tuple when a solution's weight is exp(-cost), by full enumeration."""
+    solutions = all_solutions(problem)
+    least = solutions[0].cost
+    weights = [float(np.exp(least - s.cost)) for s in solutions]
+    total = sum(weights)
+    result = dict.fromkeys(price_list(problem), 0.0)
+    for solution, weight in zip(solutions, weights, strict=True):
+        for key in solution.tuples:
+            result[key] += weight / total
+    return result
+
+
+def milp_optimum(problem: AssignmentProblem, time_limit: float = 60.0) -> float:
+    """Optimal cost by HiGHS through scipy, gap 1e-9 (0 would mean "the default, 1e-4").
+
+    Raises
+    ------
+    InfeasibleError
+        The problem has no solution.
+    TimeoutError
+        Not proven within the time limit.
+    """
+    sizes = problem.sizes
+    if problem.num_tuples == 0:
+        if problem.dummy or sizes.min() == 0:
+            return 0.0
+        raise InfeasibleError("no tuples")
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    column, sensor = np.nonzero(problem.tuples)
+    row = offsets[sensor] + problem.tuples[column, sensor] - 1
+    matrix = csc_array((np.ones(row.size), (row, column)), shape=(int(offsets[-1]), problem.num_tuples))
+    must = np.repeat(problem.dummy | (sizes == sizes.min()), sizes)
+    result = milp(
+        problem.costs,
+        integrality=np.ones(problem.num_tuples, dtype=np.int64),
+        bounds=Bounds(0, 1),
+        constraints=LinearConstraint(matrix, np.where(must, 1.0, 0.0), 1.0),
+        options={"mip_rel_gap": 1e-9, "time_limit": time_limit},
+    )
+    if result.status == 2:
+        raise InfeasibleError("no solution")
+    if result.status != 0:
+        raise TimeoutError(result.message)
+    return check_answer(problem, problem.tuples[np.round(result.x) == 1])
+
+
+def _grid(sizes: NDArray[np.int64], first: int) -> NDArray[np.int64]:
+    axes = [np.arange(first, n + 1) for n in sizes]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(sizes))
+
+
+def _draw_costs(rng: np.random.Generator, count: int, style: str) -> NDArray[np.float64]:
+    if style == "ties":
+        return rng.integers(-3, 3, count).astype(float)
+    if style == "positive":
+        return rng.uniform(0.0, 10.0, count)
+    if style == "negative":
+        return rng.uniform(-10.0, 0.0, count)
+    return rng.normal(-2.0, 4.0, count)
+
+
+def gated_problem(
+    rng: np.random.Generator,
+    sizes: tuple[int, ...],
+    density: float = 0.5,
+    style: str = "mixed",
+    *,
+    listed_singletons: float = 0.0,
+    duplicates: float = 0.0,
+) -> AssignmentProblem:
+    """Random problem with dummies in which only a share of the tuples survived the gate.
+
+    Parameters
+    ----------
+    rng : Generator
+        Where the numbers come from.
+    sizes : tuple of int
+        Measurements per sensor; 0 is allowed.
+    density : float
+        Share of the tuples with two or more measurements that are kept.
+    style : {"mixed", "positive", "negative", "ties"}
+        How costs are drawn; "ties" are small integers.
+    listed_singletons : float
+        Share of singletons listed with a cost of their own (the rest are added at 0).
+    duplicates : float
+        Share of tuples listed a second time with another cost.
+    """
+    grid = _grid(np.array(sizes), 0)
+    count = np.count_nonzero(grid, axis=1)
+    share = np.where(count >= 2, density, np.where(count == 1, listed_singletons, 0.0))
+    tuples = grid[rng.random(len(grid)) < share]
+    again = tuples[rng.random(len(tuples)) < duplicates]
+    tuples = rng.permutation(np.concatenate([tuples, again]), axis=0)
+    return AssignmentProblem(tuples.astype(np.int32), _draw_costs(rng, len(tuples), style), sizes)
+
+
+def axial_problem(
+    rng: np.random.Generator,
+    sizes: tuple[int, ...],
+    density: float = 1.0,
+    style: str = "mixed",
+) -> AssignmentProblem:
+    """Random axial problem, square or rectangular; below density 1 it may have no solution."""
+    grid = _grid(np.array(sizes), 1)
+    tuples = grid[rng.random(len(grid)) < density]
+    return AssignmentProblem(
+        tuples.astype(np.int32), _draw_costs(rng, len(tuples), style), sizes, dummy=False
+    )
+
+
+def disconnected_problem(rng: np.random.Generator, parts: int, style: str = "mixed") -> AssignmentProblem:
+    """Several small 3-D problems with dummies side by side, their measurements shuffled together."""
+    shapes = rng.integers(0, 4, (parts, 3)).tolist()
+    blocks = [gated_problem(rng, tuple(shape), 0.6, style) for shape in shapes]
+    sizes = np.sum([block.sizes for block in blocks], axis=0)
+    renumber = [np.concatenate([[0], rng.permutation(n) + 1]) for n in sizes]
+    start = np.zeros(3, dtype=int)
+    rows, costs = [], []
+    for block in blocks:
+        shifted = np.where(block.tuples > 0, block.tuples + start, 0)
+        rows.append(np.stack([renumber[s][shifted[:, s]] for s in range(3)], axis=1))
+        costs.append(block.costs)
+        start += block.sizes
+    return AssignmentProblem(np.concatenate(rows).astype(np.int32), np.concatenate(costs), sizes)
+
+
+_DUMMY_SHAPES: list[tuple[int, ...]] = [
+    *[(3, 3), (2, 5), (2, 0), (1, 1)],
+    *[(3, 3, 3), (2, 3, 4), (4, 1, 2), (0, 3, 3), (4, 4, 3)],
+    *[(2, 2, 2, 2), (3, 2, 1, 2), (2, 2, 2, 2, 2), (1, 2, 2, 1, 2), (1, 2, 1, 2, 1, 1)],
+]
+_AXIAL_SHAPES: list[tuple[int, ...]] = [
+    *[(4, 4), (3, 5), (4, 4, 4), (3, 4, 5), (5, 3, 3), (1, 4, 2)],
+    *[(2, 3, 2, 4), (3, 3, 3, 3), (2, 2, 2, 2, 2), (2, 3, 2, 2, 3), (2, 2, 2, 2, 2, 2)],
+]
+
+
+def small_problems(count: int, seed: int = 0, *, dummy: bool | None = None) -> Iterator[AssignmentProblem]:
+    """Problems that brute force can answer, in every shape and temper the solvers must bear.
+
+    Sensors 2 to 6; gated at several densities; mixed, positive, negative and tied costs; duplicates,
+    empty sensors, listed singletons, disconnected clusters; axial ones square, rectangular and sparse
+    (those may have no solution).
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    seed : int
+        Same seed, same problems.
+    dummy : bool, optional
+        Only problems with (True) or without (False) dummies; both by default.
+    """
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        style = ("mixed", "positive", "negative", "ties")[rng.integers(4)]
+        with_dummies = number % 3 != 0 if dummy is None else dummy
+        if with_dummies and rng.random() < 0.15:
+            yield disconnected_problem(rng, int(rng.integers(2, 4)), style)
+        elif with_dummies:
+            yield gated_problem(
+                rng,
+                _DUMMY_SHAPES[rng.integers(len(_DUMMY_SHAPES))],
+                float(rng.choice([0.1, 0.4, 0.8])),
+                style,
+                listed_singletons=float(rng.choice([0.0, 0.5])),
+                duplicates=float(rng.choice([0.0, 0.2])),
+            )
+        else:
+            shape = _AXIAL_SHAPES[rng.integers(len(_AXIAL_SHAPES))]
+            yield axial_problem(rng, shape, float(rng.choice([0.3, 0.7, 1.0])), style)

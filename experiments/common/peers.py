@@ -1,0 +1,359 @@
+"""What people would use instead of assoc, run on the same tuples.
+
+Every peer takes a problem and a time limit and returns a `PeerAnswer`; its time runs from the tuples to the
+chosen tuples, building its model included, importing its package not. Its answer is priced by
+`experiments.common.checking`, not by itself.
+
+======================  ==========================================================================
+``cp_sat``              OR-Tools CP-SAT, two workers, costs times 1e6 rounded to integers
+``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
+``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
+``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
+``nrl_tracker``         PyPI ``nrl-tracker``: relaxation on a dense axial tensor (small problems only)
+======================  ==========================================================================
+"""
+
+from __future__ import annotations
+
+import datetime
+import importlib.util
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
+from scipy.sparse import csc_array
+
+from assoc.problem import AssignmentProblem
+from experiments.common.checking import check_answer
+
+CP_SAT_SCALE = 1e6
+DENSE_LIMIT = 8_000_000
+
+
+@dataclass(frozen=True)
+class PeerAnswer:
+    """What a peer found.
+
+    Attributes
+    ----------
+    cost : float
+        Cost of its solution as our checker reads it; ``inf`` when it found none in time.
+    bound : float or None
+        Its lower bound, where it gives one.
+    seconds : float
+        Wall time from the tuples to the chosen tuples.
+    tuples : int32 array, shape (K, S)
+        The chosen tuples.
+    proven : bool
+        Whether the peer itself says that this is the optimum.
+    """
+
+    cost: float
+    bound: float | None
+    seconds: float
+    tuples: NDArray[np.int32]
+    proven: bool = False
+
+
+Chosen = tuple[NDArray[np.intp] | None, float | None, bool]
+Peer = Callable[[AssignmentProblem, float], PeerAnswer]
+
+
+def _answer(
+    solve: Callable[[AssignmentProblem, float], Chosen], problem: AssignmentProblem, limit: float
+) -> PeerAnswer:
+    start = time.perf_counter()
+    indices, bound, proven = solve(problem, limit)
+    seconds = time.perf_counter() - start
+    if indices is None:
+        return PeerAnswer(float("inf"), bound, seconds, problem.tuples[:0])
+    tuples = problem.tuples[indices]
+    return PeerAnswer(check_answer(problem, tuples), bound, seconds, tuples, proven)
+
+
+def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Return (measurement, tuple) of each non-zero index, and which measurements must be covered."""
+    sizes = problem.sizes.astype(np.int64)
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    column, sensor = np.nonzero(problem.tuples)
+    row = (offsets[sensor] + problem.tuples[column, sensor] - 1).astype(np.int64)
+    must = np.repeat(problem.dummy | (sizes == sizes.min()), sizes)
+    return row, column.astype(np.int64), must.astype(np.bool_)
+
+
+def _cp_sat(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    from ortools.sat import cp_model_pb2
+    from ortools.sat.python import cp_model
+
+    row, column, must = _rows(problem)
+    model = cp_model.CpModel()
+    take = [model.new_bool_var("") for _ in range(problem.num_tuples)]
+    members: list[list[cp_model.IntVar]] = [[] for _ in must]
+    for r, c in zip(row.tolist(), column.tolist(), strict=True):
+        members[r].append(take[c])
+    for needed, literals in zip(must.tolist(), members, strict=True):
+        if needed:
+            model.add_exactly_one(literals)
+        else:
+            model.add_at_most_one(literals)
+    scaled = np.round(problem.costs * CP_SAT_SCALE).astype(np.int64)
+    model.minimize(cp_model.LinearExpr.weighted_sum(take, scaled.tolist()))
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = 2
+    solver.parameters.max_time_in_seconds = time_limit
+    solver.parameters.relative_gap_limit = 0.0
+    status = solver.solve(model)
+    # Each of at most sum(sizes) chosen tuples is off by half a unit at most.
+    bound = solver.best_objective_bound / CP_SAT_SCALE - 0.5 * float(problem.sizes.sum()) / CP_SAT_SCALE
+    if status not in (cp_model_pb2.CpSolverStatus.OPTIMAL, cp_model_pb2.CpSolverStatus.FEASIBLE):
+        return None, bound, False
+    values = np.fromiter((solver.boolean_value(x) for x in take), dtype=bool, count=len(take))
+    return np.flatnonzero(values), bound, status == cp_model_pb2.CpSolverStatus.OPTIMAL
+
+
+def _scip(problem: AssignmentProblem, time_limit: float, threads: int) -> Chosen:
+    from ortools.math_opt import model_pb2
+    from ortools.math_opt.python import mathopt
+
+    row, column, must = _rows(problem)
+    order = np.lexsort((column, row))
+    proto = model_pb2.ModelProto()
+    num, rows = problem.num_tuples, len(must)
+    proto.variables.ids.extend(range(num))
+    proto.variables.lower_bounds.extend([0.0] * num)
+    proto.variables.upper_bounds.extend([1.0] * num)
+    proto.variables.integers.extend([True] * num)
+    proto.objective.linear_coefficients.ids.extend(range(num))
+    proto.objective.linear_coefficients.values.extend(problem.costs.tolist())
+    proto.linear_constraints.ids.extend(range(rows))
+    proto.linear_constraints.lower_bounds.extend(must.astype(float).tolist())
+    proto.linear_constraints.upper_bounds.extend([1.0] * rows)
+    proto.linear_constraint_matrix.row_ids.extend(row[order].tolist())
+    proto.linear_constraint_matrix.column_ids.extend(column[order].tolist())
+    proto.linear_constraint_matrix.coefficients.extend([1.0] * len(row))
+    result = mathopt.solve(
+        mathopt.Model.from_model_proto(proto),
+        mathopt.SolverType.GSCIP,
+        params=mathopt.SolveParameters(
+            threads=threads,
+            relative_gap_tolerance=0.0,
+            time_limit=datetime.timedelta(seconds=time_limit),
+        ),
+    )
+    bound = result.best_objective_bound()
+    if not result.has_primal_feasible_solution():
+        return None, bound, False
+    values = np.array(list(result.variable_values().values()))
+    return np.flatnonzero(values > 0.5), bound, result.termination.reason == mathopt.TerminationReason.OPTIMAL
+
+
+def _highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    row, column, must = _rows(problem)
+    matrix = csc_array((np.ones(row.size), (row, column)), shape=(len(must), problem.num_tuples))
+    result = milp(
+        problem.costs,
+        integrality=np.ones(problem.num_tuples, dtype=np.int64),
+        bounds=Bounds(0, 1),
+        constraints=LinearConstraint(matrix, must.astype(float), 1.0),
+        # 0 would mean "the default, 1e-4", and wrong answers called optimal
+        options={"mip_rel_gap": 1e-9, "time_limit": time_limit},
+    )
+    bound = None if result.mip_dual_bound is None else float(result.mip_dual_bound)
+    if result.x is None:
+        return None, bound, False
+    return np.flatnonzero(result.x > 0.5), bound, result.status == 0
+
+
+def _sequential(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """Assign sensor after sensor to the clusters so far; a cluster's cost is its tuple over the sensors seen.
+
+    With dummies a cluster costs what its tuple with all later sensors missed costs, and one that is not
+    listed cannot be formed: this is what a tracker knows when it goes from sensor to sensor. An axial
+    problem has no such tuples; there a cluster is scored by its best completion.
+    """
+    tuples, costs = problem.tuples, problem.costs
+    num_sensors = problem.num_sensors
+    group = np.arange(problem.sizes[0]) + 1
+    clusters = group[:, None].astype(np.int32)
+    for sensor in range(1, num_sensors):
+        size = int(problem.sizes[sensor])
+        whole = ~tuples[:, sensor + 1 :].any(axis=1) if problem.dummy else np.ones(len(tuples), dtype=bool)
+        price = _prefix_costs(tuples[whole, : sensor + 1], costs[whole])
+        now = np.array([price.get((*row, 0), np.inf) for row in clusters.tolist()])
+        alone = np.array([price.get((*([0] * sensor), j + 1), np.inf) for j in range(size)])
+        matrix = np.full((len(clusters), size), np.inf)
+        where = {tuple(row): i for i, row in enumerate(clusters.tolist())}
+        for key, cost in price.items():
+            i = where.get(key[:-1])
+            if i is not None and key[-1]:
+                matrix[i, key[-1] - 1] = cost
+        clusters = _extend(clusters, matrix, now, alone, must_pair=not problem.dummy)
+    listed: dict[tuple[int, ...], int] = {}
+    for i in np.argsort(-costs, kind="stable"):
+        listed[tuple(tuples[i].tolist())] = int(i)
+    chosen: list[int] = []
+    for row in clusters.tolist():
+        if tuple(row) in listed:
+            chosen.append(listed[tuple(row)])
+        elif all(row) or problem.dummy:
+            return None, None, False
+    return np.array(chosen, dtype=np.intp), None, False
+
+
+def _prefix_costs(prefixes: NDArray[np.int32], costs: NDArray[np.float64]) -> dict[tuple[int, ...], float]:
+    """Return the least cost of any listed tuple that begins with each prefix."""
+    keys, inverse = np.unique(prefixes, axis=0, return_inverse=True)
+    least = np.full(len(keys), np.inf)
+    np.minimum.at(least, inverse.ravel(), costs)
+    return {tuple(key): cost for key, cost in zip(keys.tolist(), least.tolist(), strict=True)}
+
+
+def _extend(
+    clusters: NDArray[np.int32],
+    matrix: NDArray[np.float64],
+    now: NDArray[np.float64],
+    alone: NDArray[np.float64],
+    *,
+    must_pair: bool,
+) -> NDArray[np.int32]:
+    """Solve one 2-D assignment of clusters to measurements and append its column."""
+    num, size = matrix.shape
+    large = 1e6
+    if must_pair:
+        square = np.where(np.isfinite(matrix), matrix, large)
+    else:
+        # What pairing gains over leaving both apart; each cluster has a private "missed" column.
+        apart = np.where(np.isfinite(now), now, 0.0)[:, None] + np.where(np.isfinite(alone), alone, 0.0)
+        square = np.full((num, size + num), large)
+        square[:, :size] = np.where(np.isfinite(matrix), matrix - apart, large)
+        square[np.arange(num), size + np.arange(num)] = 0.0
+    row, column = linear_sum_assignment(square)
+    paired = (column < size) & (square[row, column] < large / 2)
+    extended = np.concatenate([clusters, np.zeros((num, 1), dtype=np.int32)], axis=1)
+    extended[row[paired], -1] = column[paired] + 1
+    if must_pair:
+        return extended
+    left = np.setdiff1d(np.arange(size), column[paired])
+    new = np.zeros((len(left), extended.shape[1]), dtype=np.int32)
+    new[:, -1] = left + 1
+    return np.concatenate([extended, new])
+
+
+def dense_elements(problem: AssignmentProblem) -> float:
+    """Return the elements of the dense axial tensor that ``nrl_tracker`` needs.
+
+    A problem with dummies becomes an axial one by giving every measurement a private dummy: with N
+    measurements in all, N^S elements.
+    """
+    if problem.dummy:
+        return float(problem.sizes.sum()) ** problem.num_sensors
+    return float(np.prod(problem.sizes.astype(float)))
+
+
+def _nrl_tracker(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    from pytcl.assignment_algorithms.nd_assignment import (  # type: ignore[import-untyped,unused-ignore]
+        relaxation_assignment_nd,
+    )
+
+    large = 1e4 + float(np.abs(problem.costs).max(initial=0.0))
+    sizes = problem.sizes.astype(np.int64)
+    shape = (int(sizes.sum()),) * problem.num_sensors if problem.dummy else tuple(sizes.tolist())
+    tensor = np.full(shape, large)
+    if problem.dummy:
+        _fill_with_dummies(tensor, problem)
+    else:
+        np.minimum.at(tensor, tuple((problem.tuples - 1).T), problem.costs)
+    result = relaxation_assignment_nd(tensor)
+    picked = result.assignments + 1
+    if problem.dummy:
+        picked = np.where(picked > sizes, 0, picked)
+        picked = picked[picked.any(axis=1)]
+    listed: dict[tuple[int, ...], int] = {}
+    for i in np.argsort(-problem.costs, kind="stable"):
+        listed[tuple(problem.tuples[i].tolist())] = int(i)
+    keys = [tuple(row) for row in picked.tolist()]
+    # Its multipliers are free in sign, wrong for indices that may stay unused: on a rectangular problem
+    # (3 x 5 x 4) we saw its bound above the optimum and a wrong answer called converged.
+    square = len(set(shape)) == 1
+    bound = result.cost - result.gap if square else None
+    if not all(key in listed for key in keys):
+        return None, bound, False
+    return np.array([listed[key] for key in keys], dtype=np.intp), bound, result.converged and square
+
+
+def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) -> None:
+    """Write the costs into every place where a 0 may be any of the dummies of its sensor."""
+    sizes = problem.sizes.tolist()
+    tensor[tuple(slice(size, None) for size in sizes)] = 0.0
+    for key, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
+        place = tuple(
+            slice(index - 1, index) if index else slice(size, None)
+            for index, size in zip(key, sizes, strict=True)
+        )
+        np.minimum(tensor[place], cost, out=tensor[place])
+
+
+def cp_sat(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """OR-Tools CP-SAT with two workers, costs scaled by 1e6 and rounded."""
+    return _answer(_cp_sat, problem, time_limit)
+
+
+def scip(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """Run SCIP in OR-Tools MathOpt on two threads (its concurrent mode)."""
+    return _answer(lambda p, limit: _scip(p, limit, 2), problem, time_limit)
+
+
+def scip_1(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """Run SCIP in OR-Tools MathOpt on one thread, often faster than its concurrent mode."""
+    return _answer(lambda p, limit: _scip(p, limit, 1), problem, time_limit)
+
+
+def highs(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """HiGHS through scipy, relative gap 1e-9."""
+    return _answer(_highs, problem, time_limit)
+
+
+def sequential(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """Two-dimensional assignments sensor by sensor, first to last; no bound."""
+    return _answer(_sequential, problem, time_limit)
+
+
+def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """N-D relaxation of PyPI's ``nrl-tracker`` with its defaults (100 iterations; it takes no time limit).
+
+    Raises
+    ------
+    MemoryError
+        The dense tensor would exceed `DENSE_LIMIT` elements.
+    """
+    if dense_elements(problem) > DENSE_LIMIT:
+        raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")
+    return _answer(_nrl_tracker, problem, time_limit)
+
+
+PEERS: dict[str, Peer] = {
+    "cp_sat": cp_sat,
+    "scip": scip,
+    "scip_1": scip_1,
+    "highs": highs,
+    "sequential": sequential,
+    "nrl_tracker": nrl_tracker,
+}
+
+
+def warm_up(names: Iterable[str]) -> None:
+    """Import each peer's package by solving a tiny problem, so that no measured run pays for it."""
+    problem = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
+    for name in names:
+        if available(name, problem):
+            PEERS[name](problem, 1.0)
+
+
+def available(name: str, problem: AssignmentProblem) -> bool:
+    """Whether a peer is installed and can take this problem."""
+    if name == "nrl_tracker":
+        return importlib.util.find_spec("pytcl") is not None and dense_elements(problem) <= DENSE_LIMIT
+    return name in PEERS

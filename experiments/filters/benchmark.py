@@ -1,0 +1,264 @@
+"""Time of one prediction and correction against filterpy and Stone Soup, on the same problem in one run.
+
+    python -m experiments.filters.benchmark [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+The problem: tracks of nearly constant velocity; position measurements for the Kalman filter, a radar (range, azimuth,
+elevation) for the others, N = 100 for the ensemble. The others take one track at a time; ours takes all tracks in
+one call, which is how its filters are meant to be used, and, stated apart, one track at a time: all steps of its
+recording in one call (`run`), a step a call (`step`), and two calls a step (`predict`, `update`). Each row is a
+prediction and an update together, the least of several rounds, in which the packages take turns. Times are the
+processor's, which count less of what else the machine does.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from assoc.filters import (
+    ConstantVelocity,
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    Gaussian,
+    KalmanFilter,
+    ModifiedEKF,
+    UnscentedKalmanFilter,
+)
+from assoc.filters.base import Filter
+from assoc.sensors import PositionSensor, Radar3D, Sensor
+from experiments.common.claims import Claim
+from experiments.common.command import main
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+NOISE, DT, MEMBERS = 1.0, 1.0, 100
+ROUNDS = 12
+MEAN = np.array([50e3, 40e3, 10e3, -150.0, -200.0, -10.0])
+COVARIANCE = np.diag([1e4, 1e4, 1e4, 100.0, 100.0, 100.0])
+FULL = np.array([[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]])
+RADAR = Radar3D(position=np.zeros(3), noise=np.array([30.0, 2e-3, 2e-3]), field_of_view=FULL)
+PLACE = PositionSensor(position=np.zeros(3), noise=np.full(3, 50.0), field_of_view=np.array([[-1e6, 1e6]] * 3))
+KINDS: dict[str, tuple[Callable[[ConstantVelocity], Filter[Any]], Sensor]] = {
+    "Kalman": (KalmanFilter, PLACE),
+    "EKF": (ExtendedKalmanFilter, RADAR),
+    "UKF": (UnscentedKalmanFilter, RADAR),
+    "EnKF": (lambda motion: EnsembleKalmanFilter(motion, MEMBERS, 1), RADAR),
+}
+
+
+def microseconds(step: Callable[[], object], repeats: int, rounds: int = 1) -> float:
+    """Return the processor time of a step in microseconds, the least of the rounds."""
+    step()
+    times = []
+    for _ in range(rounds):
+        begin = time.process_time()
+        for _ in range(repeats):
+            step()
+        times.append((time.process_time() - begin) / repeats)
+    return 1e6 * float(np.min(times))
+
+
+def ours(kind: str, tracks: int, repeats: int) -> float:
+    """Time of our filter a track, `tracks` in one call, microseconds."""
+    make, sensor = KINDS[kind]
+    filter_ = make(ConstantVelocity(NOISE))
+    state = filter_.start(Gaussian(np.tile(MEAN, (tracks, 1)), COVARIANCE))
+    z = np.tile(sensor.measure(MEAN[None, :3] + MEAN[None, 3:]) + 0.5 * sensor.noise, (tracks, 1))
+    return microseconds(lambda: filter_.update(filter_.predict(state, DT), z, sensor), repeats) / tracks
+
+
+def stepping(kind: str, repeats: int) -> float:
+    """Time of our filter for one track, prediction and correction in one call, microseconds."""
+    make, sensor = KINDS[kind]
+    filter_ = make(ConstantVelocity(NOISE))
+    state = filter_.start(Gaussian(MEAN, COVARIANCE))
+    z = sensor.measure(MEAN[None, :3] + MEAN[None, 3:]) + 0.5 * sensor.noise
+    return microseconds(lambda: filter_.step(state, DT, z, sensor), repeats)
+
+
+def recording(kind: str, steps: int, repeats: int) -> float:
+    """Time of our filter a step, one track through all steps of a recording in one call, microseconds."""
+    make, sensor = KINDS[kind]
+    filter_ = make(ConstantVelocity(NOISE))
+    state = filter_.start(Gaussian(MEAN, COVARIANCE))
+    places = MEAN[None, :3] + MEAN[None, 3:] * DT * np.arange(1, steps + 1)[:, None]
+    z = sensor.measure(places) + 0.5 * sensor.noise
+    return microseconds(lambda: filter_.run(state, z, sensor, DT), repeats) / steps
+
+
+def _models() -> tuple[Array, Array]:
+    F, Q = ConstantVelocity(NOISE).matrices(DT)
+    return F[0], Q[0]
+
+
+def filterpy(kind: str, repeats: int) -> float:
+    """Time of filterpy's filter, microseconds."""
+    from filterpy import kalman
+
+    F, Q = _models()
+    _, sensor = KINDS[kind]
+    z = sensor.measure(MEAN[None, :3] + MEAN[None, 3:])[0] + 0.5 * sensor.noise
+
+    def see(x: Array) -> Array:
+        d = np.asarray(x).ravel()
+        ground = math.hypot(d[0], d[1])
+        return np.array([math.hypot(ground, d[2]), math.atan2(d[1], d[0]), math.atan2(d[2], ground)])
+
+    def slopes(x: Array) -> Array:
+        return np.hstack([sensor.jacobian(np.asarray(x).reshape(1, -1)[:, :3])[0], np.zeros((3, 3))])
+
+    if kind == "Kalman":
+        f = kalman.KalmanFilter(dim_x=6, dim_z=3)
+        f.F, f.Q, f.R, f.H = F, Q, sensor.covariance, np.eye(3, 6)
+        f.x, update = MEAN.copy(), lambda: f.update(z)
+    elif kind == "EKF":
+        f = kalman.ExtendedKalmanFilter(dim_x=6, dim_z=3)
+        f.F, f.Q, f.R = F, Q, sensor.covariance
+        f.x, update = MEAN.copy(), lambda: f.update(z, slopes, see)
+    elif kind == "UKF":
+        points = kalman.MerweScaledSigmaPoints(6, alpha=1.0, beta=2.0, kappa=0.0)
+        f = kalman.UnscentedKalmanFilter(6, 3, DT, hx=see, fx=lambda x, dt: F @ x, points=points)
+        f.Q, f.R = Q, sensor.covariance
+        f.x, update = MEAN.copy(), lambda: f.update(z)
+    else:
+        f = kalman.EnsembleKalmanFilter(MEAN, COVARIANCE, 3, DT, MEMBERS, see, lambda x, dt: F @ x)
+        f.Q, f.R, update = Q, sensor.covariance, lambda: f.update(z)
+    f.P = COVARIANCE.copy()
+
+    def step() -> None:
+        f.predict()
+        update()
+        if kind != "EnKF":
+            f.x, f.P = MEAN.copy(), COVARIANCE.copy()
+
+    return microseconds(step, repeats)
+
+
+def stonesoup(kind: str, repeats: int) -> float:
+    """Time of Stone Soup's predictor and updater, microseconds."""
+    from stonesoup.models.measurement.linear import LinearGaussian
+    from stonesoup.models.measurement.nonlinear import CartesianToElevationBearingRange
+    from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel
+    from stonesoup.models.transition.linear import ConstantVelocity as WhiteAcceleration
+    from stonesoup.predictor import ensemble, kalman
+    from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
+    from stonesoup.types.state import EnsembleState, GaussianState
+    from stonesoup.updater import ensemble as ensemble_updater
+    from stonesoup.updater import kalman as updaters
+
+    order = [0, 3, 1, 4, 2, 5]
+    transition = CombinedLinearGaussianTransitionModel([WhiteAcceleration(NOISE)] * 3)
+    _, sensor = KINDS[kind]
+    if kind == "Kalman":
+        model: Any = LinearGaussian(6, (0, 2, 4), sensor.covariance)
+    else:
+        model = CartesianToElevationBearingRange(6, (0, 2, 4), sensor.covariance[::-1, ::-1].copy())
+    begin = datetime.datetime(2026, 1, 1)
+    later = begin + datetime.timedelta(seconds=DT)
+    prior: Any = GaussianState(MEAN[order, None], COVARIANCE[np.ix_(order, order)], timestamp=begin)
+    predictor, updater = {
+        "Kalman": (kalman.KalmanPredictor, updaters.KalmanUpdater),
+        "EKF": (kalman.ExtendedKalmanPredictor, updaters.ExtendedKalmanUpdater),
+        "UKF": (kalman.UnscentedKalmanPredictor, updaters.UnscentedKalmanUpdater),
+        "EnKF": (ensemble.EnsemblePredictor, ensemble_updater.EnsembleUpdater),
+    }[kind]
+    predict, update = predictor(transition), updater(model)
+    if kind == "EnKF":
+        prior = EnsembleState.from_gaussian_state(prior, MEMBERS)
+    middle = GaussianState(MEAN[order, None], COVARIANCE, timestamp=later)
+    z = model.function(middle, noise=False)
+    detection = Detection(z, timestamp=later, measurement_model=model)
+
+    def step() -> None:
+        # each step predicts anew: Stone Soup would otherwise remember the prediction
+        prediction = predict.predict(prior, timestamp=later)
+        update.update(SingleHypothesis(prediction, detection))
+
+    def fresh() -> None:
+        for cached in (predict, update):
+            for function in ("_predict_over_interval", "predict", "predict_measurement"):
+                clear = getattr(getattr(type(cached), function, None), "cache_clear", None)
+                if clear is not None:
+                    clear()
+        step()
+
+    return microseconds(fresh, repeats)
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Time every filter of the three packages."""
+    repeats = 10 if quick else 200
+    tracks = 1_000 if quick else 10_000
+    claims: list[Claim] = []
+    table: dict[str, dict[str, float]] = {}
+    for kind in KINDS:
+        slow = 1 if kind == "EnKF" else 10
+        rounds = [
+            {
+                "filterpy": filterpy(kind, max(repeats // slow // 2, 2)),
+                "Stone Soup": stonesoup(kind, max(repeats // slow // 5, 2)),
+                "assoc, two calls": ours(kind, 1, repeats),
+                "assoc, one call": stepping(kind, repeats),
+                "assoc, a recording": recording(kind, 100, max(repeats // 100, 1)),
+                "assoc, batch": ours(kind, tracks if kind != "EnKF" else tracks // 10, 1),
+            }
+            for _ in range(ROUNDS)
+        ]
+        row = {name: float(np.min([one[name] for one in rounds])) for name in rounds[0]}
+        table[kind] = row
+        faster = min(row["filterpy"], row["Stone Soup"])
+        claims += [Claim(f"{kind}: {name}", "us", None, value) for name, value in row.items()]
+        for words, name in (
+            ("in a batch", "assoc, batch"),
+            ("one track's recording in a call", "assoc, a recording"),
+            ("one track, a step in one call", "assoc, one call"),
+            ("one track, a step in two calls", "assoc, two calls"),
+        ):
+            claims.append(
+                Claim(f"{kind}: faster of the two / assoc, {words}", "", 10.0, faster / row[name], None, (10, None))
+            )
+    ekf = ExtendedKalmanFilter(ConstantVelocity(NOISE))
+    state = Gaussian(np.tile(MEAN, (tracks, 1)), COVARIANCE)
+    z = np.tile(RADAR.measure(MEAN[None, :3]), (tracks, 1))
+    alone = microseconds(lambda: ekf.update(state, z, RADAR), 1, ROUNDS) / tracks
+    claims.append(Claim(f"EKF, batch of {tracks}: update alone, a track", "us", 2.0, alone, None, (None, 2.0)))
+    both = table["EKF"]["assoc, batch"]
+    claims.append(Claim(f"EKF, batch of {tracks}: prediction and update, a track", "us", 2.0, both, None, (None, 2.0)))
+    modified = ModifiedEKF(ConstantVelocity(NOISE))
+    claims.append(
+        Claim(f"modified EKF, batch of {tracks}: update alone, a track", "us", None,
+              microseconds(lambda: modified.update(state, z, RADAR), 1, ROUNDS) / tracks)
+    )  # fmt: skip
+    return claims, table
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw the times as bars."""
+    axes = figure.subplots()
+    names = list(next(iter(shown.values())))
+    for i, name in enumerate(names):
+        values = [row[name] for row in shown.values()]
+        bars = axes.bar(np.arange(len(shown)) + 0.15 * i, values, 0.14, label=name)
+        axes.bar_label(bars, [f"{value:.2g}" if value < 100 else f"{value:.0f}" for value in values], fontsize=7)
+    axes.set(yscale="log", ylabel="microseconds of processor time")
+    axes.set_xticks(np.arange(len(shown)) + 0.375, list(shown))
+    axes.set_ylim(0.3, 10 * max(max(row.values()) for row in shown.values()))
+    axes.legend(ncols=3, fontsize=8)
+
+
+TITLE = "Time of a prediction and update (goal in the column of the paper)"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the benchmark; returns its exit code."""
+    return main("filters.benchmark", TITLE, experiment, draw, (9, 4.5), arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

@@ -1,0 +1,101 @@
+"""Covariances of every filter through 10^5 predictions and corrections: symmetric, positive definite, bounded?
+
+    python -m experiments.filters.endurance [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+A target that stands still is measured by a radar (by a position sensor for the Kalman filter), corrections come in
+bursts of three for a prediction, which is hardest on a covariance. Watched every 100 steps: the least
+eigenvalue of the correlation matrix (above 0: positive definite, whatever the units), and the largest asymmetry, in
+units of the standard deviations.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc.filters import ExtendedKalmanFilter, Gaussian, KalmanFilter
+from assoc.filters.base import Filter
+from experiments.common.claims import Claim
+from experiments.common.command import main
+from experiments.filters.benchmark import PLACE, RADAR
+from experiments.filters.kinds import of_each_kind
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+EVERY = 100
+BURST = 3
+PLACE_OF_TARGET = (30e3, 20e3, 5e3)
+
+
+def filters(rng: np.random.Generator) -> dict[str, Filter[Any]]:
+    """Return one filter of each kind."""
+    kinds = of_each_kind(2.0, (20,), rng, ExtendedKalmanFilter)
+    return {name: one for name, one in kinds.items() if "simplified" not in name}
+
+
+def endure(filter_: Filter[Any], steps: int, rng: np.random.Generator) -> Array:
+    """Least eigenvalue, largest asymmetry and position's deviation (m) every EVERY steps, (steps / EVERY, 3)."""
+    n = filter_.motion.dim
+    sensor: Any = PLACE if isinstance(filter_, KalmanFilter) else RADAR
+    mean = np.zeros(n)
+    mean[:3] = PLACE_OF_TARGET
+    state = filter_.start(Gaussian(mean, np.diag([1e8, 1e8, 1e8, 1e6, 1e6, 1e6, 1.0][:n])))
+    exact = sensor.measure(mean[None, :3])
+    watched = []
+    for k in range(steps):
+        if k % BURST == 0:
+            state = filter_.predict(state, 0.1)
+        state = filter_.update(state, exact + rng.standard_normal((1, 3)) * sensor.noise, sensor).state
+        if k % EVERY == EVERY - 1:
+            P = state.covariance[0]
+            scale = np.sqrt(np.diag(P))
+            unit = P / np.outer(scale, scale)
+            watched.append((np.linalg.eigvalsh(unit).min(), np.abs(unit - unit.T).max(), np.sqrt(np.trace(P[:3, :3]))))
+    return np.array(watched)
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Watch every filter."""
+    steps = 2_000 if quick else 100_000
+    claims, shown = [], {}
+    for name, filter_ in filters(rng).items():
+        shown[name] = endure(filter_, steps, rng)
+        least, asymmetry, deviation = shown[name].T
+        claims += [
+            Claim(f"{name}: least eigenvalue of the correlation in {steps} steps", "", None, least.min(), None,
+                  (1e-12, None)),
+            Claim(f"{name}: largest asymmetry", "", None, asymmetry.max(), None, (None, 1e-12)),
+            Claim(f"{name}: largest deviation of the position after {EVERY} steps", "m", None, deviation.max(), None,
+                  (None, 300.0)),
+        ]  # fmt: skip
+    return claims, shown
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw the least eigenvalues over the steps, of each fiftieth part the least."""
+    from matplotlib.ticker import NullLocator
+
+    axes = figure.subplots()
+    for name, watched in shown.items():
+        parts = np.array_split(watched[:, 0], min(50, len(watched)))
+        ends = EVERY * np.cumsum([len(part) for part in parts])
+        # EKF, modified EKF and UKF are one line: the later ones are dotted
+        style = {"modified EKF": "--", "UKF": ":"}.get(name, "-")
+        axes.semilogy(ends, [part.min() for part in parts], style, label=name, linewidth=1.4)
+    axes.set(xlabel="corrections", ylabel="least eigenvalue of the correlation", ylim=(0.01, 0.5))
+    axes.set_yticks([0.01, 0.02, 0.05, 0.1, 0.2, 0.5], ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"])
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.legend(ncols=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+
+
+TITLE = "Covariances through many steps"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    return main("filters.endurance", TITLE, experiment, draw, (8, 4.5), arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

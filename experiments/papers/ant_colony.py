@@ -1,0 +1,339 @@
+"""Table 1 of the ant colony paper: ``python -m experiments.papers.ant_colony [--quick] [--json FILE]``.
+
+All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
+"paper" (equations 7 to 11 to the letter) and in mode "mmas", several seeds each.
+
+*Cycles to convergence* in mode "paper" are the cycles of all ants on one scan's whole problem until all have
+walked the same tour, where a tour is a set of tuples, in whatever order. The first, greedy cycle counts, and
+so does the last, in which all agree; a search that is cut off at the limit counts with the limit. The nodes are
+the tuples that cost less than their measurements as false alarms, and the false alarms of measurements in such
+tuples: a measurement in no such tuple is a false alarm in every tour and takes no part. A scan without
+nodes takes 0 cycles. In mode "mmas" a cycle is one of all ants on one independent component, and the
+number is that until the last component is left; it ends with the certificate and has no counterpart in the paper.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._files.output import write_atomically, write_text
+from experiments.common import claims as forms
+from experiments.common.claims import Claim
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "aco_parameters"
+
+# Table 1: alpha, beta, and the mean iterations for rho 0.3, 0.5, 0.7, 0.9
+_TABLE_1 = {
+    (1, 1): (4.05, 4.06, 4.07, 4.08),
+    (1, 2): (4.09, 4.10, 4.08, 4.08),
+    (2, 1): (4.03, 4.06, 4.06, 4.06),
+    (2, 2): (4.05, 4.06, 4.07, 4.08),
+    (2, 3): (4.06, 4.08, 4.11, 4.07),
+    (3, 2): (4.05, 4.06, 4.06, 4.06),
+}
+_RHO = (0.3, 0.5, 0.7, 0.9)
+PAPER = {(a, b, rho): value for (a, b), row in _TABLE_1.items() for rho, value in zip(_RHO, row, strict=True)}
+"""Mean iterations of the paper by alpha, beta, rho."""
+
+BEST = (2, 1, 0.3)
+_CELLS = ("cycles", "cycles_low", "cycles_high", "optimal", "ms")
+MODES = ("paper", "mmas")
+ANTS = 15
+TOLERANCE = 0.1
+"""Share by which a mean may differ from the paper's and still count as reproduced."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One mode: arrays over settings (the paper's order), scans and seeds.
+
+    Attributes
+    ----------
+    cycles, optimal, seconds : float arrays, shape (24, scans, seeds)
+    """
+
+    cycles: Any
+    optimal: Any
+    seconds: Any
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; returns the exit code."""
+    from assoc._cli.program import run
+
+    return run(lambda: _main(arguments), "experiments.papers.ant_colony")
+
+
+def _main(arguments: Sequence[str] | None) -> None:
+    options = _parser().parse_args(arguments)
+    started = time.perf_counter()
+    scans, seeds = (30, 2) if options.quick else (100, 10)
+    scans, seeds = options.scans or scans, options.seeds or seeds
+    folder = Path(options.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    held: Any = nullcontext(options.study) if options.study else tempfile.TemporaryDirectory(prefix="assoc-")
+    with held as study:
+        frame = run_study(study, options.seed, scans, seeds, options.jobs)
+    elapsed = time.perf_counter() - started
+    measured = {mode: gather(frame, mode) for mode in MODES}
+    rows = table(measured)
+    found = claims(measured, int((frame["parameter_iterations"] <= frame["iterations"]).sum()))
+    print_rows(rows)
+    print()
+    forms.print_table(
+        [claim for claim in found if not claim.quantity.startswith("setting")], "Table 1 and its conclusions"
+    )
+    _write_csv(folder / "settings.csv", rows)
+    forms.save_csv(folder / "claims.csv", found)
+    for path in (folder / "claims.json", options.json):
+        if path is not None:
+            forms.save_json(path, found, NAME, options.seed)
+    draw(measured, folder / "table_1.png")
+    print(f"{len(frame)} runs ({scans} scans, {seeds} seeds) in {elapsed:.0f} s; tables and figure in {folder}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m experiments.papers.ant_colony", description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="30 scans and 2 seeds, under a minute")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the scene and the ants (default 0)")
+    parser.add_argument("--scans", type=int, metavar="N", help="scans of the scene (default 100)")
+    parser.add_argument("--seeds", type=int, metavar="N", help="runs of each setting on each scan (default 10)")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the claims here")
+    parser.add_argument("--study", metavar="FOLDER", help="keep the runs here, and go on with what is there")
+    parser.add_argument(
+        "-o", "--output", default="results/aco_parameters", metavar="FOLDER", help="default results/aco_parameters"
+    )
+    return parser
+
+
+def run_study(folder: str, seed: int, scans: int, seeds: int, jobs: int) -> pd.DataFrame:
+    """Run all settings in both modes."""
+    from assoc._cli.progress import Bar
+    from assoc.simulation import simulate
+    from assoc.sweeps import Setting, Study, load
+    from assoc.sweeps.sources import Source
+
+    settings = [
+        Setting("aco", {"mode": mode, "ants": ANTS, "alpha": alpha, "beta": beta, "rho": rho})
+        for mode in MODES
+        for alpha, beta, rho in PAPER
+    ]
+    scene = Source(simulate("three-radar", seed, scans=scans), "three-radar")
+    with Bar(sys.stderr) as bar:
+        Study([scene], settings, seeds, seed).run(folder, jobs=jobs, progress=bar)
+    frame = load(folder)
+    keys = {setting.key for setting in settings}
+    return frame[frame["setting"].isin(keys) & (frame["repeat"] < seeds)].reset_index(drop=True)
+
+
+def gather(frame: pd.DataFrame, mode: str) -> Measured:
+    """Put the runs of a mode into arrays over settings, scans and seeds."""
+    runs = frame[frame["mode"] == mode]
+    parts = []
+    for alpha, beta, rho in PAPER:
+        part = runs[(runs["alpha"] == alpha) & (runs["beta"] == beta) & (runs["rho"] == rho)]
+        parts.append(part.sort_values(["scan", "repeat"]))
+    shape = len(parts), frame["scan"].nunique(), frame["repeat"].nunique()
+    arrays = (
+        np.stack([part[name].to_numpy(dtype=float) for part in parts]).reshape(shape)
+        for name in ("iterations", "optimal", "time")
+    )
+    return Measured(*arrays)
+
+
+def table(measured: dict[str, Measured]) -> list[dict[str, Any]]:
+    """One row a setting: the paper's mean, and ours with interval, optimal rate and time in both modes."""
+    rows = []
+    for i, ((alpha, beta, rho), paper) in enumerate(PAPER.items()):
+        row: dict[str, Any] = {"alpha": alpha, "beta": beta, "rho": rho, "paper_iterations": paper}
+        for mode, one in measured.items():
+            low, high = _interval(one.cycles[i])
+            row[f"{mode}_cycles"] = float(one.cycles[i].mean())
+            row[f"{mode}_cycles_low"], row[f"{mode}_cycles_high"] = low, high
+            row[f"{mode}_optimal"] = float(one.optimal[i].mean())
+            row[f"{mode}_ms"] = float(1e3 * one.seconds[i].mean())
+        rows.append(row)
+    return rows
+
+
+def _interval(values: Any) -> tuple[float, float]:
+    from assoc.sweeps.bootstrap import mean_interval
+
+    return mean_interval(values)
+
+
+def claims(measured: dict[str, Measured], cut_off: int = 0) -> list[Claim]:
+    """What the paper says beside what we found.
+
+    Parameters
+    ----------
+    measured : dict of Measured
+        For each mode.
+    cut_off : int
+        Runs that reached the limit of cycles.
+    """
+    found = _conclusions(measured["paper"], "paper", np.array(list(PAPER.values())))
+    found.append(Claim("mode paper: runs cut off at the limit of cycles", "", None, cut_off, band=(0, 0)))
+    found += _conclusions(measured["mmas"], "mmas", None)
+    for i, ((alpha, beta, rho), paper) in enumerate(PAPER.items()):
+        words = f"alpha {alpha} beta {beta} rho {rho}"
+        band = (1 - TOLERANCE) * paper, (1 + TOLERANCE) * paper
+        cycles = measured["paper"].cycles[i]
+        name = f"setting {words}, mode paper: mean cycles to convergence"
+        found.append(Claim(name, "cycles", paper, cycles.mean(), _interval(cycles), band))
+        for mode, one in measured.items():
+            if mode != "paper":
+                name = f"setting {words}, mode {mode}: mean cycles"
+                found.append(Claim(name, "cycles", None, one.cycles[i].mean(), _interval(one.cycles[i])))
+            rate = 100 * one.optimal[i]
+            name = f"setting {words}, mode {mode}: scans certified optimal"
+            found.append(Claim(name, "%", None, rate.mean(), _interval(rate)))
+            name = f"setting {words}, mode {mode}: mean time"
+            found.append(Claim(name, "ms", None, 1e3 * one.seconds[i].mean(), _interval(1e3 * one.seconds[i])))
+    return found
+
+
+def _conclusions(one: Measured, mode: str, paper: Any) -> list[Claim]:
+    from assoc.sweeps.bootstrap import resampled_means
+
+    settings = list(PAPER)
+    greater = np.array([alpha > beta for alpha, beta, _ in settings])
+    best = settings.index(BEST)
+    others = np.arange(len(settings)) != best
+
+    def contrast(means: Any) -> Any:
+        return means[..., greater].mean(axis=-1) - means[..., ~greater].mean(axis=-1)
+
+    def lead(means: Any) -> Any:
+        return means[..., best] - means[..., others].min(axis=-1)
+
+    def spread(means: Any) -> Any:
+        return np.ptp(means, axis=-1)
+
+    def rank(means: Any) -> Any:
+        ours = means[..., [best]]
+        # settings that tie share the places between them
+        return 1 + (means[..., others] < ours).sum(axis=-1) + (means[..., others] == ours).sum(axis=-1) / 2
+
+    def compared(words: str, unit: str, values: Any, measure: Any, **how: Any) -> Claim:
+        # rounded, so that equal means tie
+        interval = _ends(measure(resampled_means(values).round(9)))
+        known = None if paper is None or values is not one.cycles else float(measure(paper))
+        # a difference holds if its whole interval is on the right side of zero
+        certain = how.pop("certain", None)
+        if certain is not None:
+            words += f", whole interval {certain} 0"
+            how["holds"] = interval[1] < 0 if certain == "below" else interval[0] > 0
+        return Claim(
+            f"mode {mode}: {words}", unit, known, float(measure(values.mean(axis=(1, 2)).round(9))), interval, **how
+        )
+
+    rate, seconds = 100 * one.optimal, 1e3 * one.seconds
+    found = []
+    if paper is not None:
+        found.append(
+            compared(
+                "mean cycles over all settings",
+                "cycles",
+                one.cycles,
+                lambda m: m.mean(axis=-1),
+                band=((1 - TOLERANCE) * float(paper.mean()), (1 + TOLERANCE) * float(paper.mean())),
+            )
+        )
+    found += [
+        compared("largest less smallest mean cycles of a setting", "cycles", one.cycles, spread, band=(0, 0.1)),
+        compared(
+            "cycles, alpha > beta less the others", "cycles", one.cycles, contrast, band=(None, 0), certain="below"
+        ),
+        compared(
+            "certified optimal, alpha > beta less the others", "%", rate, contrast, band=(0, None), certain="above"
+        ),
+        compared("time, alpha > beta less the others", "ms", seconds, contrast, band=(None, 0), certain="below"),
+        compared("rank in cycles of alpha 2 beta 1 rho 0.3 of 24", "", one.cycles, rank, band=(1, 1)),
+        compared(
+            "cycles, alpha 2 beta 1 rho 0.3 less the best other",
+            "cycles",
+            one.cycles,
+            lead,
+            band=(None, 0),
+            certain="below",
+        ),
+        compared("rank in time of alpha 2 beta 1 rho 0.3 of 24", "", seconds, rank, band=(1, 1)),
+        compared("least certified optimal of a setting", "%", rate, lambda m: m.min(axis=-1), band=(99, 100)),
+    ]
+    return found
+
+
+def _ends(values: Any) -> tuple[float, float]:
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def print_rows(rows: list[dict[str, Any]]) -> None:
+    """Print one line a setting."""
+    print(f"{'':14}  {'paper':>6}  {'mode paper':>36}  {'mode mmas':>36}")
+    head = f"{'cycles':>6}  {'95 %':>12}  {'optimal':>7}  {'ms':>5}"
+    print(f"{'alpha beta rho':14}  {'cycles':>6}  {head}  {head}")
+    for row in rows:
+        line = f"{row['alpha']:5} {row['beta']:4} {row['rho']:3}  {row['paper_iterations']:6.2f}"
+        for mode in MODES:
+            cycles, low, high, rate, ms = (row[f"{mode}_{end}"] for end in _CELLS)
+            line += f"  {cycles:6.2f}  {f'{low:.2f}..{high:.2f}':>12}  {100 * rate:5.1f} %  {ms:5.2f}"
+        print(line)
+
+
+def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+def draw(measured: dict[str, Measured], path: Path) -> None:
+    """Draw the mean cycles of all settings with their intervals, the paper's beside them."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 6.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2, 1, sharex=True)
+    places = np.arange(len(PAPER))
+    labels = [f"{a} {b} {rho}" for a, b, rho in PAPER]
+    for ax, (mode, one) in zip(axes, measured.items(), strict=True):
+        means = one.cycles.mean(axis=(1, 2))
+        ends = np.array([_interval(values) for values in one.cycles])
+        spread = np.maximum(0.0, np.stack([means - ends[:, 0], ends[:, 1] - means]))
+        ax.errorbar(places, means, yerr=spread, fmt="o", capsize=3, label=f"ours, mode {mode}, 95 % interval")
+        if mode == "paper":
+            ax.plot(places, list(PAPER.values()), "s", color="C3", markersize=4, label="the paper's Table 1")
+        ax.set_ylim(bottom=0)
+        ax.set_ylabel("mean cycles")
+        ax.grid(alpha=0.3)
+        ax.legend(loc="lower right", fontsize=8)
+    axes[-1].set_xticks(places, labels, rotation=90)
+    axes[-1].set_xlabel("alpha, beta, rho")
+    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=130))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""Two aircraft that cross, fly in parallel or meet head-on: do their tracks stay theirs?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc.metrics import label_switches, plot_identity_switches
+from assoc.recordings import Recording, clustering_time_window, radar_of
+from assoc.simulation import simulate_recording
+from experiments.common.claims import Claim
+from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
+from experiments.papers.clustering_time_window.judging import Taken, run
+from experiments.papers.clustering_time_window.traffic import MISSES, ROTATION, nearest
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+TRAFFIC = ("crossing", "parallel", "head-on")
+DURATION = 600.0
+GOAL = 95.0
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """One pair and what the multiple hypothesis tracker made of it, for the figure."""
+
+    recording: Recording
+    taken: Taken
+
+
+def judge(runs: int, rng: np.random.Generator) -> tuple[list[Claim], dict[str, Example]]:
+    """Identity switches over seeds."""
+    claims, examples = [], {}
+    for traffic in TRAFFIC:
+        without: dict[str, list[bool]] = {}
+        astray: list[int] = []
+        for _ in range(runs):
+            seed = int(rng.integers(2**31))
+            recording = simulate_recording("rotating-radar", seed, traffic=traffic, duration=DURATION).recording
+            windows = clustering_time_window(recording, ROTATION)
+            hypotheses = HypothesisTracker(radar_of(recording))
+            run(hypotheses, windows)
+            decided = hypotheses.decided()
+            by_method = {
+                "MHT, CTW, time stamps": decided,
+                "nearest neighbour, CTW, time stamps": run(nearest(recording), windows),
+                "nearest neighbour, CTW": run(
+                    nearest(recording, clock=ROTATION, deletion="groups", patience=MISSES), windows
+                ),
+            }
+            for name, taken in by_method.items():
+                without.setdefault(name, []).append(switches(recording, taken) == 0)
+            astray.append(label_switches(_sources(recording, decided), np.where(decided.confirmed, decided.tracks, -1)))
+            examples.setdefault(traffic, Example(recording, decided))
+        for number, (name, good) in enumerate(without.items()):
+            what = f"{traffic}: pairs without an identity switch, {name}"
+            share = 100.0 * float(np.mean(good))
+            claims.append(Claim(what, "%", None, share, wilson(good), (GOAL, None) if number == 0 else None))
+        what = f"{traffic}: changes of track from plot to plot, single plots gone astray included, MHT"
+        claims.append(Claim(what, "a pair", None, float(np.mean(astray))))
+    return claims, examples
+
+
+def _sources(recording: Recording, taken: Taken) -> Array:
+    assert recording.sources is not None
+    return recording.sources[taken.rows]
+
+
+def switches(recording: Recording, taken: Taken) -> int:
+    """How often an aircraft goes over to another confirmed track."""
+    return plot_identity_switches(_sources(recording, taken), taken.tracks, taken.confirmed)
+
+
+def wilson(good: list[bool]) -> tuple[float, float]:
+    """95 % interval of a share, percent (Wilson's score interval)."""
+    n, p, z = len(good), float(np.mean(good)), 1.96
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * (p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5
+    return 100.0 * max(middle - half, 0.0), 100.0 * min(middle + half, 1.0)

@@ -1,0 +1,124 @@
+"""Scenario S1: what window, time stamps and hypotheses are each worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from assoc.metrics import CtMtIt
+from assoc.recordings import Recording, Window, clustering_time_window, irregular_groups, radar_of
+from assoc.simulation import simulate_recording
+from assoc.tracking import HypothesisOrientedMHT, LifeCycle
+from experiments.common.claims import Claim
+from experiments.common.command import mean_interval
+from experiments.papers.clustering_time_window.baseline import NearestNeighbourTracker, NearestSettings
+from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
+from experiments.papers.clustering_time_window.judging import TakesWindows, run
+from experiments.papers.clustering_time_window.published import OVERALL, RATES, WITH_WINDOW, WITHOUT_WINDOW, by_tens
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MEAN_GROUP = 6.2
+ROTATION = 9.5
+DURATION = 1130.0
+MISSES = 3
+"""Groups without a plot after which the paper's way deletes a track; it says "n"."""
+
+_BY_COUNT = LifeCycle(deletion="count", deletion_count=MISSES, false_probability=1e-3)
+
+
+def nearest(recording: Recording, **settings: Any) -> NearestNeighbourTracker:
+    """The small nearest-neighbour tracker, with the noise that the plots' steps tell."""
+    noise = radar_of(recording).noise
+    return NearestNeighbourTracker(float(noise[0]), float(noise[1]), NearestSettings(**settings))
+
+
+METHODS: dict[str, tuple[str, Callable[[Recording], TakesWindows]]] = {
+    "nearest neighbour, irregular groups": (
+        "irregular",
+        lambda r: nearest(r, clock=MEAN_GROUP, deletion="groups", patience=MISSES),
+    ),
+    "MHT, irregular groups": (
+        "irregular",
+        lambda r: HypothesisTracker(radar_of(r), MEAN_GROUP, life_cycle=_BY_COUNT),
+    ),
+    "nearest neighbour, CTW": ("window", lambda r: nearest(r, clock=ROTATION, deletion="groups", patience=MISSES)),
+    "MHT, CTW": ("window", lambda r: HypothesisTracker(radar_of(r), ROTATION, life_cycle=_BY_COUNT)),
+    "nearest neighbour, irregular groups, time stamps": ("irregular", nearest),
+    "nearest neighbour, CTW, time stamps": ("window", nearest),
+    "MHT, irregular groups, time stamps": ("irregular", lambda r: HypothesisTracker(radar_of(r))),
+    "MHT, CTW, time stamps": ("window", lambda r: HypothesisTracker(radar_of(r))),
+    "Reid's MHT, CTW, time stamps": (
+        "window",
+        lambda r: HypothesisTracker(radar_of(r), kind=HypothesisOrientedMHT),
+    ),
+}
+"""Name -> grouping and tracker. Without time stamps: a fixed time from group to group, deletion after three misses."""
+
+STRONG = "nearest neighbour, irregular groups, time stamps"
+BEST = "MHT, CTW, time stamps"
+SLOW = "Reid's MHT, CTW, time stamps"
+
+
+def judge(runs: int, slow_runs: int, rng: np.random.Generator) -> dict[str, list[CtMtIt]]:
+    """Rates of every method on the same recordings; Reid's MHT, ten times slower, only on the first few."""
+    results: dict[str, list[CtMtIt]] = {name: [] for name in METHODS}
+    for number in range(runs):
+        recording = simulate_recording("rotating-radar", int(rng.integers(2**31)), duration=DURATION).recording
+        groups: dict[str, list[Window]] = {
+            "window": clustering_time_window(recording),
+            "irregular": irregular_groups(recording, rng, MEAN_GROUP),
+        }
+        for name, (grouping, tracker) in METHODS.items():
+            if name != SLOW or number < slow_runs:
+                results[name].append(run(tracker(recording), groups[grouping]).rates(recording))
+    return {name: every for name, every in results.items() if every}
+
+
+def overall(results: dict[str, list[CtMtIt]]) -> dict[str, Array]:
+    """CT, MT, IT of every run, (runs, 3), by method."""
+    return {name: np.array([(one.ct, one.mt, one.it) for one in every]) for name, every in results.items()}
+
+
+def claims(results: dict[str, list[CtMtIt]]) -> list[Claim]:
+    """Tables 4.25 to 4.27 beside ours, and the goals."""
+    rates = overall(results)
+    papers = {"MHT, irregular groups": OVERALL["without"], "MHT, CTW": OVERALL["with"]}
+    goal = ((88.0, None), (85.0, None), (None, 30.0))
+    goals = dict.fromkeys(("nearest neighbour, CTW", "MHT, CTW", BEST), goal)
+    made = []
+    for name, values in rates.items():
+        for axis, rate in enumerate(RATES):
+            paper = papers[name][axis] if name in papers else None
+            band = goals[name][axis] if name in goals else None
+            made.append(_claim(f"table 4.27: {rate}, {name}", values[:, axis], band, paper))
+    for kind in ("nearest neighbour", "MHT"):
+        gain = rates[f"{kind}, CTW"] - rates[f"{kind}, irregular groups"]
+        paper = OVERALL["with"][0] - OVERALL["without"][0] if kind == "MHT" else None
+        made.append(_claim(f"CT gained by the window, {kind}", gain[:, 0], (20.0, None), paper))
+    better = rates[BEST] - rates[STRONG]
+    for axis, rate in enumerate(RATES):
+        band = (None, 0.0) if rate == "IT" else (0.0, None)
+        made.append(_claim(f"{rate}: {BEST}, less the strong baseline ({STRONG})", better[:, axis], band))
+    for number, paper_table, name in ((25, WITHOUT_WINDOW, "MHT, irregular groups"), (26, WITH_WINDOW, "MHT, CTW")):
+        ours = tens(results[name], len(paper_table))
+        # shorter recordings have fewer tens than the paper's
+        for k, row in enumerate(paper_table[: int((~np.isnan(ours).any(axis=(0, 2))).sum())]):
+            for axis, rate in enumerate(RATES):
+                what = f"table 4.{number}: {rate}, groups {10 * k + 1} to {10 * k + 10}, {name}"
+                made.append(_claim(what, ours[:, k, axis], None, float(row[axis])))
+    return made
+
+
+def tens(every: list[CtMtIt], length: int) -> Array:
+    """Means of ten windows each, (runs, length, 3)."""
+    return np.array([by_tens(one.per_window, length) for one in every])
+
+
+def _claim(
+    what: str, values: Array, band: tuple[float | None, float | None] | None, paper: float | None = None
+) -> Claim:
+    interval = mean_interval(values) if len(values) > 1 else None
+    return Claim(what, "%", paper, float(values.mean()), interval, band)

@@ -1,0 +1,192 @@
+"""Associations of scenes: targets, labels, fused positions, correct tuples, one seed one answer."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.association import Association, associate
+from assoc.association.plan import Plan, true_tuples
+from assoc.scene import Scene, Truth
+from assoc.sensors import PositionSensor
+from assoc.simulation import simulate
+
+REGION = np.array([[0.0, 1000.0], [0.0, 1000.0], [0.0, 1000.0]])
+
+
+def sensor(sigma: float) -> PositionSensor:
+    return PositionSensor(
+        position=[0, 0, 0],
+        noise=[sigma] * 3,
+        detection_probability=0.9,
+        false_alarm_rate=0.5,
+        field_of_view=REGION,
+    )
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    """Target 4 seen by three sensors, target 9 by two, target 2 by one; and a false alarm."""
+    first = [[500, 500, 500], [100, 100, 100]]
+    second = [[102, 98, 101], [900, 10, 700]]
+    third = [[101, 101, 99], [503, 499, 502], [10, 900, 10]]
+    sources = [[np.array([9, 4]), np.array([4, -1]), np.array([4, 9, 2])]]
+    truth = Truth(
+        [np.array([2, 4, 9])], [np.array([[10, 900, 10], [100, 100, 100], [500, 500, 500]])], sources
+    )
+    sensors = [sensor(1.0), sensor(2.0), sensor(2.0)]
+    return Scene(sensors, [7.0], [[np.array(first), np.array(second), np.array(third)]], REGION, truth)
+
+
+@pytest.mark.parametrize("solver", ["greedy", "aco", "milp"])
+def test_by_hand(by_hand, solver):
+    result = associate(by_hand, solver)
+    (scan,) = result.scans
+    assert scan.time == 7.0 and scan.sizes == (2, 2, 3)
+    assert scan.targets.tolist() == [[1, 0, 2], [2, 1, 1]]
+    assert [label.tolist() for label in scan.labels()] == [[0, 1], [1, -1], [1, 0, -1]]
+    assert scan.false_alarms == 2
+    assert (scan.correct_tuples, scan.true_tuples) == (2, 2)
+    # of direct measurements the maximum-likelihood position is the mean weighted by inverse variances
+    np.testing.assert_allclose(
+        scan.positions[0], np.average([[500] * 3, [503, 499, 502]], 0, [4, 1]), atol=1e-6
+    )
+    wanted = np.average([[100] * 3, [102, 98, 101], [101, 101, 99]], 0, [4, 1, 1])
+    np.testing.assert_allclose(scan.positions[1], wanted, atol=1e-6)
+    np.testing.assert_allclose(scan.covariances[0], np.eye(3) / 1.25, atol=1e-9)
+    np.testing.assert_allclose(scan.covariances[1], np.eye(3) / 1.5, atol=1e-9)
+
+
+def test_correct_means_exactly_the_measurements_of_a_target(by_hand):
+    # the third sensor missed target 9 in truth; what it was given to is a false alarm nearby
+    sources = [[np.array([9, 4]), np.array([4, -1]), np.array([4, -1, 9])]]
+    truth = Truth(by_hand.truth.target_ids, by_hand.truth.positions, sources)
+    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, truth)
+    totals = associate(scene, "milp").totals()
+    assert (totals["correct_tuples"], totals["true_tuples"], totals["share_correct"]) == (1, 2, 0.5)
+
+
+def test_true_tuples(by_hand):
+    assert true_tuples(by_hand.scan(0)).tolist() == [[2, 1, 1], [1, 0, 2]]
+    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION)
+    assert true_tuples(scene.scan(0)) is None
+    totals = associate(scene, "greedy").totals()
+    assert totals["true_tuples"] is None and totals["share_correct"] is None
+    # one sensor with two measurements of target 4: it has no tuple
+    twice = Truth(
+        [np.array([4])], [np.zeros((1, 3))], [[np.array([4, 4]), np.array([4, -1]), np.full(3, -1)]]
+    )
+    scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, twice)
+    assert true_tuples(scene.scan(0)).tolist() == []
+
+
+def test_a_single_measurement_is_a_target_only_at_negative_cost():
+    problem = assoc.AssignmentProblem([[1, 0], [0, 1]], [-1.0, 0.5], [1, 1])
+    scan = Plan((problem,), "greedy")((0, 0))
+    assert scan.targets.tolist() == [[1, 0]]
+    assert scan.false_alarms == 1 and scan.positions is None and scan.time is None
+
+
+def test_empty_scans_and_a_single_sensor():
+    nothing = np.zeros((0, 3))
+    scene = Scene([sensor(1.0)] * 2, [0.0, 1.0], [[nothing, nothing], [nothing, np.ones((1, 3))]], REGION)
+    result = associate(scene, "greedy")
+    assert [scan.false_alarms for scan in result.scans] == [0, 1]
+    assert result.totals()["gap"] == 0.0
+    assert len(result.to_frame()) == 0
+    alone = Scene([sensor(1.0)], [0.0], [[np.ones((3, 3))]], REGION)
+    assert associate(alone, "greedy").totals()["false_alarms"] == 3
+
+
+def test_the_seed_of_a_scan_does_not_depend_on_what_was_solved_before():
+    scene = simulate("bearing-only", targets=6, scans=4)
+    plan = Plan((scene,), "aco", seed=5, parameters={"mode": "paper"})
+    forward = [plan((0, k)) for k in range(4)]
+    backward = [plan((0, k)) for k in reversed(range(4))][::-1]
+    for one, other in zip(forward, backward, strict=True):
+        assert np.array_equal(one.solution.tuples, other.solution.tuples)
+        assert one.solution.iterations == other.solution.iterations
+
+
+def test_each_scan_has_random_numbers_of_its_own(monkeypatch):
+    import assoc.association.plan as module
+
+    drawn = []
+
+    def watched(problem, solver, *, seed, **options):
+        drawn.append(float(np.random.default_rng(seed).random()))
+        return assign(problem, solver, seed=seed, **options)
+
+    assign = module.assign
+    monkeypatch.setattr(module, "assign", watched)
+    scene = simulate("three-radar", scans=3)
+    for seed in (0, 1):
+        associate(scene, "greedy", seed=seed)
+    assert len(set(drawn)) == 6
+
+
+def test_processes_do_not_change_the_answer():
+    scene = simulate("three-radar", scans=6)
+    one, two = (associate(scene, "aco", seed=1, jobs=jobs, mode="paper") for jobs in (1, 2))
+    for a, b in zip(one.scans, two.scans, strict=True):
+        assert a.scan == b.scan and np.array_equal(a.solution.tuples, b.solution.tuples)
+        assert a.solution.cost == b.solution.cost and a.solution.lower_bound == b.solution.lower_bound
+        assert np.array_equal(a.positions, b.positions)
+
+
+def test_errors_in_processes_come_through():
+    scene = simulate("three-radar", scans=4)
+    with pytest.raises(assoc.LimitExceededError, match="tuples"):
+        associate(scene, "greedy", jobs=2, gating={"max_tuples": 1})
+
+
+def test_frame_summary_and_json(by_hand, tmp_path):
+    result = associate(by_hand, "greedy", seed=3)
+    frame = result.to_frame()
+    assert list(frame.columns[:6]) == ["scan", "time", "target", "sensor_1", "sensor_2", "sensor_3"]
+    assert list(frame.columns[6:]) == ["x", "y", "z", "sigma_x", "sigma_y", "sigma_z"]
+    assert frame[["sensor_1", "sensor_2", "sensor_3"]].to_numpy().tolist() == [[1, 0, 2], [2, 1, 1]]
+    assert frame["sigma_x"].to_numpy() == pytest.approx([1.25**-0.5, 1.5**-0.5])
+    assert "2 targets, 2 false alarms" in result.summary() and "2 of 2 true tuples" in result.summary()
+    path = tmp_path / "result.json"
+    result.to_json(path)
+    content = json.loads(path.read_text())
+    keys = ["format", "version", "solver", "parameters", "seed", "scans", "totals"]
+    assert list(content) == keys
+    assert (content["format"], content["version"], content["seed"]) == ("assoc.result", 1, 3)
+    (scan,) = content["scans"]
+    assert list(scan) == (
+        ["scan", "time", "sizes", "cost", "lower_bound", "gap", "status", "tuples", "targets", "runtime"]
+    )
+    assert sorted(map(tuple, scan["tuples"])) == [(0, 0, 3), (0, 2, 0), (1, 0, 2), (2, 1, 1)]
+    assert [target["tuple"] for target in scan["targets"]] == [[1, 0, 2], [2, 1, 1]]
+    np.testing.assert_array_equal(scan["targets"][0]["position"], result.scans[0].positions[0])
+    assert np.shape(scan["targets"][0]["covariance"]) == (3, 3)
+    assert content["totals"]["cost"] == scan["cost"]
+
+
+def test_json_has_no_infinities(tmp_path):
+    result = Association((), "greedy", {"limit": float("inf"), "names": ("a", 1), "n": np.int64(3)})
+    result.to_json(tmp_path / "r.json")
+    content = json.loads((tmp_path / "r.json").read_text())
+    assert content["parameters"] == {"limit": None, "names": ["a", 1], "n": 3}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"solver": "magic"}, "unknown name 'magic'"),
+        ({"solver": "greedy", "ants": 3}, "ants: no parameter of solver 'greedy'"),
+        ({"solver": "greedy", "seed": -1}, "seed: expected a whole number >= 0"),
+        ({"solver": "greedy", "jobs": 0}, "jobs: expected a whole number >= 1"),
+        ({"solver": "greedy", "time_limit": 0.0}, "time_limit: expected seconds > 0"),
+    ],
+)
+def test_bad_arguments(by_hand, arguments, message):
+    with pytest.raises(assoc.InvalidInputError, match=message):
+        associate(by_hand, **arguments)
+    with pytest.raises(assoc.InvalidInputError, match="scene: expected a Scene, got str"):
+        associate("scene.npz")  # type: ignore[arg-type]

@@ -1,0 +1,213 @@
+"""Many steps in one call, thousands of steps, and all of it without the compiler."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.filters import (
+    ConstantVelocity,
+    CoordinatedTurn,
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    FunctionMeasurement,
+    FuzzyAdaptiveEKF,
+    InteractingMultipleModel,
+    KalmanFilter,
+    LinearMeasurement,
+    ModifiedEKF,
+    Padded,
+    UnscentedKalmanFilter,
+    paper_rules,
+)
+from experiments.filters.endurance import endure
+from experiments.filters.endurance import filters as of_each_kind
+from tests.filters.common import BEARING, MOTION, PLACE, RADAR, random_state
+
+MIXED = [
+    ExtendedKalmanFilter(Padded(ConstantVelocity(0.5), 0.1)),
+    ExtendedKalmanFilter(CoordinatedTurn(5.0, 0.01)),
+]
+
+
+def every_filter():
+    return {
+        "kalman": (KalmanFilter(MOTION), PLACE),
+        "matrix": (KalmanFilter(MOTION), LinearMeasurement(np.eye(3, 6), PLACE.covariance)),
+        "ekf": (ExtendedKalmanFilter(MOTION), RADAR),
+        "turn": (ExtendedKalmanFilter(CoordinatedTurn(2.0, 0.01)), RADAR),
+        "modified": (ModifiedEKF(MOTION), RADAR),
+        "unscented": (UnscentedKalmanFilter(MOTION), RADAR),
+        "ensemble": (EnsembleKalmanFilter(MOTION, 20, 3), RADAR),
+        "fuzzy": (FuzzyAdaptiveEKF(MOTION, paper_rules(), paper_rules(), immediate=True), RADAR),
+        "imm": (InteractingMultipleModel(MIXED, np.array([[0.9, 0.1], [0.2, 0.8]])), RADAR),
+    }
+
+
+def problem(one, steps=4, count=3):
+    """A start and measurements (K, B, 3) on the way that it expects."""
+    start = random_state(count, np.random.default_rng(0), one.motion.dim)
+    rng = np.random.default_rng(1)
+    places = start.mean[:, :3] + np.arange(1, steps + 1)[:, None, None] * start.mean[:, 3:6]
+    return start, places + rng.normal(0, 50.0, places.shape)
+
+
+def results():
+    found = {}
+    for name, (one, sensor) in every_filter().items():
+        start, places = problem(one)
+        z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
+        done = one.run(one.start(start), z, sensor, 1.0)
+        found[name] = [part.tolist() for part in done[:4]]
+        found[name] += [one.log_likelihood(done.state, z[-1], sensor).tolist()]
+        found[name] += [one.step(done.state[:1], 1.0, z[-1, :1], sensor).state.mean.tolist()]
+    return found
+
+
+@pytest.mark.parametrize("name", every_filter())
+@pytest.mark.parametrize("dt", [1.0, [1.0, 0.5, 2.0, 1.0]])
+def test_a_run_is_its_steps(name, dt):
+    (one, sensor), (again, _) = every_filter()[name], every_filter()[name]
+    start, places = problem(one)
+    z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
+    whole = one.run(one.start(start), z, sensor, dt)
+    state = again.start(start)
+    for k in range(4):
+        done = again.update(again.predict(state, dt if dt == 1.0 else dt[k]), z[k], sensor)
+        state = done.state
+        for ours, theirs in (
+            (whole.mean[k], state.mean),
+            (whole.covariance[k], state.covariance),
+            (whole.nis[k], done.nis),
+            (whole.log_likelihood[k], done.log_likelihood),
+        ):
+            assert np.array_equal(ours, theirs)
+    assert np.array_equal(whole.state.mean, state.mean) and type(whole.state) is type(state)
+
+
+@pytest.mark.parametrize("name", every_filter())
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_step_is_a_prediction_and_an_update(name, count):
+    (one, sensor), (again, _) = every_filter()[name], every_filter()[name]
+    start, places = problem(one, 3, count)
+    z = places if name in ("kalman", "matrix") else np.stack([sensor.measure(p) for p in places])
+    a, b = one.start(start), again.start(start)
+    for k, dt in enumerate((1.0, 0.5, 1.0)):
+        quick, slow = one.step(a, dt, z[k], sensor), again.update(again.predict(b, dt), z[k], sensor)
+        a, b = quick.state, slow.state
+        assert type(a) is type(b) and len(a) == count
+        for part in ("innovation", "covariance", "nis", "log_likelihood"):
+            assert np.array_equal(getattr(quick, part), getattr(slow, part)), part
+        assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
+    assert quick.innovation.shape == (count, 3) and quick.covariance.shape == (count, 3, 3)
+    assert quick.nis.shape == quick.log_likelihood.shape == (count,)
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [BEARING, LinearMeasurement(np.eye(2, 6, 3), np.eye(2)), FunctionMeasurement(lambda x: x[:, :1], np.eye(1))],
+    ids=["bearing", "velocities", "function"],
+)
+def test_a_step_with_other_sensors(sensor):
+    ekf, state = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(4))
+    z = np.full((1, sensor.dim), 0.3)
+    for dt in (1.0, 2.0):
+        quick, slow = ekf.step(state, dt, z, sensor), ekf.update(ekf.predict(state, dt), z, sensor)
+        assert np.array_equal(quick.state.mean, slow.state.mean) and np.array_equal(quick.nis, slow.nis)
+        assert np.array_equal(quick.state.covariance, slow.state.covariance)
+        # one filter, two sensors in turn
+        assert ekf.step(state, dt, RADAR.measure(state.mean[:, :3]), RADAR).innovation.shape == (1, 3)
+
+
+def test_refusals_of_a_step():
+    ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
+    z = RADAR.measure(start.mean[:, :3])
+    assert np.array_equal(ekf.step(start, 1.0, z[0], RADAR).state.mean, ekf.step(start, 1.0, z, RADAR).state.mean)
+    for measured, dt, message in (
+        (z * np.nan, 1.0, "measured must be finite, row 0"),
+        (z[:, :2], 1.0, r"measured must have shape \(1, 3\)"),
+        ("abc", 1.0, "measured must be numbers"),
+        (z, -1.0, "dt must be a number >= 0"),
+        (z, np.nan, "dt must be a number >= 0"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            ekf.step(start, dt, measured, RADAR)
+    with pytest.raises(InvalidInputError, match="state must have 6 components, got 7"):
+        ekf.step(random_state(1, np.random.default_rng(0), 7), 1.0, z, RADAR)
+    start.covariance[:] *= -1
+    with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
+        ekf.step(start, 1.0, z, RADAR)
+    start.mean[:] = np.inf
+    with pytest.raises(InvalidInputError, match="mean of target 0 gives no finite measurement"):
+        ekf.step(start, 1.0, z, RADAR)
+    with pytest.raises(AttributeError, match="has no attribute 'gain'"):
+        _ = ekf.step(random_state(1, np.random.default_rng(0)), 1.0, z, RADAR).gain
+
+
+def test_refusals_of_a_run():
+    ekf, start = ExtendedKalmanFilter(MOTION), random_state(2, np.random.default_rng(0))
+    z = np.stack([RADAR.measure(start.mean[:, :3])] * 3)
+    broken = z.copy()
+    broken[1, 1, 0] = np.nan
+    for measured, dt, message in (
+        (broken, 1.0, "measured must be finite"),
+        (z[:, :1], 1.0, r"measured must have shape \(K, 2, 3\)"),
+        (z[:0], 1.0, "K > 0"),
+        (z, [1.0], "dt must be one number or 3"),
+        (z, -1.0, "dt must be a number >= 0"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            ekf.run(start, measured, RADAR, dt)
+    far = start[:1]
+    far.mean[0, 0] = np.inf
+    with pytest.raises(InvalidInputError, match="target 0 .* at step 0"):
+        ekf.run(far, z[:, :1], RADAR, 1.0)
+
+
+@pytest.mark.parametrize("dt", [-1.0, np.nan, np.inf, "1"])
+@pytest.mark.parametrize("name", every_filter())
+def test_time_does_not_run_backwards(name, dt):
+    one, sensor = every_filter()[name]
+    turning = ("turn", "unscented", "ensemble", "fuzzy")
+    if name in turning:
+        # models that are no matrix take another way
+        kind = {"turn": ExtendedKalmanFilter, "unscented": UnscentedKalmanFilter, "ensemble": EnsembleKalmanFilter}
+        turn = CoordinatedTurn(2.0, 0.01)
+        one = kind[name](turn) if name in kind else FuzzyAdaptiveEKF(turn, paper_rules())
+    state = one.start(random_state(2, np.random.default_rng(0), one.motion.dim))
+    with pytest.raises(InvalidInputError, match="dt must be a number >= 0"):
+        one.predict(state, dt)
+
+
+def test_a_sensor_that_was_refused_once_is_refused_again():
+    one, start = KalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
+    for _ in range(2):
+        with pytest.raises(InvalidInputError, match="must be linear"):
+            one.update(start, RADAR.measure(start.mean[:, :3]), RADAR)
+
+
+@pytest.mark.parametrize("name", ["EnKF, N 20", "fuzzy-adaptive EKF", "IMM"])
+def test_covariances_stay_positive_definite_for_many_steps(name):
+    """10^5 steps of every filter: python -m experiments.filters.endurance."""
+    rng = np.random.default_rng(5)
+    least, asymmetry, deviation = endure(of_each_kind(rng)[name], 3_000, rng).T
+    assert least.min() > 1e-12 and asymmetry.max() < 1e-12 and deviation.max() < 300
+
+
+def test_without_the_compiler_it_is_the_same():
+    code = "import json; from tests.filters.test_long_steps import results; print(json.dumps(results()))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=os.getcwd(),
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    plain, compiled = json.loads(done.stdout), results()
+    for name, parts in compiled.items():
+        for a, b in zip(plain[name], parts, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max(), err_msg=name)

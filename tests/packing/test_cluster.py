@@ -1,0 +1,71 @@
+"""Cluster search: never worse, always feasible, exact when the cluster is the whole problem."""
+
+import numpy as np
+import pytest
+
+from assoc.errors import InfeasibleError
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.insertion import Cover
+from assoc.packing.packing import prepare
+from assoc.packing.run import Run
+from experiments.common.instances.synthetic import axial_known_optimum, axial_random
+from experiments.common.oracles import brute_force, gated_problem, small_problems
+
+
+def _feasible(packing, owner):
+    columns = np.unique(owner[owner >= 0])
+    rows = packing.cols[columns]
+    count = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
+    assert ((owner >= 0) == (count == 1)).all()
+    assert count.max(initial=0) <= 1
+    assert (count[~packing.slack] == 1).all()
+
+
+def _searched(problem, steps, size, rng):
+    prepared = prepare(problem)
+    packing = prepared.packing
+    duals = dual_bound(packing)
+    total = prepared.offset
+    for c in range(packing.num_components):
+        piece = packing.component(c)
+        search = ClusterSearch.of(piece, duals[packing.row_start[c] : packing.row_start[c + 1]])
+        cover = Cover.empty(piece)
+        cover.add_greedily(np.argsort(piece.weights, kind="stable"))
+        if not cover.complete(Run(rng)):
+            raise InfeasibleError("no solution")
+        before = cover.weight
+        change, _ = search.run(cover.owner, rng, steps, size, node_limit=10**6)
+        assert change <= 1e-9
+        assert cover.weight == pytest.approx(before + change, abs=1e-9)
+        _feasible(piece, cover.owner)
+        total += cover.weight
+    return total
+
+
+def test_whole_problem_is_solved():
+    rng = np.random.default_rng(0)
+    for problem in small_problems(300, seed=4):
+        try:
+            expected = brute_force(problem)
+        except InfeasibleError:
+            continue
+        # a cluster as large as the problem may grow from any row, but stops short of rows it cannot reach
+        assert _searched(problem, 12, 10**6, rng) == pytest.approx(expected, abs=1e-8)
+
+
+def test_small_clusters_never_lie():
+    rng = np.random.default_rng(1)
+    for number in range(60):
+        problem = gated_problem(rng, (5, 6, 4), 0.3, ("mixed", "ties")[number % 2])
+        found = _searched(problem, 30, 6, rng)
+        assert found >= brute_force(problem) - 1e-9
+
+
+def test_axial_ones_to_the_optimum():
+    rng = np.random.default_rng(2)
+    known, optimum = axial_known_optimum(12, 100)
+    assert _searched(known, 200, 30, rng) == pytest.approx(optimum)
+    # costs are integers, so that a bound above 4 would prove an optimum of 5
+    found = _searched(axial_random(26, 101), 400, 60, rng)
+    assert found <= 10.0

@@ -1,0 +1,313 @@
+"""The k best against full enumeration, with every road to them taken."""
+
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.run import Run
+from assoc.problem import AssignmentProblem
+from assoc.ranking import iterative_deepening
+from assoc.ranking.columns import complete
+from assoc.ranking.component_ranking import ComponentRanking
+from assoc.ranking.kbest import kbest, rank
+from assoc.ranking.merging import merge
+from assoc.ranking.murty.murty import Murty
+from assoc.solvers.assign import assign
+from experiments.common.instances.synthetic import axial_random, planar_random
+from experiments.common.oracles import (
+    all_solutions,
+    axial_problem,
+    check_answer,
+    disconnected_problem,
+    gated_problem,
+    small_problems,
+)
+from tests.solvers.test_against_brute_force import blackman_popoli
+
+
+def check(problem, k):
+    """Ranked as by enumeration, each answer a different solution that owes what every Solution does."""
+    expected = all_solutions(problem, limit=4000)
+    if not expected:
+        with pytest.raises(InfeasibleError):
+            kbest(problem, k)
+        return 0
+    ranking = rank(problem, k, None)
+    found = ranking.solutions
+    if k < len(expected):
+        assert expected[k - 1].cost - 1e-9 <= ranking.rest <= expected[k].cost + 1e-12
+    elif k > len(expected):
+        assert ranking.rest == np.inf
+    costs = [check_answer(problem, solution.tuples) for solution in found]
+    scale = max(1.0, float(np.abs(problem.costs).sum()))
+    assert len(found) == min(k, len(expected))
+    assert np.allclose(costs, [s.cost for s in expected[:k]], rtol=0.0, atol=1e-11 * scale)
+    assert costs == pytest.approx([solution.cost for solution in found], abs=1e-12 * scale)
+    assert [s.cost for s in found] == sorted(s.cost for s in found)
+    keys = [tuple(map(tuple, solution.tuples.tolist())) for solution in found]
+    assert len(set(keys)) == len(keys)
+    assert keys == [key for _, key in sorted((s.cost, key) for s, key in zip(found, keys, strict=True))]
+    for number, solution in enumerate(found):
+        assert solution.status == "optimal"
+        assert solution.solver == "kbest"
+        assert solution.lower_bound <= expected[number].cost + 1e-12 * scale
+        assert np.array_equal(problem.tuples[solution.indices], solution.tuples)
+        assert solution.parameters == {"k": k, "rank": number + 1}
+    return len(found)
+
+
+def test_small_problems():
+    """Two to six sensors, ties, duplicates, empty sensors, clusters, infeasible ones; k beyond their number."""
+    found = []
+    for number, problem in enumerate(small_problems(290, seed=51)):
+        try:
+            found.append(check(problem, (1, 4, 25, 10_000)[number % 4]))
+        except MemoryError:
+            pass
+    assert len(found) >= 220
+    assert 0 in found and max(found) > 1000
+
+
+def test_two_sensors():
+    rng = np.random.default_rng(1)
+    for number in range(250):
+        style = ("mixed", "positive", "negative", "ties")[number % 4]
+        density = float(rng.choice([0.3, 0.6, 1.0]))
+        k = int(rng.choice([1, 3, 12, 60, 2000]))
+        if number % 2:
+            sizes = tuple(int(n) for n in rng.integers(0, 5, 2))
+            problem = gated_problem(rng, sizes, density, style, listed_singletons=0.5, duplicates=0.2)
+        else:
+            problem = axial_problem(rng, tuple(int(n) for n in rng.integers(1, 6, 2)), density, style)
+        check(problem, k)
+
+
+def test_two_sensors_against_permutations():
+    costs = np.random.default_rng(2).random((8, 8))
+    expected = sorted(sum(costs[i, j] for i, j in enumerate(order)) for order in itertools.permutations(range(8)))
+    found = kbest(AssignmentProblem.from_dense(costs, dummy=False), 500)
+    assert np.allclose([s.cost for s in found], expected[:500], rtol=0.0, atol=1e-12)
+
+
+def test_murty_finds_them_in_order():
+    """Not only after sorting: a bound that is too large would be seen here."""
+    rng = np.random.default_rng(3)
+    for number in range(60):
+        shape = (4, 4) if number % 2 else (3, 5)
+        rows, columns = np.nonzero(rng.random(shape) < 0.8)
+        free = number % 3 == 0
+        murty = Murty(
+            rows.astype(np.int32),
+            columns.astype(np.int32),
+            rng.normal(-0.5, 1.0, rows.size),
+            np.full(shape[0], free),
+            np.full(shape[1], free or shape[0] < shape[1]),
+            400,
+        )
+        while murty.feasible and not murty.done:
+            murty.run(7)
+        costs = [murty._costs[murty.edges(place)].sum() for place in range(murty.num_found)]
+        assert costs == pytest.approx(sorted(costs), abs=1e-12)
+        if costs:
+            assert murty.rest >= costs[-1] - 1e-12
+
+
+def test_textbook():
+    """Blackman & Popoli; a commercial k-best misses the third."""
+    found = kbest(blackman_popoli(), 8)
+    expected = [-34.7, -31.7, -31.1, -29.1, -28.6, -28.0, -27.6, -26.9]
+    assert [s.cost for s in found] == pytest.approx(expected, abs=1e-9)
+    assert found[0].tuples.tolist() == [[1, 1, 1], [2, 2, 2]]
+
+
+@pytest.mark.parametrize("budget", [0, 5])
+def test_branching_instead_of_enumeration(budget):
+    """The same lists with next to no enumeration: branch and bound down to the leaves."""
+    branched = 0
+    for number, problem in enumerate(small_problems(120, seed=52)):
+        packing = complete(problem, Run(np.random.default_rng(0))).keep(np.inf)
+        if packing.num_columns > 40 or (~packing.slack & (np.diff(packing.row_ptr) == 0)).any():
+            continue
+        duals = dual_bound(packing)
+        for c in range(packing.num_components):
+            piece = packing.component(c)
+            own = duals[packing.row_start[c] : packing.row_start[c + 1]]
+            expected = _solutions_of(piece)
+            k = (1, 5, 400)[number % 3]
+            ranking = ComponentRanking(piece, own, k, np.inf, 1e-12, budget=budget)
+            while not ranking.done:
+                before = ranking.proven
+                ranking.run(3)
+                assert ranking.proven >= before - 1e-9 or len(ranking.solutions()[0]) == k
+            weights, chosen = ranking.solutions()
+            branched += ranking.nodes > 1
+            assert len(weights) == min(k, len(expected))
+            assert np.allclose(weights, [weight for weight, _ in expected[:k]], rtol=0.0, atol=1e-9)
+            assert len({tuple(columns.tolist()) for columns in chosen}) == len(chosen)
+            for weight, columns in zip(weights, chosen, strict=True):
+                assert piece.weights[columns].sum() == pytest.approx(weight, abs=1e-9)
+            if len(expected) < k:
+                assert ranking.proven == np.inf
+            else:
+                assert ranking.proven == pytest.approx(expected[k - 1][0], abs=1e-9)
+    assert branched > 20
+
+
+def _solutions_of(piece):
+    """All choices of columns of a component, by recursion over its rows in plain Python."""
+    found = []
+    by_row = [[] for _ in range(piece.num_rows)]
+    for j, rows in enumerate(piece.cols.tolist()):
+        used = [r for r in rows if r >= 0]
+        by_row[min(used)].append((j, set(used)))
+
+    def extend(row, covered, chosen, weight):
+        while row < piece.num_rows and row in covered:
+            row += 1
+        if row == piece.num_rows:
+            found.append((weight, chosen))
+            return
+        if piece.slack[row]:
+            extend(row + 1, covered, chosen, weight)
+        for j, used in by_row[row]:
+            if not used & covered:
+                extend(row + 1, covered | used, (*chosen, j), weight + piece.weights[j])
+
+    extend(0, frozenset(), (), 0.0)
+    return sorted(found)
+
+
+def test_components_that_need_branching_within_a_problem(monkeypatch):
+    monkeypatch.setattr(iterative_deepening, "FIRST_BUDGET", -3)
+    rng = np.random.default_rng(4)
+    for number in range(40):
+        if number % 2:
+            try:
+                check(disconnected_problem(rng, 2), (3, 30)[number % 4 // 2])
+            except MemoryError:
+                pass
+        else:
+            check(axial_problem(rng, (4, 4, 4), 0.7, "ties"), (3, 30)[number % 4 // 2])
+
+
+def test_wide_integrality_gap():
+    """Dense random costs, where the multipliers' bound is far from the optimum: first of the list is exact's."""
+    problem = axial_random(8, seed=5)
+    found = kbest(problem, 15)
+    assert found[0].cost == assign(problem, "exact").cost
+    assert len(found) == 15
+    # every other of the k best without a tuple of the best is the best of the problem without that tuple
+    without = []
+    for index in found[0].indices:
+        keep = np.arange(problem.num_tuples) != index
+        smaller = AssignmentProblem(problem.tuples[keep], problem.costs[keep], problem.sizes, dummy=False)
+        without.append(assign(smaller, "exact").cost)
+    assert found[1].cost == pytest.approx(min(without))
+
+
+def test_merge():
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        lists = [np.sort(rng.integers(0, 9, rng.integers(1, 5))).astype(float) for _ in range(rng.integers(0, 5))]
+        start = np.concatenate([[0], np.cumsum([len(own) for own in lists])]).astype(np.int64)
+        expected = sorted(sum(pick) for pick in itertools.product(*lists))
+        k = int(rng.choice([1, 4, 1000]))
+        total, choice = merge(start, np.concatenate([*lists, np.zeros(0)]), k)
+        assert total.tolist() == expected[:k]
+        assert len(np.unique(choice, axis=0)) == len(choice)
+        assert [sum(own[i] for own, i in zip(lists, pick, strict=True)) for pick in choice] == total.tolist()
+
+
+def test_same_answer_twice_and_prefixes():
+    problem = gated_problem(np.random.default_rng(7), (6, 6, 6), 0.5, "ties")
+    first, second = kbest(problem, 30), kbest(problem, 30)
+    assert [s.tuples.tolist() for s in first] == [s.tuples.tolist() for s in second]
+    assert [s.cost for s in kbest(problem, 7)] == [s.cost for s in first[:7]]
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e150])
+def test_scale_of_costs(scale):
+    for shape in ((4, 4), (3, 3, 3)):
+        problem = gated_problem(np.random.default_rng(8), shape, 0.7, listed_singletons=0.5)
+        scaled = AssignmentProblem(problem.tuples, problem.costs * scale, problem.sizes)
+        expected = [s.cost for s in all_solutions(problem)[:20]]
+        assert [s.cost / scale for s in kbest(scaled, 20)] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_large_two_sensors():
+    """Against the S-D road, which shares nothing with Murty's but the final sorting."""
+    problem = planar_random(40, seed=9)
+    lifted = AssignmentProblem(
+        np.concatenate([problem.tuples, problem.tuples[:, :1]], axis=1), problem.costs, [40, 40, 40], dummy=False
+    )
+    flat = [s.cost for s in kbest(problem, 60)]
+    assert flat == pytest.approx([s.cost for s in kbest(lifted, 60)], abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(20, 20, 20), (150, 150)])
+def test_time_limit_returns_only_what_is_proved(shape):
+    rng = np.random.default_rng(10)
+    problem = AssignmentProblem.from_dense(rng.integers(0, 100, shape).astype(float), dummy=False)
+    # a ranking that time limits begins with the exact solver's heuristics: compiled before
+    assoc.warm_up(["exact"])
+    kbest(axial_problem(rng, (3,) * len(shape)), 2)
+    started = time.thread_time()
+    found = kbest(problem, 50_000, time_limit=0.7)
+    # processor time: the machine may be busy with other things
+    assert time.thread_time() - started < 4.0
+    assert 1 <= len(found) < 50_000
+    assert all(s.stopped_by == "time_limit" for s in found)
+    costs = [s.cost for s in found]
+    assert costs == sorted(costs)
+    assert costs[-1] == check_answer(problem, found[-1].tuples)
+    if len(found) > 1:
+        assert all(s.status == "optimal" for s in found)
+    assert all(s.lower_bound <= s.cost for s in found)
+
+
+def test_nothing_to_choose():
+    empty = np.zeros((0, 3), dtype=int)
+    assert [s.cost for s in kbest(AssignmentProblem(empty, [], [2, 0, 1]), 5)] == [0.0]
+    assert len(kbest(AssignmentProblem(empty, [], [0, 0, 0]), 5)) == 1
+    assert len(kbest(AssignmentProblem([], [], [0, 0]), 5)) == 1
+    with pytest.raises(InfeasibleError):
+        kbest(AssignmentProblem(empty, [], [1, 1, 1], dummy=False), 5)
+    with pytest.raises(InfeasibleError):
+        kbest(AssignmentProblem([[1, 1], [2, 1]], [0, 0], [2, 2], dummy=False), 5)
+
+
+def test_one_sensor():
+    found = kbest(AssignmentProblem([[1], [2], [2]], [3.0, -1.0, -2.0], [3]), 5)
+    assert [s.cost for s in found] == [1.0]
+
+
+def test_tuples_that_no_optimum_uses_count_too():
+    """A pair that costs more than its singletons is a worse solution, but a solution."""
+    problem = AssignmentProblem([[1, 1, 0], [1, 1, 0]], [5.0, 4.0], [1, 1, 0])
+    assert [s.cost for s in kbest(problem, 10)] == [0.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0,), "k: expected a whole number >= 1, got 0"),
+        ((2.0,), "k: expected a whole number >= 1, got 2.0"),
+        ((True,), "k: expected"),
+        (("3",), "k: expected"),
+    ],
+)
+def test_bad_k(arguments, message):
+    with pytest.raises(InvalidInputError, match=message):
+        assoc.kbest(blackman_popoli(), *arguments)
+
+
+def test_bad_problem_and_time_limit():
+    with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem"):
+        kbest([[1.0]], 3)
+    with pytest.raises(InvalidInputError, match="time_limit: expected seconds > 0"):
+        kbest(blackman_popoli(), 3, time_limit=0)

@@ -1,0 +1,185 @@
+"""Intervals of association probabilities against full enumeration."""
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.packing.run import Run
+from assoc.problem import AssignmentProblem
+from assoc.ranking.columns import complete
+from assoc.ranking.marginals import marginals
+from assoc.ranking.partition_function import log_partition
+from experiments.common import oracles
+from experiments.common.oracles import all_solutions, axial_problem, gated_problem, small_problems
+
+
+def enumerable(count, seed, limit=4000):
+    """Small problems with at least one and not too many solutions."""
+    for problem in small_problems(count, seed):
+        try:
+            found = all_solutions(problem, limit)
+        except MemoryError:
+            continue
+        if found:
+            yield problem, found
+
+
+def test_intervals_contain_the_truth():
+    widths = []
+    for number, (problem, found) in enumerate(enumerable(160, 61)):
+        k = (1, 3, 20, 5000)[number % 4]
+        result = marginals(problem, k)
+        truth = oracles.marginals(problem)
+        assert len(result.tuples) == len(truth)
+        for key, p, low, high in zip(
+            result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
+        ):
+            assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9
+            assert low - 1e-12 <= p <= high + 1e-12
+            assert 0.0 <= low <= high <= 1.0
+        if k >= len(found):
+            assert result.unseen == 0.0
+            assert np.allclose(result.lower, result.upper)
+        elif k == 20:
+            widths.append(result.unseen)
+        # every measurement that each solution uses is somewhere
+        for s, n in enumerate(problem.sizes):
+            if problem.dummy or n == problem.sizes.min():
+                for i in range(1, n + 1):
+                    assert result.probability[result.tuples[:, s] == i].sum() == pytest.approx(1.0)
+    # the intervals are of use: what 20 solutions leave open is bounded well below 1
+    assert np.median(widths) < 0.5
+
+
+def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
+    for problem, _ in enumerable(20, 63):
+        truth = oracles.marginals(problem)
+        try:
+            result = marginals(problem, 5, time_limit=1e-9)
+        except InfeasibleError:
+            # a dead end of the greedy choice, which takes time to get out of
+            assert not problem.dummy
+            continue
+        for key, p, low, high in zip(
+            result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
+        ):
+            assert low <= truth[tuple(key)] <= high and low <= p <= high
+        # the probabilities are those of one solution
+        for s, n in enumerate(problem.sizes):
+            if problem.dummy or n == problem.sizes.min():
+                for i in range(1, n + 1):
+                    assert result.probability[result.tuples[:, s] == i].sum() == 1.0
+        # where there was something to decide
+        assert result.unseen == 1.0 or set(truth.values()) <= {1.0}
+
+
+def test_the_unseen_weight_is_bounded_tightly_when_solved_out():
+    """On problems this small the partition function comes out exactly, and so does the unseen share."""
+    checked = 0
+    for problem, found in enumerable(120, 62, limit=500):
+        if problem.dummy and len(problem.components()) > 1:
+            continue
+        costs = np.array([s.cost for s in found])
+        weights = np.exp(costs[0] - costs)
+        k = max(1, len(found) // 3)
+        result = marginals(problem, k)
+        unseen = weights[k:].sum() / weights.sum()
+        assert result.unseen >= unseen - 1e-9
+        assert result.unseen <= unseen + 1e-6
+        checked += 1
+    assert checked > 40
+
+
+@pytest.mark.parametrize("work", [0, 300, 10**8])
+@pytest.mark.parametrize("a", [0.0, 0.5, 1.0])
+def test_partition_function_is_never_underestimated(work, a):
+    for problem, found in enumerable(100, 63, limit=600):
+        columns = complete(problem, Run(np.random.default_rng(0)))
+        sensor_of = np.repeat(np.arange(problem.num_sensors), problem.sizes)
+        bound = columns.bound + columns.offset
+        excess = np.array([s.cost for s in found]) - bound
+        exact = np.log(np.exp(-a * excess).sum())
+        value = log_partition(columns, sensor_of, a, work)
+        assert value >= exact - 1e-9
+        if work == 10**8:
+            assert value <= exact + 1e-6
+
+
+def test_more_solutions_narrow_the_intervals():
+    problem = gated_problem(np.random.default_rng(3), (7, 7, 7), 0.3, "mixed")
+    shares = [marginals(problem, k).unseen for k in (1, 5, 50, 500)]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[-1] < shares[0]
+
+
+def test_separated_targets_are_certain():
+    """Targets far apart: the best solution has nearly all the weight, and one listed solution shows it."""
+    tuples, costs = [], []
+    for i in range(1, 41):
+        tuples += [[i, i, i], [i, i, 0], [i, 0, i], [0, i, i]]
+        costs += [-30.0, -12.0, -12.0, -12.0]
+    result = marginals(AssignmentProblem(tuples, costs, [40, 40, 40]), 1)
+    full = np.count_nonzero(result.tuples, axis=1) == 3
+    assert result.lower[full].min() > 1.0 - 1e-5
+    assert result.upper[~full].max() < 1e-5
+
+
+def test_clusters_are_independent():
+    """Two clusters side by side: the probabilities of each alone, and k of each listed."""
+    rng = np.random.default_rng(8)
+    one, two = (gated_problem(rng, (3, 3, 3), 0.5, "mixed") for _ in range(2))
+    shifted = np.where(two.tuples > 0, two.tuples + 3, 0)
+    both = AssignmentProblem(np.concatenate([one.tuples, shifted]), np.concatenate([one.costs, two.costs]), [6, 6, 6])
+    k = 4
+    together, alone = marginals(both, k), (marginals(one, k), marginals(two, k))
+    assert together.unseen == pytest.approx(max(result.unseen for result in alone), abs=1e-9)
+    found = {tuple(t): (lo, p, hi) for t, lo, p, hi in zip(
+        together.tuples.tolist(), together.lower, together.probability, together.upper, strict=True)}  # fmt: skip
+    for result, shift in zip(alone, (0, 3), strict=True):
+        moved = np.where(result.tuples > 0, result.tuples + shift, 0).tolist()
+        for t, lo, p, hi in zip(moved, result.lower, result.probability, result.upper, strict=True):
+            assert found[tuple(t)] == pytest.approx((lo, p, hi), abs=1e-9)
+    # what is listed for both is worth k * k of the whole, and one listing of k could not say as much
+    assert together.listed >= k
+
+
+def test_large_problem_is_still_valid():
+    """No enumeration here: the intervals of few solutions must contain those of many."""
+    problem = axial_problem(np.random.default_rng(4), (9, 9, 9), 1.0, "mixed")
+    few, many = marginals(problem, 3), marginals(problem, 400)
+    assert (few.lower <= many.upper + 1e-12).all()
+    assert (many.lower <= few.upper + 1e-12).all()
+    assert (few.lower <= few.probability + 1e-12).all()
+
+
+def test_frame_and_public_name():
+    assert assoc.marginals is marginals
+    frame = marginals(AssignmentProblem([[1, 1]], [-3.0], [1, 1])).to_frame()
+    assert list(frame.columns) == ["sensor_1", "sensor_2", "probability", "lower", "upper"]
+    odds = np.exp(3.0)
+    expected = {(0, 1): 1 / (1 + odds), (1, 0): 1 / (1 + odds), (1, 1): odds / (1 + odds)}
+    for row in frame.itertuples():
+        assert row.probability == pytest.approx(expected[(row.sensor_1, row.sensor_2)])
+
+
+def test_errors():
+    with pytest.raises(InvalidInputError, match="k: expected"):
+        marginals(AssignmentProblem([[1, 1]], [0.0], [1, 1]), 0)
+    with pytest.raises(InfeasibleError):
+        marginals(AssignmentProblem([[1, 1]], [0.0], [2, 2], dummy=False), 5)
+
+
+def test_two_sensors_without_duals_of_the_packing():
+    """Murty's road gives other multipliers; the bound must hold with them too, also below full size."""
+    rng = np.random.default_rng(5)
+    for number in range(40):
+        problem = (
+            gated_problem(rng, (3, 4), 0.7, listed_singletons=0.5) if number % 2 else axial_problem(rng, (3, 4), 0.9)
+        )
+        if not all_solutions(problem):
+            continue
+        truth = oracles.marginals(problem)
+        result = marginals(problem, 2)
+        for key, low, high in zip(result.tuples.tolist(), result.lower, result.upper, strict=True):
+            assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9

@@ -1,0 +1,240 @@
+"""Every way to an answer on the same random problems, against exact arithmetic and against each other.
+
+    python -m tests.reliability.differential --count 5000 --seed 1 [--ways exact,aco] [--processes 2]
+
+prints the faults found (none, one hopes), each with the seed and number that make it again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from assoc._system.processes import ordered_map
+from assoc.errors import InfeasibleError
+from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import kbest
+from assoc.solution import OPTIMALITY_TOLERANCE, Solution
+from assoc.solvers.assign import assign
+from tests.reliability.problems import Case, draw, exact_cost, exact_optimum
+
+Way = Callable[[AssignmentProblem], list[Solution]]
+
+
+_SLOW = 5.0  # seconds; problems of this size take milliseconds, but first calls compile
+_FIRST_CALLS = 20
+_PROGRESS = 60.0  # seconds between two lines that say how far one is
+
+
+def _by(solver: str, **parameters: object) -> Way:
+    return lambda problem: [assign(problem, solver, **parameters)]
+
+
+def _through_a_file(problem: AssignmentProblem) -> list[Solution]:
+    """Solve what comes back from an npz file; the choice must be as good as that of the original."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "problem.npz"
+        problem.save(path)
+        again = AssignmentProblem.load(path)
+    if not (
+        np.array_equal(again.tuples, problem.tuples)
+        and again.costs.tobytes() == problem.costs.tobytes()
+        and np.array_equal(again.sizes, problem.sizes)
+        and again.dummy == problem.dummy
+    ):
+        raise AssertionError("the problem changed on its way through a file")
+    return [assign(again, "exact")]
+
+
+def _through_a_tensor(problem: AssignmentProblem) -> list[Solution]:
+    """Solve the problem written out densely."""
+    again = AssignmentProblem.from_dense(problem.to_dense(), dummy=problem.dummy)
+    answer = assign(again, "exact")
+    # rows of the other problem: find the same tuples, at their smaller cost, in this one
+    least: dict[tuple[int, ...], int] = {}
+    for i in np.argsort(-problem.costs, kind="stable").tolist():
+        least[tuple(problem.tuples[i].tolist())] = i
+    indices = np.array([least[tuple(row)] for row in answer.tuples.tolist()], dtype=np.intp)
+    return [
+        Solution(
+            answer.tuples,
+            indices,
+            answer.cost,
+            answer.lower_bound,
+            "exact",
+            answer.iterations,
+            answer.runtime,
+        )
+    ]
+
+
+WAYS: dict[str, Way] = {
+    "exact": _by("exact"),
+    "greedy": _by("greedy"),
+    "aco": _by("aco"),
+    "aco paper": _by("aco", mode="paper"),
+    "genetic": _by("genetic"),
+    "tabu": _by("tabu"),
+    "lagrangian": _by("lagrangian"),
+    "lagrangian cold": _by("lagrangian", warm_start=False, polish=False),
+    "milp scip": _by("milp"),
+    "milp cp_sat": _by("milp", backend="cp_sat"),
+    "milp highs": _by("milp", backend="highs"),
+    "kbest": lambda problem: kbest(problem, 4),
+    "file": _through_a_file,
+    "tensor": _through_a_tensor,
+}
+PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor")
+"""Ways that promise the optimum on problems of this size."""
+
+
+def magnitude(problem: AssignmentProblem) -> Fraction:
+    """Sum of all costs' magnitudes: what rounding is measured by, however much of it cancels."""
+    return sum(map(Fraction, np.abs(problem.costs).tolist()), Fraction(0))
+
+
+def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way: Way) -> Iterator[str]:
+    """What is wrong with the answer that comes this way; ``optimum`` None: there is no solution."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            answers = way(problem)
+    except InfeasibleError:
+        if optimum is not None:
+            yield "says infeasible"
+        return
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
+        return
+    if optimum is None:
+        yield "answers a problem that has no solution"
+        return
+    for place, answer in enumerate(answers):
+        # bounds of later places hold for what is not before them
+        own = optimum if place == 0 else None
+        yield from (f"{text} (place {place})" for text in _faults_of(problem, own, answer))
+    first = answers[0]
+    if name in PROVING:
+        # solvers close their gaps to 1e-9 of the costs they see
+        room = magnitude(problem) / 10**9
+        excess = exact_cost(problem, first.indices) - optimum
+        if excess > Fraction(OPTIMALITY_TOLERANCE) * max(1, abs(optimum)) + room:
+            yield f"is {float(excess):.3g} above the optimum {float(optimum):.6g}"
+        if first.status != "optimal" and first.gap > float(room):
+            yield f"is not certified: gap {first.gap:.3g} of {first.cost:.6g}"
+    costs = [answer.cost for answer in answers]
+    if costs != sorted(costs):
+        yield "ranks its answers wrongly"
+    if len({answer.tuples.tobytes() for answer in answers}) != len(answers):
+        yield "lists a solution twice"
+
+
+def _faults_of(problem: AssignmentProblem, optimum: Fraction | None, answer: Solution) -> Iterator[str]:
+    if not np.array_equal(problem.tuples[answer.indices], answer.tuples):
+        yield "names other tuples than it indexes"
+    smallest = int(problem.sizes.min())
+    for s, size in enumerate(problem.sizes.tolist()):
+        column = answer.tuples[:, s]
+        used = np.bincount(column[column > 0], minlength=size + 1)[1:]
+        if (used > 1).any() or ((problem.dummy or size == smallest) and (used == 0).any()):
+            yield f"is not feasible in sensor {s + 1}"
+    cost = exact_cost(problem, answer.indices)
+    if not math.isfinite(answer.cost) or float(cost) != answer.cost:
+        yield f"says cost {answer.cost!r}, its tuples cost {float(cost)!r}"
+    # nan fails every comparison; a bound may be -inf where nothing is known
+    if not answer.lower_bound <= answer.cost:
+        yield f"has the bound {answer.lower_bound!r} above its cost {answer.cost!r}"
+    if optimum is None:
+        return
+    if answer.lower_bound > -math.inf:
+        over = Fraction(answer.lower_bound) - optimum
+        # a cost is the nearest float to the exact sum: half a unit in the last place may lie above it
+        if over > magnitude(problem) / 10**17 + abs(optimum) / 2**53:
+            yield f"has a bound {float(over):.3g} above the optimum {float(optimum)!r}"
+    if answer.status == "optimal":
+        excess = cost - optimum
+        if excess > Fraction(1.01 * OPTIMALITY_TOLERANCE) * max(1, abs(cost)):
+            yield f"says optimal, {float(excess):.3g} above the optimum {float(optimum):.6g}"
+
+
+def judge(case: Case, names: list[str]) -> list[str]:
+    """All faults on one case, as lines."""
+    try:
+        optimum: Fraction | None = exact_optimum(case.problem)
+    except InfeasibleError:
+        optimum = None
+    return [f"{name} {text}" for name in names for text in faults(case.problem, optimum, name, WAYS[name])]
+
+
+@dataclass
+class Judge:
+    """Judges cases by their numbers; one for each process, so that it can count them.
+
+    Answers the structure and temper of the case, and the faults.
+    """
+
+    seed: int
+    names: list[str]
+    done: int = 0
+
+    def __call__(self, number: int) -> tuple[str, str, list[str]]:
+        """Draw a case and judge it."""
+        case = draw(self.seed, number)
+        before = time.process_time()
+        lines = judge(case, self.names)
+        seconds = time.process_time() - before
+        self.done += 1
+        if seconds > _SLOW and self.done > _FIRST_CALLS:
+            lines.append(f"all ways together take {seconds:.1f} s")
+        return case.structure, case.temper, lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the program; exit code 1 if there were faults."""
+    parser = argparse.ArgumentParser(description="All solvers on random problems, against exact arithmetic.")
+    parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=int, default=0)
+    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
+    parser.add_argument("--processes", type=int, default=1)
+    chosen = parser.parse_args(arguments)
+    names = chosen.ways.split(",")
+    kinds: Counter[str] = Counter()
+    numbers = range(chosen.start, chosen.start + chosen.count)
+    started = said = time.perf_counter()
+    judged = ordered_map(Judge(chosen.seed, names), numbers, chosen.processes)
+    for number, (structure, temper, lines) in zip(numbers, judged, strict=True):
+        for line in lines:
+            kind = f"[{temper}] " + " ".join(word for word in line.split() if not any(c.isdigit() for c in word))
+            kinds[kind] += 1
+            if kinds[kind] <= chosen.show:
+                print(f"seed {chosen.seed} number {number} ({structure}, {temper}): {line}", flush=True)
+        if time.perf_counter() - said > _PROGRESS:
+            said = time.perf_counter()
+            done, faulty = number + 1 - chosen.start, sum(kinds.values())
+            print(f"{done} of {chosen.count} problems, {said - started:.0f} s: {faulty} faults", flush=True)
+    print(
+        f"{chosen.count} problems, {chosen.count * len(names)} answers, {time.perf_counter() - started:.0f} s:"
+        f" {sum(kinds.values())} faults"
+    )
+    for kind, count in kinds.most_common():
+        print(f"{count:6d} {kind}")
+    return 1 if kinds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""Every way to an answer, on random problems against exact arithmetic; `make fuzz` runs thousands."""
+
+import numpy as np
+import pytest
+
+from assoc.problem import AssignmentProblem
+from assoc.solvers.assign import assign
+from tests.reliability.differential import WAYS, faults, judge
+from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, exact_optimum, make
+
+QUICK = [name for name in WAYS if not name.startswith("milp")]
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_every_structure(structure):
+    for number, temper in enumerate(("normal", "ties", "wide")):
+        problem = make(np.random.default_rng([41, number]), structure, temper)
+        assert judge(Case(problem, structure, temper, number), QUICK) == []
+
+
+@pytest.mark.parametrize("temper", TEMPERS)
+def test_every_temper(temper):
+    for number, structure in enumerate(("duplicates", "axial rectangular")):
+        problem = make(np.random.default_rng([42, number]), structure, temper)
+        assert judge(Case(problem, structure, temper, number), list(WAYS)) == []
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        295,  # CP-SAT refused whole costs that sum to 0.56 * 2^60 as a wrong model
+        345,  # lagrangian recovered nothing where there is one sensor
+    ],
+)
+def test_faults_that_were_found(number):
+    assert judge(draw(1, number), list(WAYS)) == []
+
+
+@pytest.mark.parametrize("temper", ["prices 1e3", "prices 1e6"])
+def test_exact_proves_its_answer_where_costs_cancel(temper):
+    """Gaps were closed to 1e-9 of the weights, which where they cancel is more than a millionth of the cost."""
+    assert assign(draw(1, 2012).problem).status == "optimal"
+    for number, structure in enumerate(("gated", "duplicates", "chain", "axial square")):
+        problem = make(np.random.default_rng([43, number]), structure, temper)
+        answer, optimum = assign(problem), exact_optimum(problem)
+        assert answer.status == "optimal" and answer.cost == pytest.approx(float(optimum), rel=1e-6, abs=1e-6)
+        assert answer.lower_bound <= optimum + 1e-9
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_rounding_is_no_improvement(solver):
+    """Covers whose weights differ by rounding alone were taken for ever better ones, for 1000 iterations."""
+    problem = draw(2, 16).problem
+    assert np.ptp(problem.costs[problem.costs < 0]) < 1e-8
+    assert assign(problem, solver, patience=20).iterations <= 60
+
+
+def test_the_judge_sees_faults():
+    """Answers made wrong on purpose."""
+    problem = AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-3.0, -2.5, -2.0], [2, 2])
+    right = assign(problem)
+    optimum = exact_optimum(problem)
+    assert right.cost == optimum == -4.5
+
+    def found(answers):
+        return " ".join(faults(problem, optimum, "exact", lambda _: answers))
+
+    class Wrong:
+        """The right answer with some of it changed."""
+
+        def __init__(self, **changes):
+            self.__dict__.update({name: getattr(right, name) for name in right.__slots__} | changes)
+            self.gap, self.status = self.cost - self.lower_bound, "optimal"
+
+    worse = AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-3.0, 9.0, 9.0], [2, 2])
+    other = assign(worse)
+    assert found([right]) == ""
+    assert "above the optimum" in found([Wrong(lower_bound=-4.4, cost=-4.4)])
+    assert "says cost" in found([Wrong(cost=-4.6, lower_bound=-4.6)])
+    assert "says optimal" in found([Wrong(tuples=other.tuples, indices=other.indices, cost=-3.0, lower_bound=-4.5)])
+    assert "not feasible" in found([Wrong(tuples=right.tuples[:1], indices=right.indices[:1])])
+    assert "bound nan" in found([Wrong(lower_bound=float("nan"))])
+    assert "twice" in found([right, right])

@@ -1,0 +1,198 @@
+"""What goes wrong around a program: the disk is full, the folder read-only, a process killed."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assoc._files import npz
+from assoc._files.npz import save_npz
+from assoc._files.output import write_atomically
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.problem import AssignmentProblem
+from assoc.simulation import simulate
+
+PYTHON = [sys.executable, "-W", "error", "-m"]
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenes") / "scene.npz"
+    simulate("three-radar", 2, scans=4).save(path)
+    return path
+
+
+def run(*words, **options):
+    return subprocess.run([*PYTHON, *map(str, words)], capture_output=True, text=True, timeout=120, **options)
+
+
+def small_files(size=2000):
+    """Let no file grow beyond this: what a full disk says, without filling one."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.mark.parametrize("option", ["--json", "--csv"])
+def test_a_full_disk_leaves_the_old_result(scene_file, tmp_path, option):
+    output = tmp_path / "out"
+    output.write_text("old")
+    command = ["assoc.solve", scene_file, "--solver", "greedy", option, output]
+    done = run(*command, preexec_fn=lambda: small_files(100))
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert "cannot be written (File too large)" in done.stderr and "unchanged" in done.stderr
+    assert output.read_text() == "old" and os.listdir(tmp_path) == ["out"]
+
+
+def test_a_full_disk_while_an_archive_is_written(tmp_path, monkeypatch):
+    """Closing the archive fails as well then, and what is said must be what the disk said."""
+
+    class Full:
+        """A file on a disk that is full after some bytes."""
+
+        def __init__(self, file):
+            self.file, self.room = file, 300
+
+        def write(self, data):
+            self.room -= len(data)
+            if self.room < 0:
+                raise OSError(28, "No space left on device")
+            return self.file.write(data)
+
+        def __getattr__(self, name):
+            return getattr(self.file, name)
+
+    (tmp_path / "a.npz").write_bytes(b"old")
+    real = npz.write_atomically
+    monkeypatch.setattr(
+        npz, "write_atomically", lambda path, writer: real(path, lambda file: writer(Full(file)))
+    )
+    with pytest.raises(InvalidInputError, match=r"cannot be written \(No space left on device\)"):
+        save_npz(tmp_path / "a.npz", "assoc.test", 1, {"x": np.random.default_rng(0).random(10_000)})
+    assert os.listdir(tmp_path) == ["a.npz"] and (tmp_path / "a.npz").read_bytes() == b"old"
+
+
+def test_stdout_on_a_full_disk(scene_file):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*PYTHON, "assoc.solve", str(scene_file), "--solver", "greedy"],
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=120,
+        )  # fmt: skip
+    assert done.returncode == 2 and done.stderr == "assoc.solve: error: No space left on device\n"
+
+
+def test_a_folder_that_cannot_be_written(tmp_path):
+    folder = tmp_path / "read-only"
+    folder.mkdir()
+    folder.chmod(0o500)
+    try:
+        if os.access(folder, os.W_OK):
+            pytest.skip("this user may write everywhere")
+        with pytest.raises(InvalidInputError, match="Permission denied"):
+            write_atomically(folder / "a", lambda file: file.write(b"x"))
+    finally:
+        folder.chmod(0o700)
+
+
+def test_a_file_system_that_cannot_be_written():
+    """/proc takes no new files from anyone, the superuser included."""
+    if not Path("/proc/self").is_dir():
+        pytest.skip("no /proc here")
+    with pytest.raises(InvalidInputError, match="cannot be written"):
+        write_atomically("/proc/assoc-test", lambda file: file.write(b"x"))
+
+
+def test_killed_in_the_middle_of_saving_the_old_file_stays(tmp_path):
+    path = tmp_path / "p.npz"
+    problem = AssignmentProblem([[1, 1]], [-1.0], [1, 1])
+    problem.save(path)
+    before = path.read_bytes()
+    script = f"""
+import time
+from assoc._files.output import write_atomically
+def writer(file):
+    file.write(b"half of the new")
+    file.flush()
+    print("half", flush=True)
+    time.sleep(60)
+write_atomically({str(path)!r}, writer)
+"""
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "half\n"
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    assert path.read_bytes() == before
+    assert AssignmentProblem.load(path).num_tuples == problem.num_tuples
+    # the same command again is not held up by what the killed one left
+    problem.save(path)
+    assert path.read_bytes()[:2] == b"PK"
+
+
+def children(pid):
+    """Process ids of a process's children that are at work in Python."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        found += [int(child) for child in (task / "children").read_text().split()]
+    return [child for child in found if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
+def test_a_killed_worker_is_one_clear_line(tmp_path):
+    simulate("three-radar", 2, scans=400).save(tmp_path / "long.npz")
+    command = [*PYTHON, "assoc.solve", "long.npz", "--solver", "aco", "--jobs", "2", "--json", "out.json"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            end = time.monotonic() + 60
+            while not children(process.pid) and time.monotonic() < end:
+                time.sleep(0.02)
+            os.kill(children(process.pid)[0], signal.SIGKILL)
+            _, complaint = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 3 and complaint.count("\n") == 1, complaint
+    assert "a worker process died" in complaint and "fewer processes" in complaint
+    assert os.listdir(tmp_path) == ["long.npz"]
+
+
+def test_a_worker_that_dies_is_an_error_of_the_library():
+    from assoc._system.processes import ordered_map
+
+    with pytest.raises(LimitExceededError, match="worker process died"):
+        list(ordered_map(os._exit, [1, 1], 2))
+
+
+def test_a_worker_that_dies_while_another_is_started(monkeypatch):
+    """The executor on its own then waits without end, or says that a handle is closed."""
+    from assoc._system import processes
+
+    class Slow(processes.ProcessPoolExecutor):
+        def _spawn_process(self):
+            if self._processes:
+                os.kill(next(iter(self._processes)), signal.SIGKILL)
+                time.sleep(1.0)
+            super()._spawn_process()
+
+    said = []
+
+    def work():
+        try:
+            list(processes.ordered_map(abs, [1, 2], 2))
+        except LimitExceededError as error:
+            said.append(str(error))
+
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", Slow)
+    worker = threading.Thread(target=work, daemon=True)
+    worker.start()
+    worker.join(30.0)
+    assert not worker.is_alive() and "worker process died" in said[0]

@@ -1,0 +1,74 @@
+"""A fixed sample of spoiled files for every reader; `make fuzz` runs tens of thousands."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.problem import AssignmentProblem
+from tests.reliability.fuzzing import ROOMS, Room, _bomb, judge, prepare, run_case, warm_up
+from tests.reliability.mutations import bombs
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    files = prepare(tmp_path_factory.mktemp("valid"))
+    # the first use compiles, which is not the reader's time
+    warm_up(files)
+    return files
+
+
+def test_five_hundred_spoiled_files(made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    faults = [run_case(77, number, made, tmp_path) for number in range(500)]
+    assert [fault for fault in faults if fault] == []
+
+
+def test_bombs_are_refused_before_they_go_off(made, tmp_path):
+    room = next(one for one in ROOMS if one.name == "problem.npz")
+    for path in bombs(tmp_path, made["problem.npz"][0].read_bytes(), 300_000_000):
+        assert path.stat().st_size < 20_000_000
+        with pytest.raises(InvalidInputError):
+            AssignmentProblem.load(path)
+    assert _bomb(room, tmp_path / "bomb-zeros.npz") is None
+
+
+def test_a_problem_of_a_billion_measurements_is_refused():
+    """Its singletons alone would take a hundred gigabytes; the file that says so has a kilobyte."""
+    with pytest.raises(LimitExceededError, match="memory"):
+        AssignmentProblem(np.zeros((0, 2), np.int32), [], [2**30, 2**30 - 5])
+
+
+def test_the_judge_sees_faults(tmp_path):
+    """Readers made wrong on purpose."""
+
+    def lines(path):
+        raise InvalidInputError("one\ntwo")
+
+    def crash(path):
+        return [][1]
+
+    path = tmp_path / "x"
+    for read, words in [(lines, "several lines"), (crash, "IndexError"), (lambda path: None, None)]:
+        fault = judge(Room("x", "text", lambda folder: [], read), path)
+        assert (fault is None) if words is None else words in fault
+
+
+def test_a_format_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path):
+    """The first look at a file, which asks only for its format, takes no more on trust than the reader does."""
+    path = tmp_path / "large.npz"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<U500000000", "fortran_order": False, "shape": ()})
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("format.npy", header.getvalue())
+    code = (
+        "import sys, tracemalloc; import numpy; from assoc._files.npz import format_of; tracemalloc.start();"
+        "assert format_of(sys.argv[1]) is None; assert tracemalloc.get_traced_memory()[1] < 1e6"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code, str(path)], check=True, timeout=60)

@@ -1,0 +1,179 @@
+"""Threads, pools of processes, installations without a place for a cache, first runs at the same time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.ranking.kbest import kbest
+from assoc.ranking.marginals import marginals
+from assoc.simulation import simulate
+from assoc.solvers.assign import assign
+from assoc.tracking import MultiSensorTracker
+from experiments.common.oracles import gated_problem, small_problems
+
+# a kernel of its own in a copied package: compiling the real ones takes a minute
+KERNEL = """
+from assoc._system.compiled import njit
+
+@njit
+def double(x):
+    return 2.0 * x
+"""
+
+
+def answer(item):
+    """Solve one problem; what must not depend on who else is at work."""
+    name, number = item
+    problem = list(small_problems(number + 1, seed=8, dummy=True))[number]
+    found = assign(problem, name, seed=number)
+    return found.tuples.tolist(), found.cost, found.lower_bound, found.iterations
+
+
+def work():
+    names = ("exact", "greedy", "aco", "genetic", "tabu", "lagrangian")
+    return [(name, number) for number in range(6) for name in names]
+
+
+def test_eight_threads_answer_like_one():
+    alone = [answer(item) for item in work()]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(3):
+            assert list(pool.map(answer, work())) == alone
+
+
+def test_threads_share_one_problem():
+    problem = gated_problem(np.random.default_rng(3), (8, 8, 8), 0.3)
+    alone = assign(problem, "exact")
+    ranked = [one.cost for one in kbest(problem, 5)]
+    fresh = assoc.AssignmentProblem(problem.tuples, problem.costs, problem.sizes)
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda _: assign(fresh, "exact"), range(16)))
+        lists = list(pool.map(lambda _: [one.cost for one in kbest(fresh, 5)], range(8)))
+    assert all(one.tuples.tolist() == alone.tuples.tolist() and one.cost == alone.cost for one in found)
+    assert all(one == ranked for one in lists)
+
+
+def test_threads_rank_track_and_weigh_alone():
+    """Rankings, marginals and trackers in eight threads, each on its own scene."""
+
+    def work(number):
+        scene = simulate("three-radar", number, scans=4)
+        problem = assoc.build_problem(scene, 0)
+        weighed = marginals(problem, 5)
+        tracker = MultiSensorTracker.for_scene(scene)
+        scans = [scene.scan(k) for k in range(scene.num_scans)]
+        steps = [tracker.step(scan.time, scan.measurements) for scan in scans]
+        return (
+            [(one.cost, one.tuples.tobytes()) for one in kbest(problem, 5)],
+            (weighed.lower.tobytes(), weighed.upper.tobytes()),
+            [[assigned.tobytes() for assigned in step.assigned] for step in steps],
+            [(track.track_id, track.mean.tobytes()) for track in tracker.tracks],
+        )
+
+    alone = [work(number) for number in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(2):
+            assert list(pool.map(work, range(8))) == alone
+
+
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
+def test_pools_of_processes(method):
+    items = work()[:6]
+    with ProcessPoolExecutor(2, mp_context=get_context(method)) as pool:
+        assert list(pool.map(answer, items)) == [answer(item) for item in items]
+
+
+def copied(folder: Path) -> Path:
+    """A copy of what a kernel needs of the package, without compiled code."""
+    package = folder / "assoc"
+    package.mkdir(parents=True)
+    original = Path(assoc.__file__).parent
+    shutil.copytree(original / "_system", package / "_system", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(original / "errors.py", package / "errors.py")
+    (package / "__init__.py").write_text("")
+    (package / "kernel.py").write_text(KERNEL)
+    return folder
+
+
+def first_run(folder: Path, script: str = "", **environment: str) -> subprocess.Popen[str]:
+    code = "from assoc.kernel import double\nassert double(3.0) == 6.0\n" + textwrap.dedent(script)
+    environment = {**os.environ, "PYTHONPATH": str(folder), **environment}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    return subprocess.Popen(
+        [sys.executable, "-W", "error", "-c", code], env=environment, text=True, cwd=folder,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def test_two_first_runs_at_once(tmp_path):
+    folder = copied(tmp_path)
+    runs = [first_run(folder) for _ in range(4)]
+    assert [(one.communicate(timeout=120)[1], one.returncode) for one in runs] == [("", 0)] * 4
+    assert list((folder / "assoc" / "__pycache__").glob("*.nbc"))
+    again = first_run(folder, "assert sum(double.stats.cache_hits.values()) == 1")
+    assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
+
+
+def test_a_cache_cut_short_is_made_anew(tmp_path):
+    folder = copied(tmp_path)
+    first_run(folder).communicate(timeout=60)
+    for suffix in ("*.nbc", "*.nbi"):
+        for kept in (folder / "assoc" / "__pycache__").glob(suffix):
+            kept.write_bytes(kept.read_bytes()[:100])
+        for script in ("", "assert sum(double.stats.cache_hits.values()) == 1"):
+            again = first_run(folder, script)
+            assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
+
+
+def test_a_cache_on_a_full_disk(tmp_path):
+    """A kernel that cannot be kept is compiled all the same."""
+    folder = copied(tmp_path)
+    script = """
+    import resource, signal
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+    assert double(3) == 6
+    """
+    full = first_run(folder, script)
+    assert (full.communicate(timeout=60)[1], full.returncode) == ("", 0)
+
+
+def test_an_installation_that_cannot_be_written(tmp_path):
+    """Neither the package nor the home can be written: the cache is temporary, shared with workers, and goes."""
+    folder, temporary = copied(tmp_path / "site"), tmp_path / "tmp"
+    temporary.mkdir()
+    # files where numba wants folders keep even the superuser out
+    (folder / "assoc" / "__pycache__").write_text("")
+    (tmp_path / "home").write_text("")
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home"), "TMPDIR": str(temporary)}
+    script = """
+    import os, subprocess, sys, numba
+    assert os.listdir(os.environ["TMPDIR"]) == [os.path.basename(numba.config.CACHE_DIR)]
+    child = "from assoc.kernel import double; double(1.0); assert sum(double.stats.cache_hits.values()) == 1"
+    subprocess.run([sys.executable, "-c", child], check=True)
+    """
+    one = first_run(folder, script, PYTHONDONTWRITEBYTECODE="1", **home)
+    assert (one.communicate(timeout=60)[1], one.returncode) == ("", 0)
+    assert os.listdir(temporary) == []
+
+
+def test_no_folder_for_temporary_files_either(tmp_path):
+    """A kernel is compiled all the same where nothing at all can be written."""
+    folder = copied(tmp_path / "site")
+    (folder / "assoc" / "__pycache__").write_text("")
+    (tmp_path / "home").write_text("")
+    (folder / "sitecustomize.py").write_text("import tempfile\ntempfile.tempdir = '/missing'\n")
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home")}
+    one = first_run(folder, "assert not double.stats.cache_path", PYTHONDONTWRITEBYTECODE="1", **home)
+    assert (one.communicate(timeout=60)[1], one.returncode) == ("", 0)

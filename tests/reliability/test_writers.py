@@ -1,0 +1,212 @@
+"""Every writer: on a full disk, on a read-only one, and where the path is a link, a pipe or a device."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from assoc._files.output import write_atomically, write_text
+from assoc.errors import InvalidInputError
+from assoc.sweeps import load
+from tests.reliability.writers import outcome, writers
+
+NAMES = (
+    "scene", "problem", "tracker", "association", "tracks", "plots of a radar", "truth", "picture", "report",
+    "report of tracks", "claims", "claims as a table", "figure of an experiment", "benchmarks",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def every():
+    found = writers()
+    assert tuple(found) == NAMES
+    return found
+
+
+def mount(*words):
+    return subprocess.run(["mount", *map(str, words)], capture_output=True, check=False).returncode == 0
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """A disk of its own, of 200 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if os.geteuid() != 0 or not mount("-t", "tmpfs", "-o", "size=200k", "tmpfs", folder):
+        pytest.skip("a disk can only be mounted by the superuser; files of limited size stand in for it")
+    try:
+        yield folder
+    finally:
+        mount("-o", "remount,rw", folder)
+        subprocess.run(["umount", "-l", folder], check=True)
+
+
+def fill(folder):
+    (folder / "out").write_text("old")
+    with open(folder / "filler", "wb", buffering=0) as file, pytest.raises(OSError, match="No space"):
+        while True:
+            file.write(bytes(4096))
+
+
+def test_files_that_may_not_grow(tmp_path):
+    """The limit of a process does what a full disk does, for everyone and not only the superuser."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.reliability.writers", str(tmp_path)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [*found] == [name for name in NAMES if "report" not in name]
+    for name, (said, names, content) in found.items():
+        assert "File too large" in said and "unchanged" in said and "\n" not in said, (name, said)
+        assert (names, content) == (["out"], "old"), name
+
+
+def test_a_full_disk_and_then_room_again(every, disk):
+    small = [name for name in NAMES if "report" not in name]
+    fill(disk)
+    for name in small:
+        said, names, content = outcome(every[name], disk / "out")
+        assert "No space left on device" in said and "unchanged" in said, (name, said)
+        assert (names, content) == (["filler", "out"], "old"), name
+    (disk / "filler").unlink()
+    for name in small:
+        assert outcome(every[name], disk / "out") == ("", ["out"], "new"), name
+
+
+def test_a_read_only_disk(every, disk):
+    (disk / "out").write_text("old")
+    assert mount("-o", "remount,ro", disk)
+    for name, writer in every.items():
+        with pytest.raises(InvalidInputError, match="read-only"):
+            writer(disk / "out")
+        with pytest.raises(InvalidInputError, match="read-only"):
+            writer(disk / f"new-{name}")
+    assert os.listdir(disk) == ["out"] and (disk / "out").read_text() == "old"
+
+
+def test_links_pipes_and_modes(every, tmp_path):
+    """A name that leads elsewhere stays; a pipe is written into, and not replaced by a file."""
+    (tmp_path / "private").write_text("old")
+    (tmp_path / "private").chmod(0o600)
+    (tmp_path / "link").symlink_to("private")
+    os.mkfifo(tmp_path / "pipe")
+    for name, writer in every.items():
+        writer(tmp_path / "link")
+        assert (tmp_path / "link").is_symlink()
+        written = (tmp_path / "private").read_bytes()
+        assert written != b"old" and stat.S_IMODE((tmp_path / "private").stat().st_mode) == 0o600, name
+        got = []
+        reader = threading.Thread(target=lambda got=got: got.append((tmp_path / "pipe").read_bytes()))
+        reader.start()
+        writer(tmp_path / "pipe")
+        reader.join(10)
+        assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode), name
+        assert len(got[0]) == len(written), name
+    assert sorted(os.listdir(tmp_path)) == ["link", "pipe", "private"]
+
+
+def test_devices_folders_and_places_that_are_none(tmp_path):
+    write_text("/dev/null", "x")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "nowhere").symlink_to("missing/file")
+    (tmp_path / "file").write_text("")
+    for path, said in [
+        (tmp_path, "is a folder"),
+        (tmp_path / "loop", "cannot be written"),
+        (tmp_path / "nowhere", "missing does not exist"),
+        (tmp_path / "file" / "below", "does not exist"),
+        (tmp_path / ("x" * 300), "File name too long"),
+        ("a\0b", "null"),
+        ("/dev/full", "No space left"),
+    ]:
+        with pytest.raises(InvalidInputError, match=said) as raised:
+            write_text(path, "x")
+        assert "\n" not in str(raised.value)
+    # as long as names may be, with characters of several bytes
+    write_text(tmp_path / ("\N{SNOWMAN}" * 83 + ".json"), "x")
+    write_text(tmp_path / os.fsdecode(b"\xff\xfe"), "\udcff")
+    assert (tmp_path / os.fsdecode(b"\xff\xfe")).read_text() == "\\udcff"
+
+
+def test_threads_write_with_the_mode_that_was_asked_for(tmp_path):
+    before = os.umask(0o027)
+    try:
+        made = [threading.Thread(target=write_text, args=(tmp_path / f"{i}", "x")) for i in range(30)]
+        for one in made:
+            one.start()
+        for one in made:
+            one.join()
+        assert {stat.S_IMODE((tmp_path / f"{i}").stat().st_mode) for i in range(30)} == {0o640}
+        assert os.umask(0o027) == 0o027
+    finally:
+        os.umask(before)
+
+
+INTERRUPTED = """
+import sys, time
+from assoc._files.output import write_atomically
+from assoc._cli.program import begin
+begin("assoc.test")
+def writer(file):
+    file.write(b"half of the new")
+    file.flush()
+    print("half", flush=True)
+    time.sleep(60)
+write_atomically(sys.argv[1], writer)
+"""
+
+
+@pytest.mark.parametrize(("name", "code", "said"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")])
+def test_ended_in_the_middle_of_writing(tmp_path, name, code, said):
+    import signal
+
+    (tmp_path / "out").write_text("old")
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, str(tmp_path / "out")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout.readline() == "half\n"
+        assert len(os.listdir(tmp_path)) == 2
+        process.send_signal(getattr(signal, name))
+        _, complaint = process.communicate(timeout=20)
+    assert (process.returncode, complaint) == (code, f"assoc.test: {said}\n")
+    assert os.listdir(tmp_path) == ["out"] and (tmp_path / "out").read_text() == "old"
+
+
+def test_a_study_goes_on_when_the_disk_has_room_again(disk, monkeypatch):
+    from assoc.simulation import simulate
+    from assoc.sweeps import Study, grid
+    from assoc.sweeps.backends import local
+    from assoc.sweeps.sources import Source
+
+    monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.02)
+    scene = Source(simulate("three-radar", 2, scans=5), "scene")
+    study = Study([scene], grid("greedy"), 60)
+    (disk / "filler").write_bytes(bytes(200 * 1024 - 5 * 4096))
+    with pytest.raises(InvalidInputError, match="No space left on device.*the same command goes on from there"):
+        study.run(disk / "s")
+    kept = len(load(disk / "s"))
+    (disk / "filler").unlink()
+    assert mount("-o", "remount,size=4m", disk)
+    counts = study.run(disk / "s")
+    assert 0 < kept == counts.before < study.size == counts.done
+    study.run(disk.parent / "expected")
+    one, other = (load(folder).drop(columns="time") for folder in (disk / "s", disk.parent / "expected"))
+    assert one.equals(other)
+
+
+def test_a_writer_that_fails_otherwise(tmp_path):
+    def fail(file):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        write_atomically(tmp_path / "out", fail)
+    assert list(Path(tmp_path).iterdir()) == []

@@ -1,0 +1,110 @@
+"""The quick ways of the track-oriented tracker give what the slow ones give."""
+
+import numpy as np
+import pytest
+
+from assoc import assign
+from assoc.costs.build import positions_and_covariances, single_positions
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scan, Scene
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
+from assoc.tracking.mht import best_hypothesis
+from assoc.tracking.mht.best_hypothesis import choose
+from assoc.tracking.mht.pruning import decide, keep_best, same_tree
+
+VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
+
+
+def branches(seed, trees, measurements, columns=3):
+    rng = np.random.default_rng(seed)
+    tree = np.repeat(np.sort(rng.choice(100, trees, replace=False)), rng.integers(1, 9, trees))
+    history = rng.integers(0, measurements + 1, (len(tree), columns)).astype(np.int32)
+    history[rng.random(history.shape) < 0.3] = 0
+    return tree.astype(np.int64), rng.normal(3.0, 5.0, len(tree)), history
+
+
+def by_solver(tree, score, history):
+    rows = np.flatnonzero(score > 0)
+    number = np.unique(tree, return_inverse=True)[1] + 1
+    tuples = np.column_stack([number, history])[rows]
+    sizes = np.maximum(tuples.max(axis=0), 1)
+    return assign(AssignmentProblem(tuples, -score[rows], sizes)).cost
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_best_hypothesis_is_that_of_a_solver(seed):
+    tree, score, history = branches(seed, trees=2 + seed % 12, measurements=2 + seed % 17)
+    chosen = choose(tree, score, history)
+    assert chosen is not None
+    assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
+    assert len(set(tree[chosen])) == chosen.sum()
+    for column in history[chosen].T:
+        used = column[column > 0]
+        assert len(set(used)) == len(used)
+
+
+def test_too_much_work_is_left_to_a_solver(monkeypatch):
+    tree, score, history = branches(1, trees=12, measurements=9)
+    monkeypatch.setattr(best_hypothesis, "VISITS", 20)
+    assert choose(tree, score, history) is None
+    assert not choose(tree, -np.abs(score), history).any()
+    nothing = choose(tree[:0], score[:0], history[:0])
+    assert nothing is not None and not len(nothing)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_best_branches_of_each_tree(seed):
+    rng = np.random.default_rng(seed)
+    tree, score = rng.integers(0, 12, 80), rng.normal(0, 8, 80).round()
+    wanted = []
+    for one in np.unique(tree):
+        own = sorted(np.flatnonzero(tree == one).tolist(), key=lambda b: -score[b])
+        wanted += [b for b in own[:4] if score[b] >= score[own[0]] - 9.0]
+    assert keep_best(tree, score, 4, 9.0).tolist() == wanted
+
+
+def test_what_is_decided_of_the_oldest_scan():
+    #             tree 1 (chosen)  tree 2 (waits)  tree 3 (waits)  tree 4 (young)
+    tree = np.array([1, 1, 2, 2, 3, 4])
+    score = np.array([9.0, 5.0, 8.0, 3.0, 4.0, 1.0])
+    chosen = np.array([True, False, False, False, False, False])
+    old = np.array([True, True, True, True, True, False])
+    oldest = np.array([[1], [2], [1], [2], [2], [0]], dtype=np.int32)
+    kept, speakers = decide(tree, score, chosen, old, oldest, np.array([2]))
+    # tree 2's best branch contradicts tree 1; tree 3 scores more than the other one and takes measurement 2
+    assert kept.tolist() == [True, False, False, False, True, True]
+    assert speakers.tolist() == [0, 4]
+
+
+def test_a_mask_spreads_over_its_trees():
+    tree, mask = np.array([1, 1, 2, 5, 5, 5]), np.array([False, True, False, False, True, False])
+    assert same_tree(tree, mask).tolist() == [True, True, False, True, True, True]
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        PositionSensor(position=np.zeros(3), noise=[9.0, 7.0, 5.0], field_of_view=[[-1e4, 1e4]] * 3),
+        PositionSensor(position=np.zeros(3), noise=[[81.0, 20.0], [20.0, 49.0]], field_of_view=[[-1e4, 1e4]] * 2),
+        Radar3D(position=[0.0, 100.0, 0.0], noise=[30.0, 0.01, 0.01], field_of_view=VIEW),
+        Radar2D(position=[0.0, 100.0, 0.0], noise=[30.0, 0.01], field_of_view=VIEW[:2]),
+        BearingSensor(position=[0.0, 100.0, 0.0], noise=[0.01], field_of_view=VIEW[1:2]),
+    ],
+    ids=lambda one: f"{type(one).__name__}-{one.dim}",
+)
+def test_positions_of_single_measurements(sensor):
+    rng = np.random.default_rng(3)
+    other = Radar3D(position=[500.0, 0.0, 0.0], noise=[30.0, 0.01, 0.01], field_of_view=VIEW)
+    place = rng.uniform([500.0, 500.0, 100.0], [5_000.0, 5_000.0, 900.0], (6, 3))
+    z = sensor.measure(place)
+    nothing = [[np.zeros((0, 3)), np.zeros((0, sensor.dim))]]
+    region = [[0.0, 6e3], [0.0, 6e3], [0.0, 1e3]]
+    scene = Scene(sensors=[other, sensor], times=[0.0], measurements=nothing, region=region)
+    tuples = np.column_stack([np.zeros(6, dtype=int), np.arange(1, 7)])
+    wanted = positions_and_covariances(scene, Scan(0, 0.0, (np.zeros((0, 3)), z)), tuples)
+    for _ in range(2):
+        found = single_positions(scene, 1, z)
+        np.testing.assert_allclose(found[0], wanted[0], rtol=1e-12, atol=1e-6)
+        np.testing.assert_allclose(found[1], wanted[1], rtol=1e-9, atol=1e-9)
+    empty = single_positions(scene, 1, z[:0])
+    assert empty[0].shape == (0, 3) and empty[1].shape == (0, 3, 3)

@@ -1,0 +1,167 @@
+"""A file that is no saved tracker is refused by one line, whatever is wrong with it; the tracker stays as it was."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assoc import simulation
+from assoc._files.npz import save_npz
+from assoc.errors import AssocError, InvalidInputError
+from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
+from assoc.tracking import TRACKERS
+from assoc.tracking.defaults import two_speeds
+from assoc.tracking.tracker import FORMAT, VERSION
+from tests.reliability.mutations import MARKER, spoil
+
+SCENE = simulation.simulate("three-radar", 4, scans=7)
+SCANS = 5
+
+
+def saved(kind, path, filter_=None):
+    tracker = kind.for_scene(SCENE, filter_)
+    for k in range(SCANS):
+        scan = SCENE.scan(k)
+        tracker.step(scan.time, scan.measurements)
+    tracker.save(path)
+    return tracker
+
+
+def step(tracker):
+    scan = SCENE.scan(SCANS)
+    return tracker.step(scan.time, scan.measurements)
+
+
+@pytest.mark.parametrize("name", sorted(TRACKERS))
+def test_spoiled_files(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kind = TRACKERS[name]
+    saved(kind, "good.npz")
+    content, rng = Path("good.npz").read_bytes(), np.random.default_rng(1)
+    refused = 0
+    for _ in range(40):
+        Path("bad.npz").write_bytes(spoil(rng, content, "npz"))
+        tracker = kind.for_scene(SCENE)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                tracker.restore("bad.npz")
+        except InvalidInputError as error:
+            refused += 1
+            assert str(error).startswith("bad.npz: ") and "\n" not in str(error)
+            assert tracker.time is None and tracker.num_steps == 0 and not tracker.tracks
+            continue
+        # what is believed can be gone on with
+        try:
+            step(tracker)
+        except AssocError as error:
+            assert "\n" not in str(error)
+    assert refused > 20
+    assert not Path(MARKER).exists()
+
+
+def nan_time(a):
+    a["time"] = np.array(np.nan)
+
+
+LIES = {
+    "time": nan_time,
+    "scan": lambda a: a.update(scan=np.array(-1)),
+    "pace": lambda a: a.update(pace=np.array(np.inf)),
+    "next_id": lambda a: a.update(next_id=np.array(0)),
+    "bank.score": lambda a: a["bank.score"].__setitem__(0, np.nan),
+    "bank.hits": lambda a: a.update({"bank.hits": a["bank.hits"][:-1]}),
+    "bank.missed": lambda a: a["bank.missed"].__setitem__(0, -3),
+    "bank.track_id": lambda a: a["bank.track_id"].__setitem__(0, 0),
+    "bank.state.weights": lambda a: a["bank.state.weights"].__setitem__(0, [-1.0, 2.0]),
+    "bank.state.means": lambda a: a.update({"bank.state.means": a["bank.state.means"][:, :, :3]}),
+    "bank.state.covariances": lambda a: a["bank.state.covariances"].__setitem__(0, np.inf),
+}
+OF_MHT = {
+    "history": lambda a: a["history"].__setitem__((0, 0), 999),
+    "window_sizes": lambda a: a["window_sizes"].__setitem__((0, 0), 10**15),
+    "window_times": lambda a: a.update(window_times=np.zeros(9), window_sizes=np.zeros((9, 3), dtype=int)),
+}
+OF_TREES = {
+    "born": lambda a: a["born"].__setitem__(0, 99),
+    "chosen": lambda a: a.update(chosen=a["chosen"][1:]),
+    "bank.track_id": lambda a: a.update({"bank.track_id": a["bank.track_id"][::-1].copy()}),
+}
+OF_HYPOTHESES = {
+    "members": lambda a: a["members"].__setitem__(0, 10_000),
+    "lengths": lambda a: a["lengths"].__setitem__(0, -1),
+    "weight": lambda a: a["weight"].__setitem__(0, np.nan),
+    "line": lambda a: a["line"].__setitem__((0, 0), -1),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "lies"),
+    [
+        *((name, LIES) for name in sorted(TRACKERS)),
+        ("mht", OF_MHT),
+        ("mht-hypothesis", OF_MHT),
+        ("mht", OF_TREES),
+        ("mht-hypothesis", OF_HYPOTHESES),
+    ],
+)
+def test_each_lie_is_named(name, lies, tmp_path):
+    tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
+    for field, lie in lies.items():
+        arrays = {key: np.array(value) for key, value in tracker._arrays().items()}
+        lie(arrays)
+        save_npz(path, FORMAT, VERSION, arrays)
+        again = TRACKERS[name].for_scene(SCENE)
+        with pytest.raises(InvalidInputError) as caught:
+            again.restore(path)
+        assert str(caught.value).startswith(f"{path}: ") and f"'{field}'" in str(caught.value)
+        assert again.time is None
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: EnsembleKalmanFilter(ConstantVelocity(20.0, kind="continuous"), 20, 1),
+        lambda: FuzzyAdaptiveEKF.from_data(CoordinatedTurn(20.0, 0.05), tuned_data()),
+    ],
+    ids=["enkf", "fuzzy"],
+)
+def test_filters_with_states_of_their_own(make, tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "state.npz"
+    tracker = saved(kind, path, make())
+    again = kind.for_scene(SCENE, make())
+    again.restore(path)
+    step(tracker), step(again)
+    assert [t.score for t in tracker.tracks] == [t.score for t in again.tracks]
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"bit_generator": "MT19937"}', "[" * 5000, "7"])
+def test_the_state_of_a_random_generator(text, tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "bad.npz"
+    make = lambda: EnsembleKalmanFilter(ConstantVelocity(20.0, kind="continuous"), 20, 1)  # noqa: E731
+    tracker = saved(kind, path, make())
+    save_npz(path, FORMAT, VERSION, tracker._arrays() | {"filter_rng": np.array(text)})
+    again = kind.for_scene(SCENE, make())
+    if not text:
+        again.restore(path)
+        return
+    with pytest.raises(InvalidInputError, match="'filter_rng' is not the state of a random generator"):
+        again.restore(path)
+
+
+@pytest.mark.parametrize("settings", ["{", "[]", "[" * 5000, '{"seed": "1"}'])
+def test_settings_that_cannot_be_read(settings, tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "bad.npz"
+    tracker = saved(kind, path)
+    save_npz(path, FORMAT, VERSION, tracker._arrays() | {"settings": np.array(settings)})
+    with pytest.raises(InvalidInputError, match="was saved by a tracker with other settings"):
+        kind.for_scene(SCENE).restore(path)
+
+
+def test_another_process_noise_is_another_setting(tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "state.npz"
+    saved(kind, path, two_speeds(50.0))
+    kind.for_scene(SCENE, two_speeds(50.0)).restore(path)
+    with pytest.raises(InvalidInputError, match=r"other settings: filter was .*sigma=5\.0.*, is .*sigma=6\.0"):
+        kind.for_scene(SCENE, two_speeds(60.0)).restore(path)
