@@ -8,11 +8,13 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from assoc._version import __version__
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
     from assoc import plotting, solvers, sweeps
-    from assoc.association.association import Association, associate
+    from assoc.association.associate import associate
+    from assoc.association.association import Association
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
     from assoc.ranking.kbest import kbest
@@ -21,8 +23,6 @@ if TYPE_CHECKING:
     from assoc.solution import Solution
     from assoc.solvers.assign import assign
     from assoc.solvers.warm_up import warm_up
-
-__version__ = "0.1.0"
 
 __all__ = [
     "AssignmentProblem",
@@ -33,6 +33,7 @@ __all__ = [
     "LimitExceededError",
     "Scene",
     "Solution",
+    "__version__",
     "assign",
     "associate",
     "build_problem",

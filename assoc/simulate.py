@@ -9,7 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from assoc._cli.inputs import check_distinct, check_output
-from assoc._cli.program import Option, Parser, begin, given, options, printable, run, whole_number
+from assoc._cli.options import given
+from assoc._cli.program import Parser, begin, run
+from assoc._cli.values import whole_number
+from assoc._parameters import Option, options
+from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 _PURPOSE = {

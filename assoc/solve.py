@@ -12,14 +12,19 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_kind, check_output, load_source, number, read_toml, scan_range
-from assoc._cli.program import Option, Parser, begin, each, given, options, run, seconds, whole_number
+from assoc._cli.inputs import check_distinct, check_output, read_toml
+from assoc._cli.options import given
+from assoc._cli.program import Parser, begin, each, run
+from assoc._cli.values import check_kind, number, scan_range, seconds, whole_number
+from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
+from assoc.association.source import load_source
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc.association.association import Association, ScanAssociation
+    from assoc.association.association import Association
     from assoc.association.plan import Plan
+    from assoc.association.scan import ScanAssociation
     from assoc.problem import AssignmentProblem
     from assoc.scene.scene import Scene
 
@@ -225,8 +230,8 @@ def _write_json(path: str | None, association: Association, names: list[str]) ->
 
 
 def _write_csv(path: str | None, association: Association, names: list[str]) -> None:
-    from assoc._cli.table import to_csv
     from assoc._files.output import write_text
+    from assoc.association.table import to_csv
 
     if path is not None:
         write_text(path, to_csv(association.scans, names))

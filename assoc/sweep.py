@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.program import INTERRUPTED, Parser, ending_signals, printable, run, steady_streams
+from assoc._cli.program import INTERRUPTED, Parser, run, steady_streams
+from assoc._cli.signals import ending_signals
 from assoc._system import temporary
 from assoc._system.extras import check_extra
+from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -12,9 +12,13 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output, number
-from assoc._cli.program import Option, Parser, begin, each, given, options, printable, run, seconds, whole_number
+from assoc._cli.inputs import check_distinct, check_output
+from assoc._cli.options import given
+from assoc._cli.program import Parser, begin, each, run
+from assoc._cli.values import number, seconds, whole_number
+from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
+from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:

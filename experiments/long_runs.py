@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.sensors.base import Sensor
@@ -33,8 +34,6 @@ from assoc.solvers.assign import assign
 from assoc.tracking import TRACKERS, Tracker
 from experiments.common.claims import Claim
 from experiments.common.command import main
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 REGION = np.array([[-40e3, 40e3], [-40e3, 40e3], [0.0, 12e3]])
 RADII = np.array([10e3, 15e3, 20e3, 25e3])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_kind, check_output, number, read_toml, scan_range
-from assoc._cli.program import seconds, whole_number
+from assoc._cli.inputs import check_distinct, check_output, read_toml
+from assoc._cli.values import check_kind, number, scan_range, seconds, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from

@@ -2,62 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from assoc._cli.program import printable
-from assoc.association.association import ScanAssociation
-
-_HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
-_LEFT = ("file", "status")
-
-
-def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells for people.
-
-    Parameters
-    ----------
-    scans : sequence of ScanAssociation
-    files : sequence of str
-        The file of each scan; shown only if there are several.
-    """
-    several = len(set(files)) > 1
-    ranked = any(scan.ranked for scan in scans)
-    truth = any(scan.true_tuples is not None for scan in scans)
-    headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
-    if ranked:
-        headers.insert(headers.index("scan") + 1, "rank")
-    cells = []
-    for scan, file, rank in _lines(scans, files):
-        solution = scan.solution
-        row = [printable(file)] if several else []
-        row += [
-            str(scan.scan),
-            *([str(rank)] if ranked else []),
-            " ".join(map(str, scan.sizes)),
-            str(len(scan.targets)),
-            str(scan.false_alarms),
-            f"{solution.cost:.4f}",
-            f"{solution.lower_bound:.4f}",
-            f"{solution.gap:.2g}",
-            solution.status,
-            f"{1e3 * solution.runtime:.2f}",
-        ]
-        if truth:
-            row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
-        cells.append(row)
-    return headers, cells
-
-
-def _lines(
-    scans: Sequence[ScanAssociation], files: Sequence[str]
-) -> Iterator[tuple[ScanAssociation, str, int]]:
-    """One line for each scan, or for each of its ranked associations: association, file, rank."""
-    for scan, file in zip(scans, files, strict=True):
-        for place, one in enumerate(scan.ranked or (scan,), start=1):
-            yield one, file, place
+from assoc.association.scan import ScanAssociation
+from assoc.association.table import LEFT_ALIGNED, rows
 
 
 def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
@@ -70,7 +19,7 @@ def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
 
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for header in headers:
-            table.add_column(header, justify="left" if header in _LEFT else "right", no_wrap=header != "file")
+            table.add_column(header, justify="left" if header in LEFT_ALIGNED else "right", no_wrap=header != "file")
         for row in cells:
             table.add_row(*row)
         Console().print(table)
@@ -78,27 +27,7 @@ def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
     widths = [max(len(row[i]) for row in [headers, *cells]) for i in range(len(headers))]
     for row in [headers, *cells]:
         texts = [
-            text.ljust(width) if header in _LEFT else text.rjust(width)
+            text.ljust(width) if header in LEFT_ALIGNED else text.rjust(width)
             for header, text, width in zip(headers, row, widths, strict=True)
         ]
         print("  ".join(texts).rstrip())
-
-
-def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
-    """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
-    ranked = any(scan.ranked for scan in scans)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
-        + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
-    )
-    for scan, file, rank in _lines(scans, files):
-        solution = scan.solution
-        sizes = " ".join(map(str, scan.sizes))
-        writer.writerow(
-            [file, scan.scan, *([rank] if ranked else []), scan.time, sizes, len(scan.targets), scan.false_alarms]
-            + [solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
-            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples]
-        )
-    return text.getvalue()

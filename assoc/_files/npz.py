@@ -14,9 +14,8 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from assoc._files.output import write_atomically
+from assoc._types import Array
 from assoc.errors import InvalidInputError
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SIZE_LIMIT = 4 * 1024**3
 """The most bytes that the arrays of one npz file may hold together."""

@@ -45,7 +45,6 @@ def _source_stamp(solvers: bool) -> str:
     return digest.hexdigest()
 
 
-
 def _is_solving(path: Path) -> bool:
     return path.relative_to(_PACKAGE).parts[0] in _SOLVING
 

@@ -6,13 +6,11 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-from assoc.packing.run import Run
-
 Answer = TypeVar("Answer")
 
 
-def in_time(work: Callable[[], Answer], run: Run, name: str) -> Answer | None:
-    """Return what the work returns, or None when it is not back by the time limit; what it raises is raised.
+def in_time(work: Callable[[], Answer], seconds: float, name: str) -> Answer | None:
+    """Return what the work returns, or None when it is not back in that time; what it raises is raised.
 
     The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself.
     """
@@ -27,7 +25,7 @@ def in_time(work: Callable[[], Answer], run: Run, name: str) -> Answer | None:
 
     thread = threading.Thread(target=run_aside, name=name, daemon=True)
     thread.start()
-    thread.join(max(run.remaining(), 0.0))
+    thread.join(max(seconds, 0.0))
     if errors:
         raise errors[0]
     return answers[0] if answers else None

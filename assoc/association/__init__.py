@@ -1,5 +1,7 @@
 """The association of a scene's measurements: which came from the same target, scan by scan."""
 
-from assoc.association.association import Association, ScanAssociation, associate
+from assoc.association.associate import associate
+from assoc.association.association import Association
+from assoc.association.scan import ScanAssociation
 
 __all__ = ["Association", "ScanAssociation", "associate"]

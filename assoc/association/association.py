@@ -10,11 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assoc._system.interrupts import interruptible
-from assoc.errors import InvalidInputError
-from assoc.scene.scene import Scene
+from assoc.association.scan import ScanAssociation, plain
 from assoc.solution import Solution
 
 if TYPE_CHECKING:
@@ -24,93 +21,6 @@ FORMAT = "assoc.result"
 VERSION = 1
 
 _SHOWN = 10
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ScanAssociation:
-    """The association of one scan.
-
-    Attributes
-    ----------
-    scan : int
-        Number of the scan, from 0.
-    time : float or None
-        Its time stamp, seconds; None where only an assignment problem was given.
-    sizes : tuple of int
-        Measurements of each sensor.
-    solution : Solution
-        The chosen tuples with their cost and certificate.
-    targets : int32 array, shape (T, S)
-        The tuples that are targets: those with at least two measurements, and singletons of negative cost.
-    positions : array (T, 3) or None
-        Fused (maximum-likelihood) positions, metres; None without a scene.
-    covariances : array (T, 3, 3) or None
-        Their covariances, m^2.
-    true_tuples : int or None
-        Targets that at least two sensors detected; None where the truth is not known.
-    correct_tuples : int or None
-        Those of them whose measurements, all of them and no other, form a chosen tuple.
-    ranked : tuple of ScanAssociation
-        The k best associations of the scan, this one first; empty where they were not asked for.
-    """
-
-    scan: int
-    time: float | None
-    sizes: tuple[int, ...]
-    solution: Solution
-    targets: NDArray[np.int32]
-    positions: NDArray[np.float64] | None = None
-    covariances: NDArray[np.float64] | None = None
-    true_tuples: int | None = None
-    correct_tuples: int | None = None
-    ranked: tuple[ScanAssociation, ...] = ()
-
-    @property
-    def false_alarms(self) -> int:
-        """Number of measurements that belong to no target."""
-        return sum(self.sizes) - int(np.count_nonzero(self.targets))
-
-    def labels(self) -> tuple[NDArray[np.int64], ...]:
-        """For each sensor the target (row of ``targets``) of each measurement, -1 for a false alarm."""
-        result = tuple(np.full(size, -1, dtype=np.int64) for size in self.sizes)
-        for sensor, label in enumerate(result):
-            seen = np.flatnonzero(self.targets[:, sensor])
-            label[self.targets[seen, sensor] - 1] = seen
-        return result
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the scan as it stands in a result file (docs/results.md)."""
-        solution = self.solution
-        targets: list[dict[str, Any]] = [
-            {"tuple": row.tolist(), "position": None, "covariance": None} for row in self.targets
-        ]
-        if self.positions is not None and self.covariances is not None:
-            for entry, place, spread in zip(targets, self.positions, self.covariances, strict=True):
-                entry.update(position=place.tolist(), covariance=spread.tolist())
-        content = {
-            "scan": self.scan,
-            "time": self.time,
-            "sizes": list(self.sizes),
-            "cost": _plain(solution.cost),
-            "lower_bound": _plain(solution.lower_bound),
-            "gap": _plain(solution.gap),
-            "status": solution.status,
-            "tuples": solution.tuples.tolist(),
-            "targets": targets,
-            "runtime": solution.runtime,
-        }
-        if self.ranked:
-            content["ranked"] = [
-                {"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)
-            ]
-        return content
-
-    def __repr__(self) -> str:
-        when = "" if self.time is None else f", t = {self.time:g} s"
-        return (
-            f"ScanAssociation({self.scan}{when}: {' + '.join(map(str, self.sizes))} measurements, "
-            f"{len(self.targets)} targets, {self.false_alarms} false alarms, {self.solution!r})"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,8 +62,8 @@ class Association:
             "targets": sum(len(scan.targets) for scan in self.scans),
             "false_alarms": sum(scan.false_alarms for scan in self.scans),
             "cost": math.fsum(solution.cost for solution in solutions),
-            "lower_bound": _plain(math.fsum(solution.lower_bound for solution in solutions)),
-            "gap": _plain(math.fsum(solution.gap for solution in solutions)),
+            "lower_bound": plain(math.fsum(solution.lower_bound for solution in solutions)),
+            "gap": plain(math.fsum(solution.gap for solution in solutions)),
             "optimal": sum(solution.status == "optimal" for solution in solutions),
             "runtime": math.fsum(solution.runtime for solution in solutions),
             "true_tuples": true,
@@ -215,7 +125,7 @@ class Association:
             "format": FORMAT,
             "version": VERSION,
             "solver": self.solver,
-            "parameters": {name: _plain(value) for name, value in self.parameters.items()},
+            "parameters": {name: plain(value) for name, value in self.parameters.items()},
             "seed": self.seed,
             "scans": [scan.to_dict() for scan in self.scans],
             "totals": self.totals(),
@@ -240,8 +150,8 @@ class Association:
 
     def _repr_html_(self) -> str:
         """Return what notebooks show: the summary, and one row for each of the first scans."""
-        from assoc._cli.table import rows
         from assoc._text.html import escape, table
+        from assoc.association.table import rows
 
         headers, cells = rows(self.scans[:_SHOWN], [""] * min(len(self.scans), _SHOWN))
         lines = "<br>".join(escape(line) for line in self.summary().splitlines())
@@ -251,74 +161,12 @@ class Association:
         return f"<p>{lines}</p>{table(headers, cells, numbers=numbers)}{more}"
 
 
-@interruptible()
-def associate(
-    scene: Scene,
-    solver: str = "exact",
-    *,
-    seed: int = 0,
-    time_limit: float | None = None,
-    jobs: int = 1,
-    gating: Mapping[str, Any] | None = None,
-    **parameters: Any,
-) -> Association:
-    """Find out for every scan which measurements are one target, and which are false alarms.
-
-    Parameters
-    ----------
-    scene : Scene
-    solver : str, default "exact"
-        One of ``assoc.solvers.names()``.
-    seed : int, default 0
-        The same seed gives the same associations, whatever the number of processes.
-    time_limit : float, optional
-        Seconds for each scan; when they are over the best solution found is taken.
-    jobs : int, default 1
-        Number of processes. A script that asks for more than one must guard its own start by
-        ``if __name__ == "__main__"``, because the processes are spawned.
-    gating : mapping, optional
-        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``.
-    **parameters
-        Parameters of the solver (``assoc.solvers.parameters(solver)``).
-
-    Returns
-    -------
-    Association
-
-    Raises
-    ------
-    InvalidInputError
-        An argument is not as described.
-    LimitExceededError
-        A scan has too many candidate tuples.
-    """
-    from assoc.association.plan import Plan
-
-    if not isinstance(scene, Scene):
-        raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    plan = Plan((scene,), solver, seed, time_limit, parameters, gating or {})
-    return plan.gather(plan.run(plan.items(), jobs))
-
-
 def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
     """Write plain data as JSON; the file appears whole or not at all."""
     from assoc._files.output import write_text
 
     text = json.dumps(content, allow_nan=False) + "\n"
     write_text(path, text)
-
-
-def _plain(value: Any) -> Any:
-    """Return what JSON can hold: no infinities, and names of what is neither number nor text."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if isinstance(value, (tuple, list)):
-        return [_plain(one) for one in value]
-    return str(value)
 
 
 def _text(value: float | None) -> str:

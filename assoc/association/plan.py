@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.processes import ordered_map
-from assoc.association.association import Association, ScanAssociation
+from assoc.association.association import Association
+from assoc.association.scan import ScanAssociation
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
-from assoc.scene.scene import Scan, Scene
+from assoc.scene.scan import Scan, true_tuples
+from assoc.scene.scene import Scene
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
@@ -127,31 +129,3 @@ def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Sol
         true_tuples=None if truth is None else len(truth),
         correct_tuples=correct,
     )
-
-
-def true_tuples(scan: Scan) -> NDArray[np.int32] | None:
-    """The tuples of the targets that at least two sensors detected.
-
-    Parameters
-    ----------
-    scan : Scan
-
-    Returns
-    -------
-    int32 array (T, S), or None
-        In order of target id; None where the sources are not known. A target of which one sensor has several
-        measurements has no tuple and is left out.
-    """
-    if scan.sources is None:
-        return None
-    count = len(scan.sources)
-    ids = np.unique(np.concatenate([*scan.sources, np.zeros(0, np.int64)]))
-    ids = ids[ids >= 0]
-    tuples = np.zeros((len(ids), count), dtype=np.int32)
-    single = np.ones(len(ids), dtype=bool)
-    for sensor, source in enumerate(scan.sources):
-        real = np.flatnonzero(source >= 0)
-        row = np.searchsorted(ids, source[real])
-        tuples[row, sensor] = real + 1
-        single &= np.bincount(row, minlength=len(ids)) <= 1
-    return tuples[single & (np.count_nonzero(tuples, axis=1) >= 2)]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import weakref
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.conversion import convert
 from assoc.errors import InvalidInputError
-from assoc.scene.scene import Scan, Scene
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # the codes are known to the kernels in conversion.py and kernels.py
 _CODES = {PositionSensor: 0, Radar3D: 1, Radar2D: 2, BearingSensor: 3}

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 HEIGHTS = 3.0
 """Where no sensor measures full positions, heights are sought this many half heights around the middle."""

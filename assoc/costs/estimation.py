@@ -15,17 +15,15 @@ position, and an undetermined one pays only where its measurements pull away fro
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
 from assoc.costs.residuals import normal
 from assoc.costs.symmetric import Six, inverse, solve
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # a position is undetermined along a direction if the measurements tell less of it than this times the prior
 _WEAK = 1.0

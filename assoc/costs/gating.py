@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.arrays import SensorArrays
 from assoc.errors import InvalidInputError
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # room for the prior's small influence on chi-square values that otherwise could only grow with a tuple
 SLACK = 1.0

@@ -5,17 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates
 from assoc.costs.limits import refuse, too_many
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # up to so many combinations looking at each is quicker than a tree
 _BRUTE = 100_000

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _TURN = 2.0 * math.pi
 # nearer to a sensor than this (metres) the derivatives of angles are those at this distance

@@ -13,14 +13,13 @@ from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.gates import pairs
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class State(Protocol):

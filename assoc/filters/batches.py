@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.state import Gaussian, gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def arrays_of(state: Any) -> dict[str, Array]:

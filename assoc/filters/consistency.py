@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import State
 from assoc.filters.state import finite
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def nees(state: State, truth: Array) -> Array:

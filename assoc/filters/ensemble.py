@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
 from assoc.filters.kernels.gaussian import GOOD
@@ -16,8 +17,6 @@ from assoc.filters.kernels.points import ensemble_update, move_ensemble
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion, positive
 from assoc.filters.state import Gaussian, finite
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _NOTHING2 = np.zeros((0, 0))
 _NOTHING3 = np.zeros((0, 0, 0))

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement
 from assoc.filters.state import Gaussian, finite, gaussian
 from assoc.filters.unscented import UnscentedKalmanFilter
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters.base import (
     Expected,
     Filter,
@@ -25,8 +26,6 @@ from assoc.filters.kernels.gaussian import update as update_kernel
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import LinearMotion, Motion, positive
 from assoc.filters.state import Gaussian, gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _NOTHING2 = np.zeros((0, 0))
 _NO_ROW2, _NO_ROW3 = np.zeros((1, 0)), np.zeros((1, 0, 0))

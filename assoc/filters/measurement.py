@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.gaussian import GIVEN, LINEAR
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import finite, positive_definite
 from assoc.sensors.base import Sensor
 from assoc.sensors.kernels import CODES
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _NO_MATRIX = np.zeros((0, 0))
 _NO_PLACE = np.zeros(3)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected
 from assoc.filters.kernels.gaussian import LOG_TURN, MODIFIED, SIMPLIFIED
@@ -14,8 +13,6 @@ from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 from assoc.sensors.base import wrap_angle
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _RADAR = 1
 

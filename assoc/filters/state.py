@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.linear_algebra import all_factors
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def finite(value: object, what: str, *dimensions: int) -> Array:

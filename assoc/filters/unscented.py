@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
 from assoc.filters.kernels.gaussian import GOOD
@@ -15,8 +15,6 @@ from assoc.filters.kernels.points import moments, sigma_points, unscented
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion, positive
 from assoc.filters.state import Gaussian, gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _NOTHING2 = np.zeros((0, 0))
 _NOTHING3 = np.zeros((0, 0, 0))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from assoc._types import Array
 from assoc.metrics.ospa import check_cutoff, distances, point_sets
 from assoc.metrics.trajectories import Trajectories, epochs
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Gospa(NamedTuple):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import check_cutoff, distances
 from assoc.metrics.trajectories import Trajectories, epochs
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Ospa(NamedTuple):

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import Ospa, check_cutoff, distances, ospa_of_distances
 from assoc.metrics.trajectories import Trajectories, epochs
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def ospa2(

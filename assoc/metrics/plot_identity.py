@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MEMORY = 6
 """A track's identity is the majority of its last plots, of this many."""

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.gospa import gospa_over_time
 from assoc.metrics.ospa import distances, point_sets
 from assoc.metrics.trajectories import Trajectories, epochs
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def rmse(truth: Array, estimates: Array) -> float:

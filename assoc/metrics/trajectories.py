@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SAME_TIME = 1e-6
 """Two time stamps that differ by less than about this (s) are one epoch."""

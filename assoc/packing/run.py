@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.errors import InvalidInputError
+from assoc._parameters import Parameters
 from assoc.solution import TracePoint
 
 if TYPE_CHECKING:
@@ -109,16 +109,6 @@ class Outcome:
     iterations: int
     lower_bound: float = -np.inf
     duals: NDArray[np.float64] | None = None
-
-
-class Parameters:
-    """Base of the parameter dataclasses; gives them one way to check and to complain."""
-
-    __slots__ = ()
-
-    def _require(self, condition: bool, name: str, expected: str) -> None:
-        if not condition:
-            raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
 
 
 SolveFunction = Callable[["Packing", "Parameters", Run], Outcome]

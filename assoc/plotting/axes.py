@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.extras import load_extra
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 _KILOMETRES_FROM = 3_000.0
 _OUTLIERS = 3.0

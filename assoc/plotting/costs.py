@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from assoc.association.association import Association, ScanAssociation
+from assoc._types import Array
+from assoc.association.association import Association
+from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import BLACK, BLUE, GREY, VERMILION
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _SPREAD = 0.7
 

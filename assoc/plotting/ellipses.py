@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.plotting.places import places
 from assoc.sensors import Sensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _CORNERS = 49
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new
 from assoc.plotting.study_figures import FACTORS, PANELS, limits_of, short
@@ -17,7 +18,6 @@ from assoc.sweeps.summary import by_problem, measured, numbers, varied
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MEASURES = {**dict(PANELS), "cost": "mean cost, nats", "correct": "correct, %"}
 

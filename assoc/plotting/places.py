@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from assoc._types import Array
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:

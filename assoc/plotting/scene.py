@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
 from assoc.plotting.ellipses import ellipses, place_covariances
 from assoc.plotting.places import distances_to_border, places
-from assoc.scene.scene import Scan, Scene
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def plot_scene(

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc.association.association import ScanAssociation
+from assoc._types import Array
+from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
@@ -15,8 +16,6 @@ from assoc.plotting.places import distances_to_border, places
 from assoc.plotting.scene import draw_sensors, draw_truth
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def plot_solution(

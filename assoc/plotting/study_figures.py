@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from assoc._files.output import write_atomically
 from assoc._system.extras import load_extra
 from assoc.errors import InvalidInputError
+from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import load, load_traces
 from assoc.sweeps.summary import measured, summarize, varied
 
@@ -24,7 +25,6 @@ FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 _MOST_CELLS = 12
 _MOST_COLUMNS = 6
 _MOST_CURVES = 8
-_CURVE_POINTS = 60
 
 
 def draw(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> list[Path]:
@@ -233,48 +233,10 @@ def title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -> str:
     return ", ".join(words)
 
 
-def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
-    """Traces of the runs of a frame, with the cost above the best known of their scan in the column ``excess``."""
-    best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
-    traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
-    excess = traces["cost"] - traces["best"]
-    # what rounding leaves is no excess
-    return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
-
-
 def curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
     """Draw the mean excess of runs over iterations or milliseconds; see `mean_excess`."""
     if not traces.empty:
         ax.plot(*mean_excess(traces, column), drawstyle="steps-post", **style)
-
-
-def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average the excess of runs over time; a run counts with what it has found by then.
-
-    Parameters
-    ----------
-    traces : DataFrame
-        Of `with_excess`, not empty.
-    column : {"iteration", "seconds"}
-
-    Returns
-    -------
-    at, excess : arrays (n,)
-        Iterations, or milliseconds; mean cost above the best known.
-    """
-    factor = 1e3 if column == "seconds" else 1.0
-    at = np.maximum(factor * traces[column].to_numpy(dtype=float), 1e-3)
-    run = traces.groupby(["scene", "scan", "repeat"]).ngroup().to_numpy()
-    excess = traces["excess"].to_numpy(dtype=float)
-    first = float(np.quantile(at[np.unique(run, return_index=True)[1]], 0.5))
-    grid = np.unique(np.geomspace(min(first, at.max()), at.max() * 1.02, _CURVE_POINTS))
-    total = np.zeros(grid.size)
-    order = np.lexsort((at, run))
-    starts = np.flatnonzero(np.r_[True, np.diff(run[order]) > 0])
-    for rows in np.split(order, starts[1:]):
-        place = np.searchsorted(at[rows], grid, side="right") - 1
-        total += excess[rows][np.maximum(place, 0)]
-    return grid, total / starts.size
 
 
 def short(value: Any) -> str:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound, hard_pass
-from assoc.packing.packing import Packing, assemble, prepare
+from assoc.packing.packing import Packing, assemble
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solvers.greedy.fallback import provide
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

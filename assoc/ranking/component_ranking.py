@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.branching.doubtful_pairs import doubtful_pairs
 from assoc.packing.branching.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
 from assoc.packing.packing import Packing
 from assoc.ranking.enumeration import NOT_COMPLETE, cut_of, enumerate_solutions, new_store
-
-Floats = NDArray[np.float64]
 
 FIRST_BUDGET = 3000
 NODE_BUDGET = 500

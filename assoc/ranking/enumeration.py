@@ -14,13 +14,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
-from assoc.packing.kernels.matching import _pop, _push
-
-Floats = NDArray[np.float64]
+from assoc._types import Floats
+from assoc.packing.kernels.heap import pop, push
 
 NOT_COMPLETE = -1
 _ALONE = -1
@@ -101,12 +99,12 @@ def _keep(store: Any, k: int, weight: float, columns: Any, count: int, check: bo
             store = _grown(store)
             key, slot, marks, chosen, meta = store
         at = meta[0]
-        _push(key, slot, meta[0], -weight, at)
+        push(key, slot, meta[0], -weight, at)
         meta[0] += 1
     else:
         at = slot[0]
-        _pop(key, slot, k - 1)
-        _push(key, slot, k - 1, -weight, at)
+        pop(key, slot, k - 1)
+        push(key, slot, k - 1, -weight, at)
     marks[at] = mark
     chosen[at, :count] = own
     chosen[at, count] = -1

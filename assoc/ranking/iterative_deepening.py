@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
@@ -15,7 +16,6 @@ from assoc.ranking.component_ranking import FIRST_BUDGET, ComponentRanking, rank
 from assoc.ranking.head_start import HeadStart
 from assoc.ranking.merging import merge
 
-Floats = NDArray[np.float64]
 Columns = NDArray[np.int32]
 
 

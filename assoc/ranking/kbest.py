@@ -21,7 +21,7 @@ from assoc._system import memory
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import Complete, complete
@@ -29,9 +29,10 @@ from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
 from assoc.ranking.two_sensors import rank_planar
 from assoc.solution import Solution
-from assoc.solvers.assign import _certify, _limit
+from assoc.solvers.assign import _limit
+from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.fallback import greedy_choice
-from assoc.solvers.greedy.solve import GreedyParameters
+from assoc.solvers.greedy.parameters import GreedyParameters
 
 # bytes of a solution and for each measurement in it: in the search's stores while they grow, and as an answer
 _SOLUTION, _MEASUREMENT = 2_000, 130
@@ -191,7 +192,7 @@ def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
     columns = run.fallback if run.fallback is not None else greedy_choice(prepared.packing, run)
     if columns is None:
         raise infeasible(prepared.packing, run)
-    return _certify(problem, prepared, Outcome(columns, 0, bound - prepared.offset), run, "greedy", GreedyParameters())
+    return certify(problem, prepared, Outcome(columns, 0, bound - prepared.offset), run, "greedy", GreedyParameters())
 
 
 def _unproved(

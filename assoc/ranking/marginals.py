@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.interrupts import interruptible
+from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct, numbered
@@ -25,7 +26,6 @@ from assoc.solvers.greedy.fallback import greedy_choice, provide
 if TYPE_CHECKING:
     import pandas as pd
 
-Floats = NDArray[np.float64]
 
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.kernels.matching import _pop, _push
-
-Floats = NDArray[np.float64]
+from assoc._types import Floats
+from assoc.packing.kernels.heap import pop, push
 
 
 @njit
@@ -57,22 +55,22 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
         place = np.zeros(total.size, np.int64)
         size = 0
         # combination t of the lists before enters when t - 1 has been used with this list's first
-        _push(heap, item, size, total[0] + weights[first], 0)
+        push(heap, item, size, total[0] + weights[first], 0)
         size += 1
         for n in range(room):
             value = heap[0]
             t = item[0]
             size -= 1
-            _pop(heap, item, size)
+            pop(heap, item, size)
             result[n] = value
             before[level, n] = t
             which[level, n] = place[t]
             if place[t] == 0 and t + 1 < total.size:
-                _push(heap, item, size, total[t + 1] + weights[first], t + 1)
+                push(heap, item, size, total[t + 1] + weights[first], t + 1)
                 size += 1
             place[t] += 1
             if place[t] < length:
-                _push(heap, item, size, total[t] + weights[first + place[t]], t)
+                push(heap, item, size, total[t] + weights[first + place[t]], t)
                 size += 1
         total = result
         level += 1

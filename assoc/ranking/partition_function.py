@@ -26,11 +26,10 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
-from assoc.packing.kernels.matching import _pop, _push
+from assoc._types import Floats
+from assoc.packing.kernels.heap import pop, push
 from assoc.packing.packing import Packing
 from assoc.ranking.columns import Complete
-
-Floats = NDArray[np.float64]
 
 # column visits for each component: about a tenth of a second in all for a hard one
 WORK = 20_000_000
@@ -106,7 +105,7 @@ def _component(
     factor = np.empty(num_rows)
     reach = np.empty(num_rows, np.bool_)
     log_bound[0] = _product(cols, weights, alone, sensor_of, done[0], factor, reach)
-    _push(key, item, 0, -log_bound[0], 0)
+    push(key, item, 0, -log_bound[0], 0)
     size, used = 1, 1
     # exact parts are summed relative to the first bound, which none can exceed
     top = log_bound[0]
@@ -131,7 +130,7 @@ def _component(
                 if choices > most:
                     row, most = r, choices
         size -= 1
-        _pop(key, item, size)
+        pop(key, item, size)
         if row < 0:
             closed += math.exp(log_spent[node] - top)
             continue
@@ -171,7 +170,7 @@ def _component(
             spent_work += visits
             if bound > -np.inf:
                 log_bound[used] = log_spent[used] + bound
-                _push(key, item, size, -log_bound[used], used)
+                push(key, item, size, -log_bound[used], used)
                 size += 1
                 used += 1
     for n in range(size):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import Complete, distinct_columns, priced, slack_of

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 GARBLED_CODES = (0, 1, 2, 3, 256, 257, 258, 512, 513, 514, 584, 770)
 """Flight levels of the paper's recording that appear between quite different ones: answers with lost bits."""

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.recordings.windows import Window, windows_of
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def irregular_groups(

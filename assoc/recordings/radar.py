@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.sensors.radar import Radar2D
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def radar_of(

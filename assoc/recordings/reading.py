@@ -8,16 +8,15 @@ import os
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, number, seconds, whole
 from assoc.recordings.recording import UNDECODED, Recording
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_DISORDER = 30.0
 """Plots that come at most this late (s) are put where they belong; later ones are an error."""

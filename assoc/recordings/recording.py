@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array, wrap_angle
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 UNDECODED = 0
 """The identity (Mode 3) of a plot whose transponder answer was not decoded."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SHORTEST, LONGEST = 2.0, 30.0
 """Rotation times (s) that are looked for. Below 2 s, stamps in whole seconds could not tell two of them apart."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.recordings.rotation import estimate_rotation
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LONG_GAP = 20.0
 """Rotations without a plot after which the antenna's phase is taken anew."""

@@ -6,15 +6,13 @@ import csv
 import io
 import math
 import os
-from typing import Any
 
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._types import Array
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:

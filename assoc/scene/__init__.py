@@ -1,5 +1,7 @@
 """Sensors and their measurements, scan by scan, with the truth where it is known."""
 
-from assoc.scene.scene import Scan, Scene, Truth
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
+from assoc.scene.truth import Truth
 
 __all__ = ["Scan", "Scene", "Truth"]

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.npz import Field, load_npz, save_npz
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors import KINDS
 
 if TYPE_CHECKING:
     from assoc.scene.scene import Scene
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 FORMAT = "assoc.scene"
 VERSION = 1

@@ -5,115 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.file import load_parts, save_parts
+from assoc.scene.scan import Scan
+from assoc.scene.truth import Truth
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
 from assoc.sensors.base import ANGLES, finite_array
 
-Array = np.ndarray[Any, np.dtype[Any]]
-
 # a planar scene still needs some height for the prior; radars see aircraft up to about here (metres)
 _DEFAULT_HEIGHT = 20_000.0
-
-
-def _integers(value: object, what: str, length: int) -> Array:
-    array = np.asarray(value)
-    if array.size == 0:
-        array = array.astype(np.int64)
-    if array.dtype.kind not in "iu" or array.shape != (length,):
-        raise InvalidInputError(
-            f"{what} must be integers of shape ({length},), got {array.dtype} of shape {array.shape}"
-        )
-    array = array.astype(np.int64)
-    array.setflags(write=False)
-    return array
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Truth:
-    """What really was there.
-
-    Parameters
-    ----------
-    target_ids : sequence over scans of int arrays (T_k,)
-        The targets present, each id (0 or more) once per scan.
-    positions : sequence over scans of arrays (T_k, 3)
-        Where they were, metres.
-    sources : sequence over scans of sequences over sensors of int arrays (n,), optional
-        The target that caused each measurement, or -1 for a false alarm.
-    """
-
-    target_ids: Sequence[Array]
-    positions: Sequence[Array]
-    sources: Sequence[Sequence[Array]] | None = None
-
-    def __post_init__(self) -> None:
-        if len(self.target_ids) != len(self.positions):
-            raise InvalidInputError(
-                f"truth: target_ids has {len(self.target_ids)} scans, positions has {len(self.positions)}"
-            )
-        ids, places = [], []
-        for k, (one, where) in enumerate(zip(self.target_ids, self.positions, strict=True)):
-            checked = _integers(one, f"truth: target_ids of scan {k}", len(one))
-            if checked.size and (checked.min() < 0 or len(np.unique(checked)) != len(checked)):
-                raise InvalidInputError(f"truth: target_ids of scan {k} must be 0 or more and different")
-            ids.append(checked)
-            place = np.zeros((0, 3)) if len(one) == 0 and np.size(where) == 0 else where
-            places.append(finite_array(place, f"truth: positions of scan {k}", (len(one), 3)))
-        object.__setattr__(self, "target_ids", tuple(ids))
-        object.__setattr__(self, "positions", tuple(places))
-        if self.sources is not None:
-            sources = []
-            for k, scan in enumerate(self.sources):
-                row = [
-                    _integers(s, f"truth: sources of scan {k}, sensor {i}", len(s))
-                    for i, s in enumerate(scan)
-                ]
-                if any(s.size and s.min() < -1 for s in row):
-                    raise InvalidInputError(
-                        f"truth: sources of scan {k} must be target ids or -1 (false alarm)"
-                    )
-                sources.append(tuple(row))
-            object.__setattr__(self, "sources", tuple(sources))
-
-    def __repr__(self) -> str:
-        targets = len({int(i) for one in self.target_ids for i in one})
-        return f"Truth({targets} targets, {len(self.target_ids)} scans)"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Scan:
-    """All measurements of one instant.
-
-    Attributes
-    ----------
-    index, time : int, float
-        Number of the scan from 0, time stamp in seconds.
-    measurements : tuple over sensors of arrays (n_s, d_s)
-    sources : tuple over sensors of int arrays (n_s,), or None
-        Target id of each measurement, -1 for a false alarm; None where it is not known.
-    truth_ids, truth_positions : arrays (T,) and (T, 3), or None
-    """
-
-    index: int
-    time: float
-    measurements: tuple[Array, ...]
-    sources: tuple[Array, ...] | None = None
-    truth_ids: Array | None = None
-    truth_positions: Array | None = None
-
-    @property
-    def sizes(self) -> Array:
-        """Measurements per sensor, int32 (S,)."""
-        return np.array([len(z) for z in self.measurements], dtype=np.int32)
-
-    def __repr__(self) -> str:
-        sizes = " + ".join(str(len(z)) for z in self.measurements)
-        return f"Scan({self.index}, t = {self.time:g} s, {sizes} measurements)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

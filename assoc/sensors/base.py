@@ -6,13 +6,12 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 ANGLES = ("azimuth", "elevation")
 """Components that are angles, in radians; all others are lengths, in metres."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc.sensors.base import Array, Sensor
+from assoc._types import Array
+from assoc.sensors.base import Sensor
 from assoc.sensors.radar import NEAREST
 
 

@@ -7,17 +7,13 @@ every kind in the registry. They are kept apart so that sensors can be used with
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.sensors.base import Sensor
 from assoc.sensors.bearing import BearingSensor
 from assoc.sensors.position import PositionSensor
 from assoc.sensors.radar import NEAREST, Radar2D, Radar3D
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 CODES: dict[type[Sensor], int] = {PositionSensor: 0, Radar3D: 1, Radar2D: 2, BearingSensor: 3}
 """Class of a sensor -> the number by which kernels know it."""

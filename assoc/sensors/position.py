@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc.sensors.base import Array, Sensor
+from assoc._types import Array
+from assoc.sensors.base import Sensor
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

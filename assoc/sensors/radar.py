@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assoc.sensors.base import Array, Sensor
+from assoc._types import Array
+from assoc.sensors.base import Sensor
 
 # closer than this to the sensor an angle has no useful derivative (metres)
 NEAREST = 1e-9

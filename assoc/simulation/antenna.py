@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc.sensors.base import Array
+from assoc._types import Array
 
 
 def looks(times: Array, positions: Array, rotation: float) -> Array:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc.sensors.base import Array
+from assoc._types import Array
 
 STEP = 0.25
 """Seconds from point to point of a path; between them it is straight."""

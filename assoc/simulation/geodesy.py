@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc.sensors.base import Array
+from assoc._types import Array
 
 SEMI_MAJOR_AXIS = 6_378_137.0
 """WGS-84 equatorial radius, metres."""

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assoc.scene.scene import Scene, Truth
-from assoc.sensors.base import Array, Sensor, wrap_angle
+from assoc._types import Array
+from assoc.scene.scene import Scene
+from assoc.scene.truth import Truth
+from assoc.sensors.base import Sensor, wrap_angle
 from assoc.simulation.memory import require_room
 
 

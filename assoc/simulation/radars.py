@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from assoc.sensors.base import Array, Sensor, wrap_angle
+from assoc._types import Array
+from assoc.sensors.base import Sensor, wrap_angle
 from assoc.sensors.radar import Radar3D
 
 # noise may carry a measurement this many standard deviations past the region and still be in view

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.sensors.base import Array, finite_array
+from assoc.sensors.base import finite_array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
+from assoc._parameters import Parameters
 from assoc.errors import InvalidInputError
-from assoc.packing.run import Parameters, SolveFunction
+from assoc.packing.run import SolveFunction
 
 # name -> module with a class `parameters` and a function `solve`; imported on first use
 _MODULES: dict[str, str] = {

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from assoc._types import Floats
 
 RESAMPLES = 2000
 _MOST_NUMBERS = 10_000_000

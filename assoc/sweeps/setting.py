@@ -10,7 +10,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from assoc._cli.program import Option, options
+from assoc._parameters import Option, options
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from assoc._cli.inputs import load_source
+from assoc.association.source import load_source
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._cli.program import Option
+from assoc._parameters import Option
 from assoc.errors import InvalidInputError
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import assoc
+from assoc._version import __version__
 from assoc.errors import InvalidInputError
 from assoc.sweeps.backends.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
@@ -97,7 +97,7 @@ class Study:
     def manifest(self) -> Manifest:
         """What a folder must say to hold this study."""
         names = {source.fingerprint: source.name for source in self.sources}
-        return Manifest(assoc.__version__, self.seed, names, self.time_limit, dict(self.gating), code_digest())
+        return Manifest(__version__, self.seed, names, self.time_limit, dict(self.gating), code_digest())
 
     @property
     def size(self) -> int:
@@ -180,7 +180,7 @@ class Study:
             progress(counts)
         if missing == 0:
             return counts
-        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, assoc.__version__, code_digest())
+        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, __version__, code_digest())
         seconds = local.SECONDS_OF_A_BATCH if scheduler is None else dask.SECONDS_OF_A_BATCH
         batches = Batches(self.settings, self.missing(store), seconds)
         results: Generator[Result]

@@ -8,15 +8,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval, weighted_mean
 from assoc.sweeps.frame import RESULTS, load
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Floats = NDArray[np.float64]
 
 MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
 """What is averaged; "correct" is the share of the true tuples that were found."""

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._files.output import write_text
+from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers import registry
@@ -29,7 +29,6 @@ from assoc.sweeps.worker import Result
 if TYPE_CHECKING:
     import pandas as pd
 
-Floats = NDArray[np.float64]
 
 TARGETS = ("gap", "time")
 PENALTY = 10.0

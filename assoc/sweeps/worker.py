@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._system.compiled import loaded
+from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
@@ -107,10 +108,10 @@ class Job:
         return made
 
     def _make(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
-        from assoc.association.plan import true_tuples
         from assoc.costs import build_problem
-        from assoc.packing.packing import prepare
+        from assoc.packing.prepare import prepare
         from assoc.problem import AssignmentProblem
+        from assoc.scene.scan import true_tuples
 
         content = self.sources[source].content
         if isinstance(content, AssignmentProblem):
@@ -168,11 +169,9 @@ def run_batch(job: Job, batch: Batch) -> Result:
     """
     import time
 
-    import assoc
-
     started = time.perf_counter()
-    if assoc.__version__ != job.package:
-        raise InvalidInputError(f"a worker has version {assoc.__version__} of assoc, this is {job.package}")
+    if __version__ != job.package:
+        raise InvalidInputError(f"a worker has version {__version__} of assoc, this is {job.package}")
     if code_digest() != job.code:
         raise InvalidInputError("a worker has other code of assoc than this process, though of the same version")
     columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MOST = 10_000_000
 """Measurements of a sensor in a scan, and scans, at the most."""

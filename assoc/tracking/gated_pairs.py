@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate
 from assoc.sensors import Sensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Frame(NamedTuple):

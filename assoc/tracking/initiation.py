@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

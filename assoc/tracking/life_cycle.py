@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.tracks.scores import sequential_threshold
 from assoc.errors import InvalidInputError
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 Confirmation = Literal["score", "m-of-n"]
 Deletion = Literal["time", "count", "score"]

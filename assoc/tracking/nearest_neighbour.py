@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.tracks.scores import doubted_gain
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate, predict_each
@@ -14,8 +15,6 @@ from assoc.tracking.gated_pairs import Frame, look
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import Bank
 from assoc.tracking.tracker import Tracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 Rule = Literal["greedy", "assignment"]
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.tracking.track import Step
 from assoc.tracking.tracker import Tracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class PlotWindow(Protocol):

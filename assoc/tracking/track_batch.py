@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.filters.state import gaussian
 from assoc.tracking.initiation import velocity_components
 from assoc.tracking.life_cycle import HISTORY, LifeCycle
 from assoc.tracking.track import Track
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MASK = (1 << HISTORY) - 1
 """The scans whose detections are remembered, one a bit."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
@@ -15,7 +16,6 @@ from assoc.tracking.tracker import Tracker
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",

@@ -13,15 +13,18 @@ import numpy as np
 
 from assoc._files.npz import Field, load_npz, save_npz
 from assoc._system.interrupts import interruptible
-from assoc.costs.build import GATE_PROBABILITY, positions_and_covariances, single_positions
+from assoc._types import Array
+from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
-from assoc.scene.scene import Scan, Scene
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.sensors.base import finite_array
 from assoc.solution import Solution
@@ -33,8 +36,6 @@ from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import Bank, empty_bank
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 FORMAT = "assoc.tracker"
 VERSION = 1

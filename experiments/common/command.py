@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from assoc._files.output import write_atomically
+from assoc._types import Array
 from experiments.common.claims import Claim, print_table, save_json
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 Experiment = Callable[[bool, np.random.Generator], tuple[list[Claim], Any]]
 Draw = Callable[[Any, Any], None]

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import Gaussian, nees
 from assoc.filters.base import Filter
 from assoc.filters.motion.models import ConstantVelocity
 from assoc.sensors import Radar3D
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import (
     ConstantVelocity,
     EnsembleKalmanFilter,
@@ -33,8 +34,6 @@ from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Radar3D, Sensor
 from experiments.common.claims import Claim
 from experiments.common.command import main
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 NOISE, DT, MEMBERS = 1.0, 1.0, 100
 ROUNDS = 12

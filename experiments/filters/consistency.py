@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, ModifiedEKF, bounds, nees
 from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Sensor
@@ -21,8 +22,6 @@ from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
 from experiments.filters.b1 import Runs, Setting
 from experiments.filters.kinds import of_each_kind
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 STEPS = 100
 NOISE = 1.0

@@ -14,14 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import ExtendedKalmanFilter, Gaussian, KalmanFilter
 from assoc.filters.base import Filter
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.filters.benchmark import PLACE, RADAR
 from experiments.filters.kinds import of_each_kind
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 EVERY = 100
 BURST = 3

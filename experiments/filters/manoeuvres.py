@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import FixedLagSmoother, Gaussian
 from assoc.filters.base import Filter
 from assoc.sensors import Radar3D
 from experiments.filters.b1 import converted
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 GRAVITY = 9.81
 RANGE_NOISE = 50.0

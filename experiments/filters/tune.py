@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._types import Array
 from assoc.errors import AssocError
 from assoc.filters import tuned_data
 from assoc.filters.base import Filter
 from experiments.filters.kinds import fuzzy_filter, imm
 from experiments.filters.manoeuvres import Batch, errors, random_flights
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 OUTPUT = Path(__file__).resolve().parents[2] / "assoc" / "filters" / "fuzzy" / "tuned_parameters.json"
 SPREAD = 0.2

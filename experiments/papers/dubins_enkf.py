@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
@@ -25,8 +26,6 @@ from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose, path, paths, shortest
 from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 STATES = ("climb angle", "speed", "distance", "height")
 UNITS = ("rad", "m/s", "m", "m")

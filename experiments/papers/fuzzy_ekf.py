@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import (
     ConstantAcceleration,
     ConstantVelocity,
@@ -30,8 +31,6 @@ from experiments.common.command import main, rmse, rmse_interval
 from experiments.filters.b1 import ratio_interval
 from experiments.filters.kinds import fuzzy_filter, imm
 from experiments.filters.manoeuvres import SCENARIOS, Batch, Flight, errors, smoothed_errors
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LAG = 2
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.metrics import gospa
 from assoc.tracking import MultiSensorTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import Claim
@@ -25,8 +26,6 @@ from experiments.common.command import main
 from experiments.trackers.goals import thousand, three_radar
 from experiments.trackers.plane import DETECTION, Plane, simulate
 from experiments.trackers.running import in_plane
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WINDOW, GATE = 3, 0.999
 CUTOFF = 50.0

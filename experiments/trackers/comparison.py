@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc import simulation
+from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, identity, mean_gospa
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
@@ -23,8 +24,6 @@ from assoc.tracking.filter_choice import make_filter
 from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.trackers.running import through
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 CUTOFF = 500.0
 """Of GOSPA, metres."""

@@ -40,12 +40,12 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.state import GaussianState
 from stonesoup.updater.kalman import ExtendedKalmanUpdater
 
+from assoc._types import Array
 from assoc.integrations.stonesoup import AssignmentAssociator, FusionFeeder, adapt
 from assoc.simulation.radars import azimuth_interval, on_circle, padded, padded_azimuth, range_interval
 from experiments.common.claims import Claim
 from experiments.common.command import main, mean_interval
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Stream = list[tuple[datetime, set[Any]]]
 
 START = datetime(2026, 1, 1)

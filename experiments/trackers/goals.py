@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from assoc import simulation
+from assoc._types import Array
 from assoc.scene import Scene, Truth
 from assoc.tracking import MultiSensorTracker, Tracker
 from experiments.trackers.running import through
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 NEAR = 400.0
 """A track within this distance of a target is that target's; further from every target it is false, metres."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.sensors import PositionSensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SPACING = 150.0
 """Side of the square that a target has to itself on average, metres."""

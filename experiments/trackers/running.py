@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import ConstantVelocity, Gaussian, KalmanFilter
 from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import Initiation, Tracker, TrackTable
 from experiments.trackers.plane import ACCELERATION, SPEED, START_DEVIATION, Plane
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,8 @@ from stonesoup.types.state import GaussianState, TaggedWeightedGaussianState
 from stonesoup.types.track import Track
 from stonesoup.updater.kalman import KalmanUpdater
 
+from assoc._types import Array
 from experiments.trackers.plane import ACCELERATION, NOISE, START_DEVIATION, Plane
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _START = datetime(2026, 1, 1)
 

@@ -9,8 +9,9 @@ import pytest
 
 import assoc
 from assoc.association import Association, associate
-from assoc.association.plan import Plan, true_tuples
+from assoc.association.plan import Plan
 from assoc.scene import Scene, Truth
+from assoc.scene.scan import true_tuples
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 

@@ -5,7 +5,7 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, component_bounds, dual_bound
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems

@@ -6,8 +6,8 @@ import pytest
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
-from assoc.packing.neighbourhoods.insertion import Cover
-from assoc.packing.packing import prepare
+from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from experiments.common.instances.synthetic import axial_known_optimum, axial_random
 from experiments.common.oracles import brute_force, gated_problem, small_problems

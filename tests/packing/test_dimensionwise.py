@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from assoc.errors import InfeasibleError
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.dimensionwise import improve, splits
-from assoc.packing.neighbourhoods.insertion import Cover
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from experiments.common.instances.synthetic import planar_random

@@ -5,10 +5,11 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components.component import split_components, weight_of
-from assoc.packing.neighbourhoods.insertion import Cover
+from assoc.packing.components.component import weight_of
+from assoc.packing.components.splitting import split_components
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.large import LargeNeighbourhood
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from experiments.common.oracles import brute_force, gated_problem, small_problems
 

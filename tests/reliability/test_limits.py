@@ -14,7 +14,7 @@ import assoc
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct

@@ -23,7 +23,7 @@ from assoc.metrics.ospa import ospa
 from assoc.metrics.trajectories import Trajectories
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import Search
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest

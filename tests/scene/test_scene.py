@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assoc.errors import InvalidInputError
-from assoc.scene import Scene, Truth, default_region
+from assoc.scene import Scene, Truth
+from assoc.scene.scene import default_region
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 
 CIRCLE = [-np.pi, np.pi]

@@ -5,7 +5,7 @@ import pytest
 
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from assoc.solvers.lagrangian.relaxation import Relaxation

@@ -5,7 +5,7 @@ import pytest
 
 import assoc
 from assoc import AssignmentProblem
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.solvers.exact.reduction import Reduction, _best_of_both
 

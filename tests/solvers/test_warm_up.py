@@ -12,7 +12,7 @@ _PROGRAM = """
 import assoc
 from assoc._system.compiled import loaded
 from assoc.costs import build_problem
-from experiments.instances import scenes, synthetic
+from experiments.common.instances import scenes, synthetic
 
 problems = [build_problem(scenes.ghost(20, 2), 0), build_problem(scenes.gated(4, 40, 1), 0)]
 problems += [synthetic.axial_random(11, 0), synthetic.planted(5, 0)[0]]

@@ -13,7 +13,7 @@ import assoc
 from assoc.packing.run import Outcome
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
-from assoc.solvers.greedy.solve import GreedyParameters
+from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.sources import Source
 

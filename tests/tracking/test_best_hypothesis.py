@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assoc import assign
-from assoc.costs.build import positions_and_covariances, single_positions
+from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D

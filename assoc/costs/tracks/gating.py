@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
 from assoc.filters.measurement import Measurement
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MOST_PAIRS = 20_000_000
 """The most pairs of tracks and measurements: more would only mean that the tracks know nothing."""

@@ -21,13 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.sensors.base import Sensor
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class ScoreTerms(NamedTuple):

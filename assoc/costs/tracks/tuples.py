@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks.gating import angular_components, near_pairs, within
@@ -22,8 +23,6 @@ from assoc.errors import LimitExceededError
 from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate
 from assoc.filters.measurement import Measurement
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class TrackTuples(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update
 from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
@@ -16,8 +17,6 @@ from assoc.filters.kalman import ExtendedKalmanFilter
 from assoc.filters.measurement import Measurement
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, gaussian
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

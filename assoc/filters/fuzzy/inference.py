@@ -6,15 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.state import finite
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @njit

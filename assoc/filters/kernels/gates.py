@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, GOOD, LINEAR, LOG_TURN, PLAIN, STATUSES, modify
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.kernels import linearise, wrap
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @njit

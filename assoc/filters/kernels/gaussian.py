@@ -8,15 +8,13 @@ given by the columns of the state that it reads (`columns`) and its entries ther
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.kernels import linearise, wrap
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
     BAD_MEAN,
@@ -21,8 +21,6 @@ from assoc.filters.kernels.gaussian import (
 from assoc.filters.kernels.gaussian import correct as correct_one
 from assoc.filters.kernels.linear_algebra import factor, solve_in_place
 from assoc.sensors.kernels import measure, wrap
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @njit

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy as np
 
 from assoc._system.compiled import njit
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 
 @njit

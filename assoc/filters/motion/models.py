@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.turn import turn
 from assoc.filters.state import finite
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
 

@@ -16,10 +16,11 @@ from stonesoup.models.measurement.nonlinear import (
     CartesianToElevationBearingRange,
 )
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.models import CartesianToSlantRangeBearing
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D, Sensor
-from assoc.sensors.base import Array, wrap_angle
+from assoc.sensors.base import wrap_angle
 
 # Stone Soup's model -> our sensor, and where our components stand in its measurement; exact types, because a
 # child such as the binned range-rate radar measures something else

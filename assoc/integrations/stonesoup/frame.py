@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from stonesoup.models.measurement.nonlinear import CartesianToBearingRange
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.adapted import AdaptedSensor, model_key
 from assoc.sensors import Sensor
-from assoc.sensors.base import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,13 +16,14 @@ from stonesoup.reader import Reader
 from stonesoup.types.array import CovarianceMatrix, StateVector
 from stonesoup.types.detection import Detection
 
-from assoc.association.association import ScanAssociation
 from assoc.association.plan import Plan
+from assoc.association.scan import ScanAssociation
 from assoc.integrations.stonesoup.adapted import AdaptedSensor
 from assoc.integrations.stonesoup.frame import Frame, make_frame
 from assoc.integrations.stonesoup.ordering import sorted_detections
 from assoc.integrations.stonesoup.scenes import by_time, region_of
-from assoc.scene.scene import Scan, Scene
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
 
 
 class FusionFeeder(DetectionFeeder):  # type: ignore[misc]

@@ -15,10 +15,10 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.models import measurement_model
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array
 
 EPOCH = datetime(1970, 1, 1)
 """Time 0 of a scene, unless another is given: Unix times, without a time zone as is Stone Soup's custom."""

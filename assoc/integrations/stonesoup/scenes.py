@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.stonesoup.adapted import AdaptedSensor
 from assoc.integrations.stonesoup.frame import Frame, make_frame
 from assoc.integrations.stonesoup.ordering import sorted_detections, sorted_paths
-from assoc.scene.scene import Scene, Truth, default_region
+from assoc.scene.scene import Scene, default_region
+from assoc.scene.truth import Truth
 from assoc.sensors import Sensor
-from assoc.sensors.base import Array
 
 
 def scene_from_detections(

@@ -18,14 +18,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
-
-Floats = NDArray[np.float64]
 
 # temperatures are this share of each component's spread of weights: likelihood costs spread over about 16
 START = 0.06

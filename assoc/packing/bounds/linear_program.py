@@ -52,7 +52,7 @@ def linear_program_duals(packing: Packing, run: Run) -> NDArray[np.float64] | No
         )
 
     # HiGHS looks at the clock so seldom that it was seen to be 2.4 s late
-    answer = solve() if run.time_limit is None else in_time(solve, run, "linear program")
+    answer = solve() if run.time_limit is None else in_time(solve, run.remaining(), "linear program")
     if answer is None or answer.status != 0:
         return None
     duals = np.zeros(packing.num_rows)

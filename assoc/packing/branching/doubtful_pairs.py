@@ -16,12 +16,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.branching.nodes import hard_sweeps
-
-Floats = NDArray[np.float64]
 
 
 @njit

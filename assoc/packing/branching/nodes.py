@@ -10,14 +10,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system import memory
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.packing import Packing
-
-Floats = NDArray[np.float64]
 
 _DEPTH = 64
 # columns swept between two looks at the clock: about a millisecond

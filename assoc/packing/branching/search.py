@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.branching.doubtful_pairs import child_bound, doubtful_pairs
 from assoc.packing.branching.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
 from assoc.packing.packing import Packing
-
-Floats = NDArray[np.float64]
 
 # pairs that are tried on both sides before one is branched on
 CANDIDATES = 8

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.errors import InfeasibleError
-
-Floats = NDArray[np.float64]
+from assoc.packing.kernels.heap import doubled, pop, push
 
 
 class Matching(NamedTuple):
@@ -244,16 +244,16 @@ def _augment_all(
                     distance[j] = value
                     previous[j] = k
                     if size == heap_key.size:
-                        heap_key = _doubled(heap_key)
-                        heap_column = _doubled(heap_column)
-                    _push(heap_key, heap_column, size, value, j)
+                        heap_key = doubled(heap_key)
+                        heap_column = doubled(heap_column)
+                    push(heap_key, heap_column, size, value, j)
                     size += 1
             found = False
             while size > 0:
                 d = heap_key[0]
                 j = heap_column[0]
                 size -= 1
-                _pop(heap_key, heap_column, size)
+                pop(heap_key, heap_column, size)
                 if not closed[j] and d == distance[j]:
                     found = True
                     break
@@ -291,45 +291,3 @@ def _augment_all(
                 break
             j = indices[after]
     return True
-
-
-@njit
-def _doubled(array: Any) -> Any:
-    larger = np.empty(2 * array.size, array.dtype)
-    larger[: array.size] = array
-    return larger
-
-
-@njit
-def _push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
-    place = size
-    while place > 0:
-        parent = (place - 1) >> 1
-        if key[parent] <= value:
-            break
-        key[place] = key[parent]
-        item[place] = item[parent]
-        place = parent
-    key[place] = value
-    item[place] = thing
-
-
-@njit
-def _pop(key: Any, item: Any, size: int) -> None:
-    """Remove the root; ``size`` is what is left."""
-    value = key[size]
-    thing = item[size]
-    place = 0
-    while True:
-        child = 2 * place + 1
-        if child >= size:
-            break
-        if child + 1 < size and key[child + 1] < key[child]:
-            child += 1
-        if key[child] >= value:
-            break
-        key[place] = key[child]
-        item[place] = item[child]
-        place = child
-    key[place] = value
-    item[place] = thing

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-
-Floats = NDArray[np.float64]
+from assoc._types import Floats
 
 # bits of a digit; below so many numbers counting digits does not pay
 _BITS = 11

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster_optimum import collect, depth_first, tighten
 from assoc.packing.packing import Packing
-
-Floats = NDArray[np.float64]
 
 _CAPACITY = 4000
 _REACH = 3.0

@@ -10,11 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-
-Floats = NDArray[np.float64]
+from assoc._types import Floats
 
 _LEVELS = 4
 _SWEEPS = 8

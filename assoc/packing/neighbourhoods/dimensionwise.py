@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.packing import Packing
-
-Floats = NDArray[np.float64]
 
 _MOST_SPLITS_FOR = 6
 

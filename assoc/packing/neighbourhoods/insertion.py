@@ -10,125 +10,17 @@ column for every such row, so that covering comes before cost; what the penalty 
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.packing import Packing
-from assoc.packing.run import Run
 
-Floats = NDArray[np.float64]
-
-# seconds for the way out of a dead end when time is over
-_GRACE = 0.02
 # columns looked at between two looks at the clock: about a millisecond
 _LOOK = 50_000
-
-
-class Cover:
-    """A choice of columns that share no row, changed in place.
-
-    Attributes
-    ----------
-    owner : int32 array, shape (R,)
-        The chosen column that uses each row, or -1.
-    """
-
-    def __init__(self, packing: Packing, owner: NDArray[np.int32]) -> None:
-        self.packing = packing
-        self.owner = owner
-
-    @classmethod
-    def empty(cls, packing: Packing) -> Cover:
-        """Return the cover without any column."""
-        return cls(packing, np.full(packing.num_rows, -1, dtype=np.int32))
-
-    @classmethod
-    def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
-        """Return the cover of columns that share no row."""
-        cover = cls.empty(packing)
-        own(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
-        return cover
-
-    def columns(self) -> NDArray[np.int32]:
-        """Return the chosen columns, ascending."""
-        columns: NDArray[np.int32] = chosen_columns(self.packing.cols, self.owner)
-        return columns
-
-    @property
-    def weight(self) -> float:
-        """Total weight of the chosen columns."""
-        return float(self.packing.weights[self.columns()].sum())
-
-    @property
-    def complete_already(self) -> bool:
-        """Whether all rows without slack are covered."""
-        return not bool((self.owner[~self.packing.slack] < 0).any())
-
-    def add_greedily(self, order: NDArray[np.integer]) -> None:
-        """Add columns in the given order while they fit; with slack only those of negative weight."""
-        packing = self.packing
-        _add_greedily(packing.cols, packing.weights, packing.slack, order, self.owner)
-
-    def improve(self, deadline: float = np.inf) -> None:
-        """Insert with ejection until no insertion improves or time is over (clock.py)."""
-        packing = self.packing
-        weights = packing.weights if not packing.is_axial else penalised(packing)
-        rows = np.arange(packing.num_rows, dtype=np.int32)
-        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows, deadline)
-
-    def complete(self, run: Run) -> bool:
-        """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
-
-        Raises
-        ------
-        InfeasibleError
-            Never; the caller knows the problem's words for it.
-        """
-        if self.complete_already:
-            return True
-        # a moment beyond the time, if need be: most dead ends are left in less, and there is nothing else to return
-        self.improve(max(run.deadline(), time.monotonic() + _GRACE))
-        if self.complete_already:
-            return True
-        from assoc.packing.branching.feasibility import first_solution
-
-        columns = first_solution(self.packing, run)
-        if columns is None:
-            return False
-        self.owner[:] = Cover.of(self.packing, columns).owner
-        return True
-
-
-@njit
-def own(cols: Any, columns: Any, owner: Any) -> None:
-    """Make these columns the owners of their rows."""
-    for j in columns:
-        for s in range(cols.shape[1]):
-            if cols[j, s] >= 0:
-                owner[cols[j, s]] = j
-
-
-@njit
-def chosen_columns(cols: Any, owner: Any) -> Any:
-    """The chosen columns, ascending, in the type of ``owner``."""
-    chosen = np.zeros(cols.shape[0], np.bool_)
-    count = 0
-    for j in owner:
-        if j >= 0 and not chosen[j]:
-            chosen[j] = True
-            count += 1
-    result = np.empty(count, owner.dtype)
-    count = 0
-    for j in range(chosen.size):
-        if chosen[j]:
-            result[count] = j
-            count += 1
-    return result
 
 
 def penalised(packing: Packing) -> Floats:

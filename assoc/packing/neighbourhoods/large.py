@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc.packing.branching.search import Search
-from assoc.packing.neighbourhoods.insertion import chosen_columns, own
+from assoc.packing.neighbourhoods.cover import chosen_columns, own
 from assoc.packing.packing import assemble
 
 if TYPE_CHECKING:

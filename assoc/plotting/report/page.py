@@ -14,10 +14,10 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import Any
 
-import assoc
 from assoc._files.output import write_text
 from assoc._system.extras import check_extra, load_extra
 from assoc._text.html import escape, script_json
+from assoc._version import __version__
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
@@ -130,7 +130,7 @@ def made_with(program: str | None, words: Sequence[str] | None) -> dict[str, str
     content = {}
     if program is not None and words is not None:
         content["command"] = shlex.join(["python", "-m", program, *words])
-    content["assoc"] = assoc.__version__
+    content["assoc"] = __version__
     content["Python"] = platform.python_version()
     for name in _VERSIONS:
         try:

@@ -14,7 +14,8 @@ from assoc._text.html import escape
 from assoc.plotting.heat_map import MEASURES, cells
 from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import number
-from assoc.plotting.study_figures import FACTORS, mean_excess, title, with_excess
+from assoc.plotting.study_figures import FACTORS, title
+from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import RESULTS, load, load_traces
 from assoc.sweeps.store import read_manifest
 from assoc.sweeps.summary import measured, summarize, varied

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._text.html import escape
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time
 from assoc.plotting.places import places
@@ -22,7 +23,6 @@ from assoc.sensors import BearingSensor
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 GOSPA_CUTOFF = 1_000.0
 

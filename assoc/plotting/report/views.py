@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc.association.association import ScanAssociation
+from assoc._types import Array
+from assoc.association.scan import ScanAssociation
 from assoc.costs import tuple_costs
 from assoc.plotting.places import measures_height
 from assoc.plotting.solution import measured_places
@@ -17,8 +18,6 @@ from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
 from assoc.sensors.base import ANGLES
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 BUDGET = 2_800_000
 """Bytes that the views of all scans may take in a page; with plotly's 4.8 MB that stays below 8 MB."""

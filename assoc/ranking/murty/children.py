@@ -14,12 +14,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.kernels.matching import _pop, _push
-
-Floats = NDArray[np.float64]
+from assoc._types import Floats
+from assoc.packing.kernels.heap import pop, push
 
 ALONE = -1
 
@@ -73,7 +71,7 @@ def _relax(room: Any, size: int, num_reached: int, item: int, value: float, edge
     distance[item] = value
     previous[item] = edge
     previous_row[item] = row
-    _push(queue_key, queue_item, size, value, item)
+    push(queue_key, queue_item, size, value, item)
     return size + 1, num_reached
 
 
@@ -114,7 +112,7 @@ def search_path(
             d = queue_key[0]
             item = queue_item[0]
             size -= 1
-            _pop(queue_key, queue_item, size)
+            pop(queue_key, queue_item, size)
             if not closed[item] and d == distance[item]:
                 break
             item = -1
@@ -234,7 +232,7 @@ def open_children(
         )
         if bound <= worst:
             if bound < np.inf:
-                _push(heap_key, heap_item, size, bound, (np.int64(node) * num_rows + t) << 1)
+                push(heap_key, heap_item, size, bound, (np.int64(node) * num_rows + t) << 1)
                 size += 1
         else:
             limits[0] = min(limits[0], worst)

@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.kernels.matching import _pop, _push, match_sparse
+from assoc._types import Floats
+from assoc.packing.kernels.heap import pop, push
+from assoc.packing.kernels.matching import match_sparse
 from assoc.ranking.murty.children import ALONE, clear, make_node, may_stay_alone, open_children, search_path, set_taboo
-
-Floats = NDArray[np.float64]
 
 
 class Murty:
@@ -266,9 +266,9 @@ def _root(
     forbidden[0] = -1
     node_cost[0] = cost
     # the root is an open child of nobody
-    _push(heap_key, heap_item, 0, cost, -1)
+    push(heap_key, heap_item, 0, cost, -1)
     counts[1] = 1
-    _push(best, best_item, 0, -cost, 0)
+    push(best, best_item, 0, -cost, 0)
     counts[2] = 1
     return True
 
@@ -312,7 +312,7 @@ def _advance(
             counts[1] = 0
             return
         counts[1] -= 1
-        _pop(heap_key, heap_item, counts[1])
+        pop(heap_key, heap_item, counts[1])
         node = 0
         if item >= 0:
             exact = item & 1
@@ -333,12 +333,12 @@ def _advance(
                 if length < np.inf:
                     value = node_cost[parent] + length
                     if counts[2] < k:
-                        _push(best, best_item, counts[2], -value, 0)
+                        push(best, best_item, counts[2], -value, 0)
                         counts[2] += 1
                     elif value < -best[0]:
-                        _pop(best, best_item, k - 1)
-                        _push(best, best_item, k - 1, -value, 0)
-                    _push(heap_key, heap_item, counts[1], value, item | 1)
+                        pop(best, best_item, k - 1)
+                        push(best, best_item, k - 1, -value, 0)
+                    push(heap_key, heap_item, counts[1], value, item | 1)
                     counts[1] += 1
                 elif worst < np.inf:
                     # longer than allowed, or there is none

@@ -11,16 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InfeasibleError, InvalidInputError, LimitExceededError
 from assoc.sensors.base import finite_array
 from assoc.simulation.dubins.kernels import SENSES, TURN, WORDS, distance, free_word, free_words, pieces, turn
 from assoc.simulation.dubins.paths import Path, Pose, Segment, positive_radius
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # touching points lie outside the obstacle by this share of its radius, so that rounding does not count
 _SKIN = 1e-7

@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array
 from assoc.simulation.dubins.kernels import SENSES, WORDS, advance, distance, pieces, turn
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # bytes of a sample, measured
 _SAMPLE = 500

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array
 from assoc.sensors.bearing import BearingSensor
 from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe

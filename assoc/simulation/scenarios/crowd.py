@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array, Sensor
+from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
 from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe

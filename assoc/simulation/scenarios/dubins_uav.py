@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
 from assoc.simulation.memory import require_room

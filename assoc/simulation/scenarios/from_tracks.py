@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array
 from assoc.simulation.geodesy import east_north_up
 from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
-from assoc.sensors.base import Array
 from assoc.simulation.antenna import bearings_in_steps, in_steps, looks, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
 from assoc.simulation.scenarios.base import ScenarioParameters

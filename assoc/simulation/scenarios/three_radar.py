@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.sensors.base import Array
 from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over

@@ -21,16 +21,15 @@ from numpy.typing import NDArray
 from assoc._system import memory
 from assoc._system.clock import now
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.packing.components.component import bound_of_choice
-from assoc.packing.neighbourhoods.insertion import Cover
+from assoc.packing.components.proof import bound_of_choice
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 
 if TYPE_CHECKING:
-    from assoc.solvers.aco.solve import AcoParameters
-
-Floats = NDArray[np.float64]
+    from assoc.solvers.aco.parameters import AcoParameters
 
 
 def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:

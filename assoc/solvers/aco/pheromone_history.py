@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.packing.packing import prepare
+from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solvers.aco.paper import nodes_of, solve_as_in_the_paper
-from assoc.solvers.aco.solve import AcoParameters
+from assoc.solvers.aco.parameters import AcoParameters
 from assoc.solvers.registry import make_parameters
 
 

@@ -2,70 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from assoc.packing.run import Outcome, Parameters, Run
+from assoc.packing.run import Outcome, Run
+from assoc.solvers.aco.parameters import AcoParameters
 
 if TYPE_CHECKING:
     from assoc.packing.packing import Packing
-
-MODES = ("mmas", "paper")
-TRANSFORMS = ("exponential", "shifted", "reciprocal")
-
-
-@dataclass(frozen=True)
-class AcoParameters(Parameters):
-    """Parameters of the ant colony; the names are the paper's.
-
-    Attributes
-    ----------
-    mode : str
-        "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11 to the letter).
-    ants : int
-        Ants in a cycle; 15 in the paper.
-    alpha, beta : float
-        Exponents of pheromone and visibility in eq. 8.
-    rho : float
-        Share of the pheromone that stays, eq. 9.
-    iterations : int
-        Cycles on one component at the most.
-    patience : int
-        Mode mmas: a component is left after so many cycles without improvement.
-    visibility : str
-        Mode paper: transform of the costs, which eq. 7 needs positive. "exponential": exp((c - c_min) / scale);
-        "shifted": c - c_min + scale; "reciprocal": c itself, only for positive costs.
-    scale : float
-        The transform's scale, in units of cost.
-    clusters : int
-        Mode mmas: exact sub-steps on the best ant of a cycle, and for every 30 measurements on the best solution
-        (0: insertion with ejection alone).
-    """
-
-    mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
-    ants: int = field(default=15, metadata={"help": "ants in a cycle"})
-    alpha: float = field(default=1.0, metadata={"help": "exponent of the pheromone, eq. 8"})
-    beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
-    rho: float = field(default=0.9, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
-    iterations: int = field(default=1000, metadata={"help": "cycles on one component at the most"})
-    patience: int = field(default=150, metadata={"help": "cycles without improvement before a component is left"})
-    visibility: str = field(
-        default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
-    )
-    scale: float = field(default=10.0, metadata={"help": "mode paper: scale of the visibility transform"})
-    clusters: int = field(default=10, metadata={"help": "mode mmas: exact sub-steps in a cycle"})
-
-    def __post_init__(self) -> None:
-        self._require(self.mode in MODES, "mode", " or ".join(MODES))
-        self._require(1 <= self.ants <= 100_000, "ants", "a whole number from 1 to 100000")
-        self._require(0 <= self.alpha <= 20, "alpha", "a number from 0 to 20")
-        self._require(0 <= self.beta <= 20, "beta", "a number from 0 to 20")
-        self._require(0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
-        self._require(self.iterations >= 1, "iterations", "a whole number >= 1")
-        self._require(self.patience >= 1, "patience", "a whole number >= 1")
-        self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
-        self._require(0 < self.scale < float("inf"), "scale", "a positive number")
-        self._require(self.clusters >= 0, "clusters", "a whole number >= 0")
 
 
 def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
@@ -81,7 +24,7 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
         from assoc.solvers.aco.paper import solve_as_in_the_paper
 
         return solve_as_in_the_paper(packing, parameters, run)
-    from assoc.packing.components.component import solve_by
+    from assoc.packing.components.search import solve_by
     from assoc.solvers.aco.max_min import Colony
 
     return solve_by(

@@ -9,15 +9,17 @@ import numpy as np
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.branching.search import Search
-from assoc.packing.components.component import Part, complete, split_part
-from assoc.packing.neighbourhoods.insertion import Cover, chosen_columns
+from assoc.packing.components.component import Part
+from assoc.packing.components.search import complete
+from assoc.packing.components.splitting import split_part
+from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
+from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
-from assoc.solvers.genetic.solve import GeneticParameters
 from assoc.solvers.tabu.moves import TabuSearch
-from assoc.solvers.tabu.solve import TabuParameters
+from assoc.solvers.tabu.parameters import TabuParameters
 
 # rows from which tabu search and breeding pay beside the branching, and turns of branching between their iterations
 _LARGE = 30

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.bounds import dual_ascent
 from assoc.packing.bounds.dual_ascent import _component_bounds, _hard_sweeps, _reduced_costs, _smooth_passes, _spread
-from assoc.packing.components.component import TOLERANCE, Part, split_components
+from assoc.packing.components.component import TOLERANCE, Part
+from assoc.packing.components.splitting import split_components
 from assoc.packing.neighbourhoods.insertion import _add_greedily, _improve, penalised_weights
 from assoc.packing.packing import Packing, _assemble, _find
 from assoc.packing.run import Run
-
-Floats = NDArray[np.float64]
 
 # passes at one temperature; the last temperatures get more, because by then few columns are left
 _PASSES = np.array([10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])

@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from assoc.packing.run import Outcome, Parameters, Run
+from assoc.packing.run import Outcome, Run
 from assoc.solution import OPTIMALITY_TOLERANCE
+from assoc.solvers.exact.parameters import ExactParameters
 
 if TYPE_CHECKING:
     from assoc.packing.packing import Packing
 
 # column visits of the search that closes what is left where costs cancel
 _VISITS = 20_000_000
-
-
-@dataclass(frozen=True)
-class ExactParameters(Parameters):
-    """Parameters of the exact solver.
-
-    Attributes
-    ----------
-    nodes : int
-        Nodes of branch and bound at the most; what is then open keeps its gap.
-    patience : int
-        Iterations of tabu search without improvement on an open part, for every 60 measurements, before
-        branching starts; while it is branched on, one more iteration follows every three turns.
-    """
-
-    nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
-    patience: int = field(
-        default=10, metadata={"help": "iterations of tabu search without improvement before branching starts"}
-    )
-
-    def __post_init__(self) -> None:
-        self._require(self.nodes >= 0, "nodes", "a whole number >= 0")
-        self._require(self.patience >= 0, "patience", "a whole number >= 0")
 
 
 def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from assoc._system import memory
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.components.component import Part, incomplete
 from assoc.packing.neighbourhoods.insertion import _improve, penalised
-from assoc.solvers.aco.max_min import random_cover
+from assoc.packing.neighbourhoods.random_cover import random_cover
 
 if TYPE_CHECKING:
-    from assoc.solvers.genetic.solve import GeneticParameters
+    from assoc.solvers.genetic.parameters import GeneticParameters
 
-Floats = NDArray[np.float64]
 
 # generations without improvement after which a population is renewed
 _RENEWAL = 10

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.insertion import Cover
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 

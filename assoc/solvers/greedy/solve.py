@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from assoc.packing.run import Outcome, Parameters, Run
+from assoc._parameters import Parameters
+from assoc.packing.run import Outcome, Run
+from assoc.solvers.greedy.parameters import GreedyParameters
 
 if TYPE_CHECKING:
     from assoc.packing.packing import Packing
-
-
-@dataclass(frozen=True)
-class GreedyParameters(Parameters):
-    """Greedy has no parameters."""
 
 
 def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
@@ -30,7 +26,7 @@ def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
     """
     from assoc.packing.branching.feasibility import infeasible
     from assoc.packing.kernels.sorting import ascending
-    from assoc.packing.neighbourhoods.insertion import Cover
+    from assoc.packing.neighbourhoods.cover import Cover
 
     cover = Cover.empty(packing)
     cover.add_greedily(ascending(packing.weights))

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.insertion import chosen_columns
+from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.packing.packing import Packing
-
-Floats = NDArray[np.float64]
 
 
 class Relaxation:

@@ -23,66 +23,25 @@ multisensor-multitarget state estimation", IEEE Trans. AES 33, 523-538 (1997).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.packing.run import Outcome, Parameters, Run
+from assoc._types import Floats
+from assoc.packing.run import Outcome, Run
+from assoc.solvers.lagrangian.parameters import LagrangianParameters
 
 if TYPE_CHECKING:
-    from assoc.packing.neighbourhoods.insertion import Cover
+    from assoc.packing.neighbourhoods.cover import Cover
     from assoc.packing.packing import Packing
 
-Floats = NDArray[np.float64]
 
 _COARSE_LEVELS = 4
 _COARSE_PASSES = 10
 _POLISH_STEPS = 50
 _POLISH_ROUNDS = 20
 _POLISH_TUPLES = 20
-
-
-@dataclass(frozen=True)
-class LagrangianParameters(Parameters):
-    """Parameters of ``lagrangian``.
-
-    Attributes
-    ----------
-    iterations : int
-        Subgradient steps, each with one 2-D relaxation and one recovery.
-    gap : float
-        Stop when cost - bound <= gap * max(1, abs(cost)).
-    step : float
-        Factor of Polyak's step; halved after ``patience`` iterations in which the bound did not rise.
-    patience : int
-        See ``step``; after ten halvings the method has converged.
-    warm_start : bool
-        Start from the smoothed dual ascent; else from u = 0, as in the paper.
-    polish : bool
-        Improve every recovered solution by dimensionwise search and insertion with ejection, and the
-        best one at the end by cluster search.
-    """
-
-    iterations: int = field(default=100, metadata={"help": "subgradient steps"})
-    gap: float = field(default=1e-9, metadata={"help": "stop at this relative gap"})
-    step: float = field(default=1.0, metadata={"help": "factor of Polyak's step"})
-    patience: int = field(default=5, metadata={"help": "steps without a better bound until the factor is halved"})
-    warm_start: bool = field(default=True, metadata={"help": "start from the smoothed dual ascent, not from 0"})
-    polish: bool = field(default=True, metadata={"help": "improve recovered solutions by local search"})
-
-    def __post_init__(self) -> None:
-        for name in ("iterations", "patience"):
-            value = getattr(self, name)
-            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-            self._require(whole and value >= 1, name, "a whole number >= 1")
-        for name, low, high in (("gap", 0.0, 1.0), ("step", 1e-6, 10.0)):
-            value = getattr(self, name)
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            self._require(number and low <= value <= high, name, f"a number in {low:g}..{high:g}")
-        for name in ("warm_start", "polish"):
-            self._require(isinstance(getattr(self, name), (bool, np.bool_)), name, "true or false")
 
 
 def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outcome:
@@ -96,7 +55,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
     from assoc.packing.branching.feasibility import infeasible
     from assoc.packing.kernels.sorting import ascending
-    from assoc.packing.neighbourhoods.insertion import Cover
+    from assoc.packing.neighbourhoods.cover import Cover
 
     if packing.num_columns == 0:
         if packing.is_axial:
@@ -200,7 +159,7 @@ class _Search:
     def polish(self) -> None:
         """Improve the best solution by cluster search, within the columns that are left."""
         from assoc.packing.neighbourhoods.cluster import ClusterSearch
-        from assoc.packing.neighbourhoods.insertion import Cover
+        from assoc.packing.neighbourhoods.cover import Cover
 
         if self.columns is None or self._gap_closed() or self.run.should_stop():
             return
@@ -250,8 +209,8 @@ class _Search:
         self.bound, self.proof = max(self.bound, bound), proof
 
     def _recover(self) -> None:
+        from assoc.packing.neighbourhoods.cover import Cover
         from assoc.packing.neighbourhoods.dimensionwise import improve
-        from assoc.packing.neighbourhoods.insertion import Cover
 
         columns = self.relaxation.recover(self.duals)
         if columns is None:

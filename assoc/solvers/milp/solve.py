@@ -22,19 +22,18 @@ import datetime
 import math
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system import memory
-from assoc.packing.run import Outcome, Parameters, Run
+from assoc.packing.run import Outcome, Run
+from assoc.solvers.milp.parameters import MilpParameters
 
 if TYPE_CHECKING:
     from assoc.packing.packing import Packing
 
-BACKENDS = ("scip", "cp_sat", "highs")
 
 _TOLERANCE = 1e-9
 _LARGEST_COST = 7  # costs for the float backends are below 2^7
@@ -47,28 +46,6 @@ _MODEL = {"scip": 7_000.0, "cp_sat": 6_000.0, "highs": 2_300.0}
 _FAREWELL = 10.0
 # seconds that a model takes for each entry of its matrix, at the least (measured: 1.3e-6 and 2.8e-6)
 _ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
-
-
-@dataclass(frozen=True)
-class MilpParameters(Parameters):
-    """Parameters of ``milp``.
-
-    Attributes
-    ----------
-    backend : {"scip", "cp_sat", "highs"}
-        Which solver of OR-Tools.
-    workers : int
-        Threads of scip and cp_sat; with more than one the answer may be another of the same cost.
-        HiGHS takes no number from OR-Tools and decides for itself.
-    """
-
-    backend: str = field(default="scip", metadata={"help": "scip, cp_sat or highs"})
-    workers: int = field(default=1, metadata={"help": "threads of scip, cp_sat; with 1 runs repeat exactly"})
-
-    def __post_init__(self) -> None:
-        self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
-        whole = isinstance(self.workers, (int, np.integer)) and not isinstance(self.workers, bool)
-        self._require(whole and 1 <= self.workers <= 1024, "workers", "a whole number in 1..1024")
 
 
 class _Answer(NamedTuple):
@@ -219,7 +196,7 @@ def _within(packing: Packing, parameters: MilpParameters, run: Run) -> _Answer:
 def _quick(packing: Packing, run: Run) -> NDArray[np.integer] | None:
     """Return a greedy solution improved by insertion; None if there is none."""
     from assoc.packing.kernels.sorting import ascending
-    from assoc.packing.neighbourhoods.insertion import Cover
+    from assoc.packing.neighbourhoods.cover import Cover
 
     if run.fallback is None:
         cover = Cover.empty(packing)

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import njit
+from assoc._types import Floats
 from assoc.packing.components.component import Part, incomplete
-from assoc.packing.neighbourhoods.insertion import Cover, insert, insertion_gain, penalised
-from assoc.solvers.aco.max_min import random_cover
+from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.neighbourhoods.insertion import insert, insertion_gain, penalised
+from assoc.packing.neighbourhoods.random_cover import random_cover
 
 if TYPE_CHECKING:
-    from assoc.solvers.tabu.solve import TabuParameters
+    from assoc.solvers.tabu.parameters import TabuParameters
 
-Floats = NDArray[np.float64]
 
 # every third restart is from a new solution, the others from the best
 _FRESH = 3

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 VISITS = 100_000
 """Branches looked at before all is left to a solver; a millisecond or two."""

@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc._types import Array
 from assoc.tracking.mht.pruning import _keep_best
 from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Tables(NamedTuple):

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
+from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import predict_each
@@ -35,8 +36,6 @@ from assoc.tracking.gated_pairs import look
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import Bank
 from assoc.tracking.tracker import Tracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class HypothesisOrientedMHT(Tracker):

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 
 def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.tracks.tuples import require_states
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.filters.batches import concatenate, predict_each
@@ -32,8 +33,6 @@ from assoc.tracking.mht.pruning import decide, same_tree
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import Bank
 from assoc.tracking.tracker import Tracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class TrackOrientedMHT(Tracker):

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc.costs.build import tuple_costs
+from assoc._types import Array
+from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.scores import log_birth
-from assoc.scene.scene import Scan
+from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import Bank
 from assoc.tracking.tracker import Tracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Outcome(NamedTuple):

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.tracks.scores import doubted_gain, log_birth
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
-from assoc.scene.scene import Scan
+from assoc.scene.scan import Scan
 from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class MultiSensorTracker(SingleScanTracker):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
@@ -13,10 +14,8 @@ from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
-from assoc.scene.scene import Scan
+from assoc.scene.scan import Scan
 from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class StaticFusionTracker(SingleScanTracker):

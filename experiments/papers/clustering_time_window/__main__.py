@@ -21,8 +21,6 @@ from experiments.common.command import main
 from experiments.papers.clustering_time_window import false_start, pairs, traffic
 from experiments.papers.clustering_time_window.published import RATES, WITH_WINDOW, WITHOUT_WINDOW
 
-Array = np.ndarray[Any, np.dtype[Any]]
-
 TITLE = "MHT with clustering time window (the paper's figures: its own recording)"
 
 

@@ -10,10 +10,10 @@ nautical miles beside, so that a wrong velocity results.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.metrics import identity_after_each
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.recordings.columns import NAUTICAL_MILE
@@ -24,8 +24,6 @@ from experiments.common.claims import Claim
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
 from experiments.papers.clustering_time_window.traffic import MISSES, ROTATION, nearest
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 PLOTS = 12
 """The aircraft's first plots, which are judged."""

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter
 from assoc.recordings import Window
 from assoc.sensors import Radar2D
 from assoc.tracking import Decision, HypothesisOrientedMHT, Initiation, LifeCycle, TrackOrientedMHT
 from experiments.papers.clustering_time_window.judging import Taken
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class HypothesisTracker:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it
 from assoc.recordings import Recording, Window
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class TakesWindows(Protocol):

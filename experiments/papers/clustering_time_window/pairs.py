@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.metrics import label_switches, plot_identity_switches
 from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.simulation import simulate_recording
@@ -14,8 +14,6 @@ from experiments.common.claims import Claim
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
 from experiments.papers.clustering_time_window.traffic import MISSES, ROTATION, nearest
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 TRAFFIC = ("crossing", "parallel", "head-on")
 DURATION = 600.0

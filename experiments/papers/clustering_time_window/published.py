@@ -6,11 +6,9 @@ ITS Surabaya (2014).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[Any]]
+from assoc._types import Array
 
 RATES = ("CT", "MT", "IT")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._types import Array
 from assoc.metrics import CtMtIt
 from assoc.recordings import Recording, Window, clustering_time_window, irregular_groups, radar_of
 from assoc.simulation import simulate_recording
@@ -17,8 +18,6 @@ from experiments.papers.clustering_time_window.baseline import NearestNeighbourT
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import TakesWindows, run
 from experiments.papers.clustering_time_window.published import OVERALL, RATES, WITH_WINDOW, WITHOUT_WINDOW, by_tens
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MEAN_GROUP = 6.2
 ROTATION = 9.5

@@ -1,0 +1,64 @@
+"""Values that a command line or a configuration file gives, parsed and checked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from assoc.errors import InvalidInputError
+
+
+def whole_number(text: str, label: str, least: int) -> int:
+    """Parse a whole number of at least ``least``."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = least - 1
+    if value < least:
+        raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {text!r}")
+    return value
+
+
+def seconds(text: str, label: str) -> float:
+    """Parse a number of seconds above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise InvalidInputError(f"{label}: expected seconds > 0, got {text!r}")
+    return value
+
+
+def scan_range(text: str, count: int, name: str) -> range:
+    """Parse A:B or A, within the scans of the source ``name``.
+
+    Raises
+    ------
+    InvalidInputError
+        It is not of that form, or reaches beyond.
+    """
+    first, colon, last = text.partition(":")
+    try:
+        start = int(first) if first or not colon else 0
+        stop = (int(last) if last else count) if colon else start + 1
+    except ValueError:
+        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
+    if not 0 <= start < stop <= count:
+        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {name}")
+    return range(start, stop)
+
+
+def number(text: str, label: str) -> float:
+    """Parse a number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidInputError(f"{label}: expected a number, got {text!r}") from None
+
+
+def check_kind(value: Any, kind: type, label: str) -> None:
+    """Refuse a value of a file that is not text (str), a number (float) or a whole number (int)."""
+    taken: Any = (int, float) if kind is float else kind
+    if not isinstance(value, taken) or isinstance(value, bool):
+        expected = {str: "text", float: "a number"}.get(kind, "a whole number")
+        raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")

@@ -1,0 +1,117 @@
+"""Parameter dataclasses: one way to check them, and one way to read them from text."""
+
+from __future__ import annotations
+
+import argparse
+import types
+from dataclasses import MISSING, Field, fields
+from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+
+from assoc.errors import InvalidInputError
+
+
+class Option:
+    """One parameter as an option of the command line or a key of a configuration file.
+
+    Parameters
+    ----------
+    owner : type
+        A parameter dataclass; its fields may carry metadata "help".
+    field : dataclasses.Field
+        The field of it.
+    """
+
+    def __init__(self, owner: type, field: Field[Any]) -> None:
+        self.name = field.name
+        self.flag = "--" + field.name.replace("_", "-")
+        self.help = str(field.metadata.get("help", ""))
+        self.default = field.default
+        self.positional = bool(field.metadata.get("positional", False))
+        self.choices: tuple[Any, ...] = ()
+        self.optional = False
+        self.kind: Any = get_type_hints(owner)[field.name]
+        if get_origin(self.kind) in (Union, types.UnionType):
+            self.optional = type(None) in get_args(self.kind)
+            kinds = [kind for kind in get_args(self.kind) if kind is not type(None)]
+            # "int | float" reads as a float; other unions are no option
+            self.kind = kinds[0] if len(kinds) == 1 else float if {*kinds} == {int, float} else object
+        if get_origin(self.kind) is Literal:
+            self.choices = get_args(self.kind)
+            self.kind = type(self.choices[0])
+
+    @property
+    def usable(self) -> bool:
+        """Whether text on a command line can give its value."""
+        return self.kind in (int, float, str, bool)
+
+    def describe(self) -> str:
+        """Return the text of the help, with the default."""
+        if self.default is MISSING or self.default is None:
+            return self.help
+        return f"{self.help} (default {self.default})".strip()
+
+    def metavar(self) -> str:
+        """Return what stands for the value in the help."""
+        if self.choices:
+            return "{" + ",".join(map(str, self.choices)) + "}"
+        return {int: "N", float: "X"}.get(self.kind, "TEXT")
+
+    def parse(self, text: str) -> Any:
+        """Turn text from the command line into the value."""
+        try:
+            value = self.kind(text)
+        except ValueError:
+            expected = {int: "a whole number", float: "a number"}.get(self.kind, "a value")
+            raise InvalidInputError(f"{self.flag}: expected {expected}, got {text!r}") from None
+        return self.check(value, self.flag)
+
+    def check(self, value: Any, label: str) -> Any:
+        """Check the type of a value from a configuration file; whole numbers will do for numbers."""
+        if value is None and self.optional:
+            return None
+        if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
+            return float(value)
+        if type(value) is not self.kind:
+            expected = {int: "a whole number", float: "a number", bool: "true or false"}.get(
+                self.kind, "text"
+            )
+            raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
+        if self.choices and value not in self.choices:
+            raise InvalidInputError(
+                f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}"
+            )
+        return value
+
+    def add_to(self, parser: argparse._ActionsContainer, *, hidden: bool = False) -> None:
+        """Add the option to a parser or a group; without a value it stays out of the parsed arguments."""
+        text = argparse.SUPPRESS if hidden else self.describe().replace("%", "%%")
+        if self.positional:
+            parser.add_argument(self.name, metavar=self.name.upper(), help=text)
+        elif self.kind is bool:
+            parser.add_argument(
+                self.flag,
+                dest=self.name,
+                action=argparse.BooleanOptionalAction,
+                default=argparse.SUPPRESS,
+                help=text,
+            )
+        else:
+            parser.add_argument(
+                self.flag, dest=self.name, metavar=self.metavar(), default=argparse.SUPPRESS, help=text
+            )
+
+
+def options(owner: type) -> list[Option]:
+    """Options for the fields of a parameter dataclass that text can give."""
+    every = [Option(owner, field) for field in fields(cast(Any, owner))]
+    return [option for option in every if option.usable]
+
+
+class Parameters:
+    """Base of the parameter dataclasses; gives them one way to check and to complain."""
+
+    __slots__ = ()
+
+    def _require(self, condition: bool, name: str, expected: str) -> None:
+        if not condition:
+            raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")

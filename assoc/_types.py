@@ -1,0 +1,14 @@
+"""Names for arrays in annotations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = np.ndarray[Any, np.dtype[Any]]
+"""An array of any type."""
+
+Floats = NDArray[np.float64]
+"""An array of float64."""

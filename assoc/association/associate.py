@@ -1,0 +1,60 @@
+"""``associate``: the door from a scene to its association."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from assoc._system.interrupts import interruptible
+from assoc.association.association import Association
+from assoc.errors import InvalidInputError
+from assoc.scene.scene import Scene
+
+
+@interruptible()
+def associate(
+    scene: Scene,
+    solver: str = "exact",
+    *,
+    seed: int = 0,
+    time_limit: float | None = None,
+    jobs: int = 1,
+    gating: Mapping[str, Any] | None = None,
+    **parameters: Any,
+) -> Association:
+    """Find out for every scan which measurements are one target, and which are false alarms.
+
+    Parameters
+    ----------
+    scene : Scene
+    solver : str, default "exact"
+        One of ``assoc.solvers.names()``.
+    seed : int, default 0
+        The same seed gives the same associations, whatever the number of processes.
+    time_limit : float, optional
+        Seconds for each scan; when they are over the best solution found is taken.
+    jobs : int, default 1
+        Number of processes. A script that asks for more than one must guard its own start by
+        ``if __name__ == "__main__"``, because the processes are spawned.
+    gating : mapping, optional
+        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``.
+    **parameters
+        Parameters of the solver (``assoc.solvers.parameters(solver)``).
+
+    Returns
+    -------
+    Association
+
+    Raises
+    ------
+    InvalidInputError
+        An argument is not as described.
+    LimitExceededError
+        A scan has too many candidate tuples.
+    """
+    from assoc.association.plan import Plan
+
+    if not isinstance(scene, Scene):
+        raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    plan = Plan((scene,), solver, seed, time_limit, parameters, gating or {})
+    return plan.gather(plan.run(plan.items(), jobs))

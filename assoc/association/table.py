@@ -1,0 +1,79 @@
+"""The table of an association: one row a scan, for people and as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+
+from assoc._text.plain import printable
+from assoc.association.scan import ScanAssociation
+
+_HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
+LEFT_ALIGNED = ("file", "status")
+
+
+def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[str], list[list[str]]]:
+    """Headers and cells for people.
+
+    Parameters
+    ----------
+    scans : sequence of ScanAssociation
+    files : sequence of str
+        The file of each scan; shown only if there are several.
+    """
+    several = len(set(files)) > 1
+    ranked = any(scan.ranked for scan in scans)
+    truth = any(scan.true_tuples is not None for scan in scans)
+    headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
+    if ranked:
+        headers.insert(headers.index("scan") + 1, "rank")
+    cells = []
+    for scan, file, rank in _lines(scans, files):
+        solution = scan.solution
+        row = [printable(file)] if several else []
+        row += [
+            str(scan.scan),
+            *([str(rank)] if ranked else []),
+            " ".join(map(str, scan.sizes)),
+            str(len(scan.targets)),
+            str(scan.false_alarms),
+            f"{solution.cost:.4f}",
+            f"{solution.lower_bound:.4f}",
+            f"{solution.gap:.2g}",
+            solution.status,
+            f"{1e3 * solution.runtime:.2f}",
+        ]
+        if truth:
+            row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
+        cells.append(row)
+    return headers, cells
+
+
+def _lines(
+    scans: Sequence[ScanAssociation], files: Sequence[str]
+) -> Iterator[tuple[ScanAssociation, str, int]]:
+    """One line for each scan, or for each of its ranked associations: association, file, rank."""
+    for scan, file in zip(scans, files, strict=True):
+        for place, one in enumerate(scan.ranked or (scan,), start=1):
+            yield one, file, place
+
+
+def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
+    """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
+    ranked = any(scan.ranked for scan in scans)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
+        + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
+    )
+    for scan, file, rank in _lines(scans, files):
+        solution = scan.solution
+        sizes = " ".join(map(str, scan.sizes))
+        writer.writerow(
+            [file, scan.scan, *([rank] if ranked else []), scan.time, sizes, len(scan.targets), scan.false_alarms]
+            + [solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
+            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples]
+        )
+    return text.getvalue()

@@ -1,0 +1,139 @@
+"""Where the target of a tuple is, and what the tuple costs."""
+
+from __future__ import annotations
+
+import weakref
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.estimation import fit
+from assoc.errors import InvalidInputError
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
+
+
+def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
+    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+
+    Parameters
+    ----------
+    scene, scan
+        See `build_problem`.
+    tuples : array_like of int (K, S)
+        1-based measurement of each sensor, 0 where it missed the target.
+
+    Returns
+    -------
+    ndarray (K,)
+
+    Raises
+    ------
+    InvalidInputError
+        The tuples have the wrong shape, an index out of range, or no measurement.
+    """
+    sensors = sensor_arrays(scene)
+    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
+    detected = rows >= 0
+    costs = 0.5 * chi - detected @ sensors.gain + sensors.base
+    return np.where(detected.sum(axis=1) == 1, 0.0, costs)
+
+
+def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:
+    """Maximum-likelihood positions of tuples (equation 4) and their covariances.
+
+    What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    deviation half its width. So a position always exists.
+
+    Parameters
+    ----------
+    scene, scan, tuples
+        See `tuple_costs`.
+
+    Returns
+    -------
+    positions (K, 3), covariances (K, 3, 3)
+        Metres; the covariance is the inverse information at the position.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`.
+    """
+    _, _, positions, covariances = _fit_tuples(scene, scan, tuples)
+    return positions, covariances
+
+
+def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array, Array]:
+    """`positions_and_covariances` of measurements of one sensor, each by itself.
+
+    Parameters
+    ----------
+    scene : Scene
+        Sensors and region.
+    sensor : int
+        Number of the sensor, from 0.
+    measured : array (n, d)
+        Its measurements; finite, of its dimension.
+
+    Returns
+    -------
+    positions (n, 3), covariances (n, 3, 3)
+    """
+    sensors = sensor_arrays(scene)
+    if sensors.code[sensor] == POSITION:
+        # what a position sensor says of a place is the same wherever the place is
+        known = _known_positions.setdefault(scene, {})
+        if len(measured):
+            if sensor not in known:
+                known[sensor] = _positions(scene, sensors, sensor, measured[:1])[1]
+            places = np.empty((len(measured), 3))
+            places[:] = sensors.middle
+            places[:, : measured.shape[1]] = measured
+            return places, np.broadcast_to(known[sensor], (len(measured), 3, 3))
+    return _positions(scene, sensors, sensor, measured)
+
+
+_known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.WeakKeyDictionary()
+
+
+def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array) -> tuple[Array, Array]:
+    count = len(scene.sensors)
+    parts = tuple(measured if s == sensor else measured[:0] for s in range(count))
+    flat, index = scan_arrays(sensors, Scan(0, 0.0, parts), 1.0, 1.0)
+    rows = np.full((len(measured), count), -1, dtype=np.int32)
+    rows[index - 1, sensor] = np.arange(len(measured))
+    _, positions, covariances = fit(sensors, flat, rows, False)
+    return positions, covariances
+
+
+def _scan(scene: Scene, scan: int | Scan) -> Scan:
+    return scan if isinstance(scan, Scan) else scene.scan(scan)
+
+
+def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
+    one = _scan(scene, scan)
+    sensors = sensor_arrays(scene)
+    measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
+    count, sizes = len(scene.sensors), one.sizes
+    wanted = np.asarray(tuples)
+    if wanted.size == 0:
+        wanted = np.zeros((0, count), dtype=np.int64)
+    if wanted.ndim != 2 or wanted.shape[1] != count or wanted.dtype.kind not in "iu":
+        raise InvalidInputError(
+            f"tuples must be integers of shape (K, {count}), got {wanted.dtype} of shape {wanted.shape}"
+        )
+    wrong = (wanted < 0) | (wanted > sizes)
+    if wrong.any():
+        k, s = np.argwhere(wrong)[0]
+        raise InvalidInputError(
+            f"tuples: row {k} has index {wanted[k, s]} for sensor {s}, expected 0 to {sizes[s]}"
+        )
+    if len(wanted) and not wanted.any(axis=1).all():
+        raise InvalidInputError(f"tuples: row {int(np.argmin(wanted.any(axis=1)))} has no measurement")
+    # bearings were sorted: from 1-based index to row
+    row_of = np.empty(len(index) + 1, dtype=np.int32)
+    row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
+    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
+    return (rows, *fit(sensors, measured, rows, False))

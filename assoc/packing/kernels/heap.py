@@ -1,0 +1,53 @@
+"""A binary heap of (key, item) in arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+
+
+@njit
+def doubled(array: Any) -> Any:
+    """Return a copy with twice the room."""
+    larger = np.empty(2 * array.size, array.dtype)
+    larger[: array.size] = array
+    return larger
+
+
+@njit
+def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
+    """Add an item under a key; ``size`` is the number of items before."""
+    place = size
+    while place > 0:
+        parent = (place - 1) >> 1
+        if key[parent] <= value:
+            break
+        key[place] = key[parent]
+        item[place] = item[parent]
+        place = parent
+    key[place] = value
+    item[place] = thing
+
+
+@njit
+def pop(key: Any, item: Any, size: int) -> None:
+    """Remove the root; ``size`` is what is left."""
+    value = key[size]
+    thing = item[size]
+    place = 0
+    while True:
+        child = 2 * place + 1
+        if child >= size:
+            break
+        if child + 1 < size and key[child + 1] < key[child]:
+            child += 1
+        if key[child] >= value:
+            break
+        key[place] = key[child]
+        item[place] = item[child]
+        place = child
+    key[place] = value
+    item[place] = thing

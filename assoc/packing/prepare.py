@@ -1,0 +1,126 @@
+"""An assignment problem brought into packing form, and the way back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc.packing.packing import Packing, _assemble
+from assoc.problem import AssignmentProblem
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A problem in packing form and the way back.
+
+    Attributes
+    ----------
+    packing : Packing
+        ``packing.origin`` are rows of ``problem.tuples``, ``packing.row_origin`` global row numbers.
+    offset : float
+        Cost of the state of rest: all singletons (0 without dummies).
+    single : int64 array
+        With dummies, the cheapest singleton tuple of each global row; empty without.
+    single_cost : float array
+        Its cost.
+    """
+
+    packing: Packing
+    offset: float
+    single: NDArray[np.int64]
+    single_cost: NDArray[np.float64]
+
+
+def prepare(problem: AssignmentProblem) -> Prepared:
+    """Bring a problem into packing form; the result is kept with the problem, which never changes."""
+    if problem._prepared is not None:
+        return problem._prepared
+    sizes = problem.sizes.astype(np.int64)
+    offsets = np.cumsum(sizes) - sizes
+    arrays: Any
+    if problem.dummy:
+        *arrays, whole, single, single_cost = _prepare_with_dummies(
+            problem.tuples, problem.costs, offsets, int(sizes.sum())
+        )
+    else:
+        rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
+        slack = np.repeat(sizes > sizes.min(), sizes)
+        arrays = _assemble(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
+        whole = _whole_numbers(problem.costs)
+        single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
+    packing = Packing(*(*arrays, 1.0 if whole else 0.0))
+    prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
+    problem._prepared = prepared
+    return prepared
+
+
+@njit
+def _prepare_with_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+) -> Any:
+    """Arrays of the packing, whether its weights are whole numbers, and the singletons."""
+    rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
+    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = _assemble(
+        rows, weights, np.ones(total, np.bool_), origin
+    )
+    return (
+        cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin,
+        _whole_numbers(weights), single, single_cost,
+    )  # fmt: skip
+
+
+@njit
+def _whole_numbers(weights: NDArray[np.float64]) -> bool:
+    """Whether all weights are whole numbers, small enough for sums of them to be exact."""
+    if weights.size == 0:
+        return False
+    for j in range(weights.size):
+        if not (abs(weights[j]) < 1e9 and weights[j] == math.floor(weights[j])):
+            return False
+    return True
+
+
+@njit
+def _columns_with_dummies(
+    tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
+) -> Any:
+    """Cheapest singleton of each row, and the columns of negative weight."""
+    num_tuples, num_sensors = tuples.shape
+    single = np.full(total, -1, np.int64)
+    single_cost = np.zeros(total)
+    for j in range(num_tuples):
+        size = 0
+        row = -1
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                size += 1
+                row = offsets[s] + tuples[j, s] - 1
+        if size == 1 and (single[row] < 0 or costs[j] < single_cost[row]):
+            single[row] = j
+            single_cost[row] = costs[j]
+    weights = np.empty(num_tuples)
+    origin = np.empty(num_tuples, np.int32)
+    count = 0
+    for j in range(num_tuples):
+        size = 0
+        weight = costs[j]
+        for s in range(num_sensors):
+            if tuples[j, s] > 0:
+                size += 1
+                weight -= single_cost[offsets[s] + tuples[j, s] - 1]
+        if size > 1 and weight < 0.0:
+            weights[count] = weight
+            origin[count] = j
+            count += 1
+    rows = np.empty((count, num_sensors), np.int32)
+    for k in range(count):
+        j = origin[k]
+        for s in range(num_sensors):
+            i = tuples[j, s]
+            rows[k, s] = offsets[s] + i - 1 if i > 0 else -1
+    return rows, weights[:count].copy(), origin[:count].copy(), single, single_cost

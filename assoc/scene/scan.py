@@ -1,0 +1,69 @@
+"""The measurements of one scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._types import Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scan:
+    """All measurements of one instant.
+
+    Attributes
+    ----------
+    index, time : int, float
+        Number of the scan from 0, time stamp in seconds.
+    measurements : tuple over sensors of arrays (n_s, d_s)
+    sources : tuple over sensors of int arrays (n_s,), or None
+        Target id of each measurement, -1 for a false alarm; None where it is not known.
+    truth_ids, truth_positions : arrays (T,) and (T, 3), or None
+    """
+
+    index: int
+    time: float
+    measurements: tuple[Array, ...]
+    sources: tuple[Array, ...] | None = None
+    truth_ids: Array | None = None
+    truth_positions: Array | None = None
+
+    @property
+    def sizes(self) -> Array:
+        """Measurements per sensor, int32 (S,)."""
+        return np.array([len(z) for z in self.measurements], dtype=np.int32)
+
+    def __repr__(self) -> str:
+        sizes = " + ".join(str(len(z)) for z in self.measurements)
+        return f"Scan({self.index}, t = {self.time:g} s, {sizes} measurements)"
+
+
+def true_tuples(scan: Scan) -> NDArray[np.int32] | None:
+    """The tuples of the targets that at least two sensors detected.
+
+    Parameters
+    ----------
+    scan : Scan
+
+    Returns
+    -------
+    int32 array (T, S), or None
+        In order of target id; None where the sources are not known. A target of which one sensor has several
+        measurements has no tuple and is left out.
+    """
+    if scan.sources is None:
+        return None
+    count = len(scan.sources)
+    ids = np.unique(np.concatenate([*scan.sources, np.zeros(0, np.int64)]))
+    ids = ids[ids >= 0]
+    tuples = np.zeros((len(ids), count), dtype=np.int32)
+    single = np.ones(len(ids), dtype=bool)
+    for sensor, source in enumerate(scan.sources):
+        real = np.flatnonzero(source >= 0)
+        row = np.searchsorted(ids, source[real])
+        tuples[row, sensor] = real + 1
+        single &= np.bincount(row, minlength=len(ids)) <= 1
+    return tuples[single & (np.count_nonzero(tuples, axis=1) >= 2)]

@@ -1,0 +1,51 @@
+"""How far above the best known cost the runs of a study end, and where they are over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CURVE_POINTS = 60
+
+
+def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
+    """Traces of the runs of a frame, with the cost above the best known of their scan in the column ``excess``."""
+    best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
+    traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
+    excess = traces["cost"] - traces["best"]
+    # what rounding leaves is no excess
+    return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
+
+
+def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Average the excess of runs over time; a run counts with what it has found by then.
+
+    Parameters
+    ----------
+    traces : DataFrame
+        Of `with_excess`, not empty.
+    column : {"iteration", "seconds"}
+
+    Returns
+    -------
+    at, excess : arrays (n,)
+        Iterations, or milliseconds; mean cost above the best known.
+    """
+    factor = 1e3 if column == "seconds" else 1.0
+    at = np.maximum(factor * traces[column].to_numpy(dtype=float), 1e-3)
+    run = traces.groupby(["scene", "scan", "repeat"]).ngroup().to_numpy()
+    excess = traces["excess"].to_numpy(dtype=float)
+    first = float(np.quantile(at[np.unique(run, return_index=True)[1]], 0.5))
+    grid = np.unique(np.geomspace(min(first, at.max()), at.max() * 1.02, _CURVE_POINTS))
+    total = np.zeros(grid.size)
+    order = np.lexsort((at, run))
+    starts = np.flatnonzero(np.r_[True, np.diff(run[order]) > 0])
+    for rows in np.split(order, starts[1:]):
+        place = np.searchsorted(at[rows], grid, side="right") - 1
+        total += excess[rows][np.maximum(place, 0)]
+    return grid, total / starts.size
