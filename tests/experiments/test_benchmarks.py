@@ -1,4 +1,4 @@
-"""The benchmark's machinery: rows, goals and markdown on numbers made for the purpose."""
+"""The benchmark's machinery: rows, goals and report on numbers made for the purpose."""
 
 from __future__ import annotations
 
@@ -139,9 +139,9 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "gatd" in capsys.readouterr().err
     path = tmp_path / "b.csv"
     with pytest.raises(SystemExit):
-        main(["--markdown-only", "--csv", str(path)])
+        main(["--report-only", "--csv", str(path)])
     rows.save(path, [ROW, PEER])
-    assert main(["--markdown-only", "--csv", str(path)]) == 0
+    assert main(["--report-only", "--csv", str(path)]) == 0
     assert "## gated" in (tmp_path / "b.md").read_text()
 
 

@@ -19,7 +19,7 @@ from experiments.papers.clustering_time_window.judging import Taken, run
 
 
 def test_the_papers_tables_agree_with_each_other():
-    # table 4.27 is the mean of the others, to its rounding; MT and IT of 4.25 are not quite, in the published itself
+    # table 4.27 is the mean of the others, to its rounding; MT and IT of 4.25 are not quite, in the paper itself
     assert published.WITH_WINDOW.mean(axis=0) == pytest.approx(published.OVERALL["with"], abs=0.02)
     assert published.WITHOUT_WINDOW.mean(axis=0) == pytest.approx(published.OVERALL["without"], abs=2.5)
 
