@@ -129,12 +129,13 @@ def assemble(
     granularity: float = 0.0,
 ) -> Packing:
     """Sort columns into components (rows in any numbering, -1 for none) and index them by row."""
-    arrays: Any = _assemble(rows, weights, slack, origin)
+    arrays: Any = assembled(rows, weights, slack, origin)
     return Packing(*(*arrays, granularity))
 
 
 @njit
-def _find(parent: NDArray[np.int32], i: int) -> int:
+def find(parent: NDArray[np.int32], i: int) -> int:
+    """Root of i in a union-find forest; halves the path on the way."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -142,9 +143,10 @@ def _find(parent: NDArray[np.int32], i: int) -> int:
 
 
 @njit
-def _assemble(
+def assembled(
     rows: NDArray[np.int32], weights: NDArray[np.float64], slack: NDArray[np.bool_], origin: NDArray[np.int32]
 ) -> Any:
+    """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering."""
     num, num_sensors = rows.shape
     total = slack.size
     parent = np.arange(total).astype(np.int32)
@@ -155,7 +157,7 @@ def _assemble(
             r = rows[j, s]
             if r >= 0:
                 used[r] = True
-                root = _find(parent, r)
+                root = find(parent, r)
                 if first < 0:
                     first = root
                 elif root != first:
@@ -169,7 +171,7 @@ def _assemble(
     num_components = 0
     for r in range(total):
         if used[r] or not slack[r]:
-            root = _find(parent, r)
+            root = find(parent, r)
             if component[root] < 0:
                 component[root] = num_components
                 num_components += 1

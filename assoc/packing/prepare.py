@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.packing import Packing, _assemble
+from assoc.packing.packing import Packing, assembled
 from assoc.problem import AssignmentProblem
 
 
@@ -50,7 +50,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     else:
         rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
         slack = np.repeat(sizes > sizes.min(), sizes)
-        arrays = _assemble(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
+        arrays = assembled(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
         whole = _whole_numbers(problem.costs)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
     packing = Packing(*(*arrays, 1.0 if whole else 0.0))
@@ -65,7 +65,7 @@ def _prepare_with_dummies(
 ) -> Any:
     """Arrays of the packing, whether its weights are whole numbers, and the singletons."""
     rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
-    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = _assemble(
+    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = assembled(
         rows, weights, np.ones(total, np.bool_), origin
     )
     return (

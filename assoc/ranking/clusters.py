@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc.packing.kernels.sorting import ascending_whole
-from assoc.packing.packing import _find
+from assoc.packing.packing import find
 from assoc.problem import AssignmentProblem
 
 # tuples from which numbering by marks is quicker than by sorting
@@ -62,7 +62,7 @@ def _clusters(tuples: Any, offsets: Any, total: int) -> Any:
         first = -1
         for s in range(num_sensors):
             if tuples[j, s] > 0:
-                root = _find(parent, offsets[s] + tuples[j, s] - 1)
+                root = find(parent, offsets[s] + tuples[j, s] - 1)
                 if first < 0:
                     first = root
                 elif root != first:
@@ -74,7 +74,7 @@ def _clusters(tuples: Any, offsets: Any, total: int) -> Any:
     for j in range(num):
         for s in range(num_sensors):
             if tuples[j, s] > 0:
-                root = _find(parent, offsets[s] + tuples[j, s] - 1)
+                root = find(parent, offsets[s] + tuples[j, s] - 1)
                 if label[root] < 0:
                     label[root] = count
                     count += 1

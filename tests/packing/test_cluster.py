@@ -5,6 +5,7 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.bounds.priced import Priced
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare
@@ -29,13 +30,15 @@ def _searched(problem, steps, size, rng):
     total = prepared.offset
     for c in range(packing.num_components):
         piece = packing.component(c)
-        search = ClusterSearch.of(piece, duals[packing.row_start[c] : packing.row_start[c + 1]])
+        own = duals[packing.row_start[c] : packing.row_start[c + 1]]
+        search = ClusterSearch(Priced.of(piece, own))
+        search.size = size
         cover = Cover.empty(piece)
         cover.add_greedily(np.argsort(piece.weights, kind="stable"))
         if not cover.complete(Run(rng)):
             raise InfeasibleError("no solution")
         before = cover.weight
-        change, _ = search.run(cover.owner, rng, steps, size, node_limit=10**6)
+        change, _ = search.search(piece.arrays, cover.owner, rng, steps, nodes=10**6)
         assert change <= 1e-9
         assert cover.weight == pytest.approx(before + change, abs=1e-9)
         _feasible(piece, cover.owner)

@@ -7,7 +7,7 @@ import assoc
 from assoc import AssignmentProblem
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
-from assoc.solvers.exact.reduction import Reduction, _best_of_both
+from assoc.solvers.exact.reduction import Reduction, best_of_both
 
 
 def _problem(seed: int, whole: bool) -> AssignmentProblem:
@@ -44,6 +44,6 @@ def test_two_covers_give_the_better_of_both_wherever_they_differ():
     weights = np.array([-1.0, -1.0, -2.0, -2.0, -5.0, -5.0, -3.0, -3.0])
     one = np.array([0, 1, 0, 1, 4, 5, 4, 5], dtype=np.int32)
     other = np.array([2, 3, 3, 2, 6, 7, 7, 6], dtype=np.int32)
-    weight = _best_of_both(cols, weights, 0, 8, one, other, np.empty(8, dtype=np.int32), np.empty(8))
+    weight = best_of_both(cols, weights, 0, 8, one, other, np.empty(8, dtype=np.int32), np.empty(8))
     assert weight == -14.0
     assert one.tolist() == [2, 3, 3, 2, 4, 5, 4, 5]

@@ -15,14 +15,14 @@ over-relaxed, and one pass with the hard minimum makes the result feasible.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.packing import Packing
+from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import Run
 
 # temperatures are this share of each component's spread of weights: likelihood costs spread over about 16
@@ -37,6 +37,33 @@ NEAR = 12.0
 # columns visited between two looks at the clock: about a millisecond in a kernel, and some fifty between kernels
 _LOOK = 200_000
 _VISITS = 10_000_000
+
+
+class SmoothPoint(NamedTuple):
+    """Where the smoothed ascent stands; changed in place.
+
+    Attributes
+    ----------
+    duals : float array, shape (R,)
+        Multipliers.
+    reduced, primal : float arrays, shape (N,)
+        Reduced costs and smoothed primal values of the columns.
+    slack_primal : float array, shape (R,)
+        Smoothed primal values of the rows' slack.
+    """
+
+    duals: Floats
+    reduced: Floats
+    primal: Floats
+    slack_primal: Floats
+
+
+class _Near(NamedTuple):
+    """The columns of small reduced cost: numbered by ``place`` (-1: not near), listed by row."""
+
+    place: Any
+    row_ptr: Any
+    cols: Any
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
@@ -59,9 +86,9 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
         Multipliers u; ``certified_bound(packing, u)`` is the bound.
     """
     duals = np.zeros(packing.num_rows)
-    temperature = START * spread(packing)
-    reduced, primal, slack_primal = work_arrays(packing)
-    hard_pass(packing, duals, reduced, 1)
+    temperature = START * spread(packing.arrays)
+    point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
+    hard_pass(packing, duals, point.reduced, 1)
     size = packing.row_cols.size
     deadline = math.inf if run is None else run.deadline()
     for _ in range(levels):
@@ -69,64 +96,23 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
         while left > 0 and (run is None or run.remaining() > 0.0):
             # under a time limit large problems come back for a look at the clock
             turn = left if run is None or run.time_limit is None else min(left, max(6, _VISITS // max(size, 1)))
-            visits = smooth_pass(packing, duals, reduced, primal, slack_primal, temperature, turn, deadline)
+            visits = smooth_passes(packing.arrays, point, temperature, turn, deadline)
             left = left - turn if visits == turn * size else 0
         temperature *= COOLING
-    hard_pass(packing, duals, reduced, 2)
+    hard_pass(packing, duals, point.reduced, 2)
     return duals
-
-
-def work_arrays(packing: Packing) -> tuple[Floats, Floats, Floats]:
-    """Return room for reduced costs, smoothed primal values of the columns, and those of the rows' slack."""
-    return np.empty(packing.num_columns), np.empty(packing.num_columns), np.empty(packing.num_rows)
-
-
-def spread(packing: Packing) -> Floats:
-    """Return for each component the spread of its weights (with 0, where rows have slack); never 0."""
-    return _spread(packing.weights, packing.slack, packing.col_start, packing.row_start)
 
 
 def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
     """Fill ``reduced`` from ``duals``, then raise ``duals`` by passes with the hard minimum (eq. above, T -> 0)."""
-    _reduced_costs(packing.cols, packing.weights, duals, reduced)
-    _hard_sweeps(packing.slack, packing.row_ptr, packing.row_cols, duals, reduced, sweeps)
-
-
-def smooth_pass(
-    packing: Packing,
-    duals: Floats,
-    reduced: Floats,
-    primal: Floats,
-    slack_primal: Floats,
-    temperature: Floats,
-    passes: int,
-    deadline: float = math.inf,
-) -> int:
-    """Move ``duals`` by smoothed passes at one temperature per component; return the column visits made."""
-    return int(
-        _smooth_passes(
-            packing.cols,
-            packing.weights,
-            packing.slack,
-            packing.row_start,
-            packing.col_start,
-            packing.row_ptr,
-            packing.row_cols,
-            duals,
-            reduced,
-            primal,
-            slack_primal,
-            temperature,
-            passes,
-            deadline,
-        )
-    )
+    fill_reduced(packing.arrays, duals, reduced)
+    hard_sweeps(packing.arrays, duals, reduced, sweeps)
 
 
 def reduced_costs(packing: Packing, duals: Floats) -> Floats:
     """Return the weight of each column less the multipliers of its rows, shape (N,)."""
     reduced = np.empty(packing.num_columns)
-    _reduced_costs(packing.cols, packing.weights, duals, reduced)
+    fill_reduced(packing.arrays, duals, reduced)
     return reduced
 
 
@@ -137,15 +123,7 @@ def component_bounds(packing: Packing, duals: Floats) -> Floats:
     for as many columns as a solution can have, so that the bound holds whatever ``duals`` are.
     ``inf`` means that a row without slack has no column: there is no solution.
     """
-    return _component_bounds(
-        packing.cols,
-        packing.weights,
-        packing.slack,
-        packing.col_start,
-        packing.row_start,
-        packing.row_ptr,
-        duals,
-    )
+    return bounds_by_component(packing.arrays, duals)
 
 
 def certified_bound(packing: Packing, duals: Floats) -> float:
@@ -154,7 +132,9 @@ def certified_bound(packing: Packing, duals: Floats) -> float:
 
 
 @njit
-def _spread(weights: Floats, slack: Any, col_start: Any, row_start: Any) -> Floats:
+def spread(packing: PackingArrays) -> Floats:
+    """For each component the spread of its weights (with 0, where rows have slack), shape (C,); never 0."""
+    weights, slack, col_start, row_start = packing.weights, packing.slack, packing.col_start, packing.row_start
     result = np.ones(col_start.size - 1)
     for c in range(result.size):
         low, high = np.inf, -np.inf
@@ -172,7 +152,9 @@ def _spread(weights: Floats, slack: Any, col_start: Any, row_start: Any) -> Floa
 
 
 @njit
-def _reduced_costs(cols: Any, weights: Floats, duals: Floats, reduced: Floats) -> None:
+def fill_reduced(packing: PackingArrays, duals: Floats, reduced: Floats) -> None:
+    """Fill ``reduced`` with the weight of each column less the multipliers of its rows."""
+    cols, weights = packing.cols, packing.weights
     num, num_sensors = cols.shape
     for j in range(num):
         value = weights[j]
@@ -184,7 +166,9 @@ def _reduced_costs(cols: Any, weights: Floats, duals: Floats, reduced: Floats) -
 
 
 @njit
-def _hard_sweeps(slack: Any, row_ptr: Any, row_cols: Any, duals: Floats, reduced: Floats, sweeps: int) -> None:
+def hard_sweeps(packing: PackingArrays, duals: Floats, reduced: Floats, sweeps: int) -> None:
+    """Passes with the hard minimum: each row takes what the least reduced cost of its columns leaves."""
+    slack, row_ptr, row_cols = packing.slack, packing.row_ptr, packing.row_cols
     for _ in range(sweeps):
         for r in range(slack.size):
             least = -duals[r] if slack[r] else np.inf
@@ -214,26 +198,15 @@ def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
 
 
 @njit
-def _smooth_passes(
-    cols: Any,
-    weights: Floats,
-    slack: Any,
-    row_start: Any,
-    col_start: Any,
-    row_ptr: Any,
-    row_cols: Any,
-    duals: Floats,
-    reduced: Floats,
-    primal: Floats,
-    slack_primal: Floats,
-    temperature: Floats,
-    passes: int,
-    deadline: float,
-) -> int:
+def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Floats, passes: int, deadline: float) -> int:
+    """Move ``point`` by smoothed passes at one temperature per component; the column visits made."""
+    slack, row_start, row_ptr = packing.slack, packing.row_start, packing.row_ptr
+    duals, reduced, primal, slack_primal = point
     scale = np.empty(slack.size)
-    near_ptr = np.empty(slack.size + 1, np.int64)
-    near_cols = np.empty(row_cols.size, np.int32)
-    place = np.empty(weights.size, np.int32)
+    near = _Near(
+        np.empty(reduced.size, np.int32), np.empty(slack.size + 1, np.int64), np.empty(packing.row_cols.size, np.int32)
+    )
+    place, near_ptr, near_cols = near
     visits = 0
     unseen = 0
     over = False
@@ -246,11 +219,8 @@ def _smooth_passes(
         worst = 1.0
         while done < passes and worst >= 0.01 and not over:
             # columns far above the minimum weigh nothing: they are left out and looked at again now and then
-            _near(
-                cols, weights, row_ptr, row_cols, duals, reduced, top, end, col_start[c], col_start[c + 1],
-                NEAR * t, place, near_ptr, near_cols,
-            )  # fmt: skip
-            for j in range(col_start[c], col_start[c + 1]):
+            _list_near(packing, duals, reduced, c, NEAR * t, near)
+            for j in range(packing.col_start[c], packing.col_start[c + 1]):
                 if place[j] >= 0:
                     primal[place[j]] = math.exp(min(-reduced[j] / t, 500.0))
             for r in range(top, end):
@@ -291,11 +261,12 @@ def _smooth_passes(
 
 
 @njit
-def _near(
-    cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, duals: Floats, reduced: Floats, top: int, end: int,
-    first: int, last: int, limit: float, place: Any, near_ptr: Any, near_cols: Any,
-) -> None:  # fmt: skip
-    """Number the columns of a component whose reduced cost is at most ``limit``, and list them by row."""
+def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, limit: float, near: _Near) -> None:
+    """Number the columns of component c whose reduced cost is at most ``limit``, and list them by row."""
+    cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
+    place, near_ptr, near_cols = near
+    top, end = packing.row_start[c], packing.row_start[c + 1]
+    first, last = packing.col_start[c], packing.col_start[c + 1]
     count = 0
     for j in range(first, last):
         value = weights[j]
@@ -319,9 +290,10 @@ def _near(
 
 
 @njit
-def _component_bounds(
-    cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, duals: Floats
-) -> Floats:
+def bounds_by_component(packing: PackingArrays, duals: Floats) -> Floats:
+    """The kernel of ``component_bounds``."""
+    cols, weights, slack, row_ptr = packing.cols, packing.weights, packing.slack, packing.row_ptr
+    row_start, col_start = packing.row_start, packing.col_start
     num_sensors = cols.shape[1]
     bounds = np.zeros(col_start.size - 1)
     for c in range(bounds.size):

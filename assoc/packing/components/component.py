@@ -1,44 +1,69 @@
-"""What ant colony, genetic algorithm and tabu search share: parts, reduced-cost fixing, stopping, proof.
+"""A component of a packing with the best cover known, and the moves that improve covers.
 
-The packing is taken apart into parts (first its components). The first iteration is the greedy one, which follows
-the reduced costs alone, and most parts need no other. An open part is searched for some iterations; then
-columns whose reduced cost exceeds the part's gap are dropped, since no better solution can use them, and
-what is left is taken apart again. A part whose gap is closed is done. Parts take turns, so that a time
-limit is shared between them. At the end a short branch and bound (branch_and_bound.py) raises the bounds
-of small open parts; it never changes the solution, which is the metaheuristic's own.
+`NEIGHBOURHOODS` lists all moves and says how often each is tried.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._types import Floats
-from assoc.packing.bounds.dual_ascent import certified_bound, hard_pass, reduced_costs
-from assoc.packing.bounds.linear_program import linear_program_duals
+from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods import dimensionwise
-from assoc.packing.neighbourhoods.cluster_steps import ClusterSteps
-from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
+from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.cover import Cover, chosen_columns, is_complete, weight_of
+from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
+from assoc.packing.neighbourhoods.insertion import search_arrays
 from assoc.packing.neighbourhoods.large import LargeNeighbourhood
-from assoc.packing.packing import Packing
+from assoc.packing.neighbourhoods.neighbourhood import Neighbourhood
+from assoc.packing.packing import PackingArrays
 from assoc.packing.run import Run
 
 Owner = NDArray[np.int32]
 
-TOLERANCE = 1e-9
-# columns up to which the linear program is solved: some seconds at the most
-_LINEAR_PROGRAM = 200_000
-# rows from which large neighbourhoods pay, and tries on one best cover: then only another one helps
+# rows from which large neighbourhoods pay
 _LARGE = 30
-_TRIES = 300
+
+
+class Move(NamedTuple):
+    """When a neighbourhood is tried, and how often.
+
+    Attributes
+    ----------
+    neighbourhood : type
+    on_new : callable
+        Tries on each new cover of a metaheuristic, from its parameter ``clusters``.
+    on_best : callable
+        Tries on the best cover after each iteration, from ``clusters`` and the number of rows.
+    at_once : int
+        Of those, tries between two looks at the gap and at the clock.
+    """
+
+    neighbourhood: type[Neighbourhood]
+    on_new: Callable[[int], int]
+    on_best: Callable[[int, int], int]
+    at_once: int = 1
+
+
+NEIGHBOURHOODS = (
+    # two halves of all tuples are matched anew, exactly
+    Move(Dimensionwise, on_new=lambda clusters: 1, on_best=lambda clusters, rows: 0),
+    # some twenty targets that lie close together are solved exactly
+    Move(ClusterSearch, lambda clusters: clusters, lambda clusters, rows: clusters * max(1, rows // 30), at_once=10),
+    # half of all rows or more are covered anew by branch and bound
+    Move(LargeNeighbourhood, lambda clusters: 0, lambda clusters, rows: clusters if rows >= _LARGE else 0),
+)
+"""The moves that improve covers, in the order in which they are tried. Insertion with ejection (insertion.py)
+is not among them: covers are built with it."""
 
 
 @dataclass(slots=True)
-class Part:
+class Component(Priced):
     """A connected piece of the problem with its multipliers and the best cover known.
 
     Attributes
@@ -48,7 +73,7 @@ class Part:
     duals, reduced : float arrays, shapes (R,) and (N,)
         Feasible multipliers and reduced costs.
     bound : float
-        Valid lower bound of the part.
+        Valid lower bound of the component.
     origin : int array, shape (N,)
         The columns' places in the packing that the solver was given.
     best : int32 array, shape (R,), or None
@@ -57,27 +82,25 @@ class Part:
         Its weight; ``inf`` when none is known.
     deadline : float
         When time is over, by the kernels' clock (clock.py).
+    iterations, stalled : int
+        Iterations of a metaheuristic, and those since the best cover became better.
     """
 
-    packing: Packing
-    duals: Floats
-    reduced: Floats
-    bound: float
     origin: NDArray[np.int64]
     best: Owner | None = None
     weight: float = np.inf
+    deadline: float = np.inf
     iterations: int = 0
     stalled: int = 0
-    deadline: float = np.inf
-    clusters: ClusterSteps | None = None
-    neighbourhood: LargeNeighbourhood = field(default_factory=LargeNeighbourhood)
-    tried: int = 0
-    tried_weight: float = np.inf
+    _searches: dict[type[Neighbourhood], Neighbourhood] = field(default_factory=dict)
+    _arrays: PackingArrays | None = None
 
     @property
-    def tolerance(self) -> float:
-        """Gains below this do not exist or do not count: rounding, or whole-numbered weights."""
-        return max(TOLERANCE * max(1.0, abs(self.bound)), 0.999 * self.packing.granularity)
+    def arrays(self) -> PackingArrays:
+        """The packing as searches see it (``insertion.search_arrays``)."""
+        if self._arrays is None:
+            self._arrays = search_arrays(self.packing)
+        return self._arrays
 
     @property
     def closed(self) -> bool:
@@ -97,75 +120,68 @@ class Part:
             return min(max((self.weight - self.bound) / 4.0, TOLERANCE * max(1.0, abs(self.bound))), widest)
         return widest
 
-    def take_over(self, duals: Floats) -> None:
-        """Take over feasible multipliers if their bound is better."""
-        bound = certified_bound(self.packing, duals)
-        if bound > self.bound:
-            self.bound, self.duals, self.reduced = bound, duals, reduced_costs(self.packing, duals)
+    def best_columns(self) -> NDArray[np.int64]:
+        """Columns of the best cover, ascending; there must be one."""
+        assert self.best is not None
+        return np.asarray(chosen_columns(self.packing.cols, self.best), dtype=np.int64)
 
-    def sharpen(self, run: Run) -> None:
-        """Take the multipliers of the linear program itself, where that is not too large."""
-        if self.packing.num_columns > _LINEAR_PROGRAM:
-            return
-        duals = linear_program_duals(self.packing, run)
-        if duals is not None:
-            hard_pass(self.packing, duals, np.empty(self.packing.num_columns), 1)
-            self.take_over(duals)
+    def is_complete(self, owner: Owner) -> bool:
+        """Whether a cover covers all rows that must be covered."""
+        return is_complete(self.packing, owner)
+
+    def weight_of(self, owner: Owner) -> float:
+        """Weight of a cover."""
+        return weight_of(self.packing, owner)
+
+    def offer(self, owner: Owner, weight: float) -> bool:
+        """Keep a cover if it is complete and better than the best; whether it was."""
+        if weight < self.weight - self.tolerance and self.is_complete(owner):
+            self.best, self.weight = owner.copy(), weight
+            return True
+        return False
 
     def offer_greedy(self) -> None:
         """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
         cover = Cover.empty(self.packing)
         cover.add_greedily(ascending(self.reduced))
         cover.improve(self.deadline)
-        self.offer(cover.owner, weight_of(self, cover.owner))
+        self.offer(cover.owner, cover.weight)
 
-    def improve(self, owner: Owner, rng: np.random.Generator, steps: int) -> float:
-        """Improve a complete cover in place by exact sub-steps; return the change of its weight."""
-        if steps == 0 or self.late or incomplete(self, owner):
-            return 0.0
-        if self.clusters is None:
-            self.clusters = ClusterSteps(self.packing, self.duals)
-        return self.clusters.improve(owner, rng, steps, self.deadline)
+    def improve(
+        self, owner: Owner, rng: np.random.Generator, clusters: int, moves: Sequence[Move] = NEIGHBOURHOODS
+    ) -> float:
+        """Improve a new cover in place by what the moves list for it; return its weight."""
+        weight = self.weight_of(owner)
+        if not self.is_complete(owner):
+            return weight
+        for move in moves:
+            tries = move.on_new(clusters)
+            if tries and weight - self.bound > self.tolerance and not self.late:
+                weight = self._search(move).improve(self, owner, weight, rng, tries, self.deadline)
+        return weight
 
-    def polish(self, owner: Owner) -> float:
-        """Improve a complete cover in place by dimensionwise search; return its weight."""
-        if not incomplete(self, owner):
-            dimensionwise.improve(self.packing, owner, deadline=self.deadline)
-        return weight_of(self, owner)
+    def settle(self, owner: Owner, rng: np.random.Generator, clusters: int) -> float:
+        """Improve a new cover in place and offer it; return its weight."""
+        weight = self.improve(owner, rng, clusters)
+        self.offer(owner, weight)
+        return weight
 
-    def refine(self, run: Run, steps: int) -> None:
-        """Improve the best cover: exact sub-steps, ``steps`` for every 30 rows, and ``steps`` large neighbourhoods."""
-        if self.best is None or steps == 0:
+    def refine(self, run: Run, clusters: int) -> None:
+        """Improve the best cover by the moves that `NEIGHBOURHOODS` lists for it."""
+        if self.best is None or clusters == 0:
             return
-        left = steps * max(1, self.packing.num_rows // 30)
-        while left > 0 and not self.closed and not run.should_stop():
-            self.improve(self.best, run.rng, min(left, 10))
-            # summed anew: changes of the order of rounding would add up to an improvement that is none
-            self.weight = weight_of(self, self.best)
-            left -= 10
-        if self.weight < self.tried_weight:
-            self.tried_weight, self.tried = self.weight, 0
-        for _ in range(steps if self.packing.num_rows >= _LARGE and not incomplete(self, self.best) else 0):
-            if self.closed or self.tried >= _TRIES or run.should_stop():
-                return
-            self.tried += 1
-            if self.neighbourhood.improve(self, self.best, self.weight, run.rng) < 0.0:
-                self.weight = weight_of(self, self.best)
-                self.tried_weight, self.tried = self.weight, 0
+        for move in NEIGHBOURHOODS:
+            left = move.on_best(clusters, self.packing.num_rows)
+            while left > 0 and not self.closed and not run.should_stop():
+                tries = min(left, move.at_once)
+                self._search(move).improve(self, self.best, self.weight, run.rng, tries, self.deadline)
+                # summed anew: changes of the order of rounding would add up to an improvement that is none
+                self.weight = self.weight_of(self.best)
+                left -= move.at_once
 
-    def offer(self, owner: Owner, weight: float) -> bool:
-        """Keep a cover if it is complete and better than the best; whether it was."""
-        if weight < self.weight - self.tolerance and not incomplete(self, owner):
-            self.best, self.weight = owner.copy(), weight
-            return True
-        return False
-
-
-def weight_of(part: Part, owner: Owner) -> float:
-    """Weight of a cover of the part."""
-    return float(part.packing.weights[chosen_columns(part.packing.cols, owner)].sum())
-
-
-def incomplete(part: Part, owner: Owner) -> bool:
-    """Whether a row that must be covered is not."""
-    return bool((owner[~part.packing.slack] < 0).any())
+    def _search(self, move: Move) -> Neighbourhood:
+        """The neighbourhood of a move at work on this component."""
+        kind = move.neighbourhood
+        if kind not in self._searches:
+            self._searches[kind] = kind(self)
+        return self._searches[kind]

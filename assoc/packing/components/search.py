@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.components.component import Part
-from assoc.packing.components.proof import bound_of_part
-from assoc.packing.components.splitting import _columns, split_components, split_part
+from assoc.packing.components.component import Component
+from assoc.packing.components.proof import bound_of_component
+from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
@@ -21,117 +21,119 @@ from assoc.packing.run import Outcome, Run
 
 
 class Searcher(Protocol):
-    """A metaheuristic at work on one part."""
+    """A metaheuristic at work on one component."""
 
-    def iterate(self, part: Part, rng: np.random.Generator) -> None:
-        """Do one iteration and ``offer`` what it finds to the part."""
+    def iterate(self, component: Component, rng: np.random.Generator) -> None:
+        """Do one iteration and ``offer`` what it finds to the component."""
 
 
-def solve_by(
-    make: Callable[[Part, np.random.Generator], Searcher],
+def search_components(
+    make: Callable[[Component, np.random.Generator], Searcher],
     packing: Packing,
     run: Run,
     iterations: int,
     patience: int,
     refinement: int = 0,
 ) -> Outcome:
-    """Run a metaheuristic on every part of the packing.
+    """Run a metaheuristic on every component of the packing.
 
     Parameters
     ----------
     make : callable
-        Makes the searcher of a part.
+        Makes the searcher of a component.
     packing : Packing
         The whole problem.
     run : Run
         Clock, random generator, trace.
     iterations : int
-        Iterations on one part at the most.
+        Iterations on one component at the most.
     patience : int
-        A part is left after so many iterations without improvement.
+        A component is left after so many iterations without improvement.
     refinement : int
-        Exact sub-steps on the best cover after each iteration, for every 30 rows of the part.
+        Exact sub-steps on the best cover after each iteration, for every 30 rows of the component.
 
     Raises
     ------
     InfeasibleError
-        A part has no complete cover, or none was found.
+        A component has no complete cover, or none was found.
     """
     # without a solution at the time limit there would be nothing to return: the bound gets a share of the time
     share = Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
     duals = dual_bound(packing, run=share)
-    parts = split_components(packing, duals, np.arange(packing.num_columns))
+    components = split_components(packing, duals, np.arange(packing.num_columns))
     deadline = run.deadline()
-    for part in parts:
-        part.deadline = deadline
-        part.offer_greedy()
-        if not part.closed and not share.should_stop():
-            part.sharpen(share)
+    for component in components:
+        component.deadline = deadline
+        component.offer_greedy()
+        if not component.closed and not share.should_stop():
+            component.sharpen(share)
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
-    done = len(parts)
+    done = len(components)
     cut_off = False
-    root_bound = sum(part.bound for part in parts)
-    _record_all(run, done, weight, root_bound, parts)
-    queue: list[tuple[Part, Searcher | None]] = [(part, None) for part in parts]
+    root_bound = sum(component.bound for component in components)
+    _record_all(run, done, weight, root_bound, components)
+    queue: list[tuple[Component, Searcher | None]] = [(component, None) for component in components]
     while queue:
-        part, searcher = queue.pop(0)
-        # a part that has a cover takes no turn after time is over, or thousands of parts would take one each
-        over = part.closed or (part.best is not None and run.should_stop())
+        component, searcher = queue.pop(0)
+        # a component that has a cover takes no turn after time is over, or thousands of components would take one each
+        over = component.closed or (component.best is not None and run.should_stop())
         if not over:
             if searcher is None:
-                searcher = make(part, run.rng)
-            before, iterations_before = part.weight, part.iterations
-            over = _take_turn(part, searcher, run, iterations, patience, refinement)
-            done += part.iterations - iterations_before
-            cut_off |= part.iterations >= iterations and part.stalled < patience and not part.closed
-            if part.best is None and over:
-                complete(part, run)
-            if part.weight < before:
-                _record_all(run, done, weight, root_bound, [part, *(other for other, _ in queue)])
-            pieces = None if over else split_part(part)
-            if pieces is not None:
-                queue.extend((piece, None) for piece in pieces)
+                searcher = make(component, run.rng)
+            before, iterations_before = component.weight, component.iterations
+            over = _take_turn(component, searcher, run, iterations, patience, refinement)
+            done += component.iterations - iterations_before
+            cut_off |= component.iterations >= iterations and component.stalled < patience and not component.closed
+            if component.best is None and over:
+                complete_greedily(component, run)
+            if component.weight < before:
+                _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
+            smaller = None if over else split_component(component)
+            if smaller is not None:
+                queue.extend((one, None) for one in smaller)
                 continue
         if over:
-            columns.append(part.origin[_columns(part)])
-            bound += bound_of_part(part, run)
-            weight += part.weight
+            columns.append(component.origin[component.best_columns()])
+            bound += bound_of_component(component, run)
+            weight += component.weight
         else:
-            queue.append((part, searcher))
+            queue.append((component, searcher))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     run.record(done, weight, bound)
     if cut_off:
-        # said only now: a run that is stopped neither searches other parts nor raises their bounds
+        # said only now: a run that is stopped neither searches other components nor raises their bounds
         run.stopped_by = run.stopped_by or "iterations"
     return Outcome(chosen, done, bound, duals)
 
 
-def _take_turn(part: Part, searcher: Searcher, run: Run, iterations: int, patience: int, refinement: int) -> bool:
-    """Give a part up to ten iterations; whether its search is over."""
+def _take_turn(
+    component: Component, searcher: Searcher, run: Run, iterations: int, patience: int, refinement: int
+) -> bool:
+    """Give a component up to ten iterations; whether its search is over."""
     for _ in range(10):
-        before = part.weight
-        searcher.iterate(part, run.rng)
-        part.refine(run, refinement)
-        part.iterations += 1
-        part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
-        if part.closed or part.stalled >= patience or part.iterations >= iterations or run.should_stop():
+        before = component.weight
+        searcher.iterate(component, run.rng)
+        component.refine(run, refinement)
+        component.iterations += 1
+        component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
+        if component.closed or component.stalled >= patience or component.iterations >= iterations or run.should_stop():
             return True
     return False
 
 
-def _record_all(run: Run, iterations: int, weight: float, bound: float, parts: list[Part]) -> None:
-    known = weight + sum(part.weight for part in parts)
+def _record_all(run: Run, iterations: int, weight: float, bound: float, components: list[Component]) -> None:
+    known = weight + sum(component.weight for component in components)
     if known < np.inf:
         run.record(iterations, known, bound)
 
 
-def complete(part: Part, run: Run) -> None:
-    """Last resort for a part in which no iteration covered all that must be covered."""
-    cover = Cover.empty(part.packing)
-    cover.add_greedily(ascending(part.reduced))
+def complete_greedily(component: Component, run: Run) -> None:
+    """Last resort for a component in which no iteration covered all that must be covered."""
+    cover = Cover.empty(component.packing)
+    cover.add_greedily(ascending(component.reduced))
     if not cover.complete(run):
-        raise infeasible(part.packing, run)
-    part.offer(cover.owner, cover.weight)
-    if part.best is None:
+        raise infeasible(component.packing, run)
+    component.offer(cover.owner, cover.weight)
+    if component.best is None:
         raise InfeasibleError("no complete solution was found")

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import component_bounds, hard_pass, reduced_costs
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.components.component import Part
+from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods.cover import chosen_columns
 from assoc.packing.packing import Packing
 
 
-def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Part]:
-    """Return the components as parts without a cover.
+def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Component]:
+    """Return the components of a packing, none with a cover yet.
 
     Raises
     ------
@@ -25,40 +25,45 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
     if np.isposinf(bounds).any():
         raise infeasible(packing)
     reduced = reduced_costs(packing, duals)
-    parts: list[Part] = []
+    components: list[Component] = []
     for c in range(packing.num_components):
-        piece = packing.component(c) if packing.num_components > 1 else packing
+        alone = packing.component(c) if packing.num_components > 1 else packing
         top, end = packing.row_start[c], packing.row_start[c + 1]
         first, last = packing.col_start[c], packing.col_start[c + 1]
-        parts.append(Part(piece, duals[top:end], reduced[first:last], float(bounds[c]), origin[first:last]))
-    return parts
+        components.append(Component(alone, duals[top:end], reduced[first:last], float(bounds[c]), origin[first:last]))
+    return components
 
 
-def split_part(part: Part, share: float = 2 / 3) -> list[Part] | None:
-    """Drop the columns that no better solution can use; None unless at most ``share`` of them are left."""
-    if part.best is None:
+def split_component(whole: Component, share: float = 2 / 3) -> list[Component] | None:
+    """Drop the columns that no better solution can use; None unless at most ``share`` of them are left.
+
+    What is left may fall apart: components, each with its share of the best cover.
+    """
+    if whole.best is None:
         return None
-    keep = part.reduced <= part.weight - part.bound - (part.tolerance if part.packing.granularity else 0.0)
-    keep[chosen_columns(part.packing.cols, part.best)] = True
+    step = whole.tolerance if whole.packing.granularity else 0.0
+    keep = whole.reduced <= whole.weight - whole.bound - step
+    keep[chosen_columns(whole.packing.cols, whole.best)] = True
     if np.count_nonzero(keep) > share * keep.size:
         return None
-    smaller = part.packing.restrict(keep)
-    duals = np.where(smaller.slack, np.minimum(part.duals[smaller.row_origin], 0.0), part.duals[smaller.row_origin])
-    duals = np.ascontiguousarray(duals)
+    smaller = whole.packing.restrict(keep)
+    duals = whole.duals[smaller.row_origin]
+    duals = np.ascontiguousarray(np.where(smaller.slack, np.minimum(duals, 0.0), duals))
     hard_pass(smaller, duals, np.empty(smaller.num_columns), 1)
-    place = np.full(part.packing.num_columns, -1, dtype=np.int32)
+    place = np.full(whole.packing.num_columns, -1, dtype=np.int32)
     place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
-    owner = part.best[smaller.row_origin]
+    owner = whole.best[smaller.row_origin]
     owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
-    pieces = split_components(smaller, duals, part.origin[smaller.origin])
-    for c, piece in enumerate(pieces):
-        own = owner[smaller.row_start[c] : smaller.row_start[c + 1]]
-        piece.best = np.where(own >= 0, own - smaller.col_start[c], -1).astype(np.int32)
-        piece.weight = float(piece.packing.weights[_columns(piece)].sum())
-        piece.iterations, piece.stalled, piece.deadline = part.iterations, part.stalled, part.deadline
-    return pieces
+    components = split_components(smaller, duals, whole.origin[smaller.origin])
+    give_covers(components, smaller, owner)
+    for one in components:
+        one.iterations, one.stalled, one.deadline = whole.iterations, whole.stalled, whole.deadline
+    return components
 
 
-def _columns(part: Part) -> NDArray[np.int64]:
-    assert part.best is not None
-    return np.asarray(chosen_columns(part.packing.cols, part.best), dtype=np.int64)
+def give_covers(components: list[Component], packing: Packing, owner: NDArray[np.int32]) -> None:
+    """Give each component of a packing its share of a complete cover (owner of each row of the packing)."""
+    for c, component in enumerate(components):
+        own = owner[packing.row_start[c] : packing.row_start[c + 1]]
+        component.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
+        component.weight = component.weight_of(component.best)

@@ -1,123 +1,140 @@
-"""Large-neighbourhood search: free a cluster of rows, fix what its duals allow, search the rest in full.
+"""Cluster search: free a cluster of rows, fix what its multipliers allow, search the rest in full.
 
 Near the optimum the columns that a better choice can use are few. For a cluster of rows, closed under the
 present choice, they are the columns of reduced cost below the cluster's excess (the sum of reduced costs of
 what is chosen there). Multipliers of the cluster's own rows are then raised by smoothed coordinate ascent
-(bounds.py); after each temperature the columns which the new bound excludes are dropped, and when it
+(as in bounds/dual_ascent.py); after each temperature the columns which the new bound excludes are dropped, and when it
 excludes all the cluster is proven. What is left is searched depth first: always the row with the fewest
 columns, cut off by the sum of the least reduced costs per sensor.
 
 A row with slack that stays uncovered is a column of its own, of reduced cost -u_r.
+
+Clusters grow while they can be solved, and shrink when they cannot.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
-from assoc._types import Floats
+from assoc.packing.bounds.dual_ascent import reduced_costs
+from assoc.packing.bounds.priced import Priced, Prices
+from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cluster_optimum import collect, depth_first, tighten
-from assoc.packing.packing import Packing
+from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
+from assoc.packing.packing import PackingArrays
 
 _CAPACITY = 4000
 _REACH = 3.0
+# rows of a cluster: about twenty targets of three sensors are solved in a millisecond or less
+_START, _LEAST, _MOST = 45, 24, 75
+# nodes of the depth-first search for one cluster
+_NODES = 1000
+# share of clusters in which another choice of the same weight is taken too
+_SIDEWAYS = 0.3
+# share of clusters not searched to the end, from which clusters shrink
+_TOO_LARGE = 0.2
 
 
-@dataclass(slots=True)
+class _Effort(NamedTuple):
+    """How much is tried: clusters, rows of each, least difference of two costs, nodes, share of ties taken."""
+
+    tries: int
+    size: int
+    step: float
+    nodes: int
+    sideways: float
+
+
 class ClusterSearch:
-    """The search on one component, to be called in chunks; it keeps nothing but its columns' order.
+    """The cluster search of one component.
+
+    Parameters
+    ----------
+    priced : Priced
+        One component; the multipliers of this moment are kept.
 
     Attributes
     ----------
-    packing : Packing
-        One component.
-    reduced, duals : float arrays, shapes (N,) and (R,)
+    prices : Prices
         Reduced costs (>= 0) and the feasible multipliers they come from.
     by_row : int32 array
         Columns of each row (``packing.row_ptr``) in order of reduced cost.
     step : float
-        Least difference between two costs: 1 where all weights are integers.
+        Least difference between two costs: 1 where all weights are whole numbers.
+    size : int
+        Rows of the next clusters.
     """
 
-    packing: Packing
-    reduced: Floats
-    duals: Floats
-    by_row: NDArray[np.int32]
-    step: float
-
-    @classmethod
-    def of(cls, packing: Packing, duals: Floats) -> ClusterSearch:
-        """Prepare the search on one component from feasible multipliers."""
-        from assoc.packing.bounds.dual_ascent import reduced_costs
-
-        free = np.where(packing.slack, np.minimum(duals, 0.0), duals)
-        reduced = np.maximum(reduced_costs(packing, free), 0.0)
+    def __init__(self, priced: Priced) -> None:
+        packing = priced.packing
+        duals = np.where(packing.slack, np.minimum(priced.duals, 0.0), priced.duals)
+        self.prices = Prices(np.maximum(reduced_costs(packing, duals), 0.0), duals)
         largest = float(np.abs(packing.weights).max(initial=0.0))
         whole = largest < 1e9 and bool((packing.weights == np.rint(packing.weights)).all())
-        step = 1.0 if whole else 1e-9 * max(1.0, largest)
-        return cls(packing, reduced, free, _by_row(packing.cols, packing.row_ptr, ascending(reduced)), step)
+        self.step = 1.0 if whole else 1e-9 * max(1.0, largest)
+        self.by_row = _by_row(packing.cols, packing.row_ptr, ascending(self.prices.reduced))
+        # a cluster of all rows would be an exact solver, not a local search
+        self._most = min(_MOST, max(6, 2 * packing.num_rows // 3))
+        self.size = min(_START, self._most)
 
-    def run(
+    def improve(
         self,
+        priced: Priced,
+        owner: NDArray[np.int32],
+        weight: float,
+        rng: np.random.Generator,
+        tries: int,
+        deadline: float = np.inf,
+    ) -> float:
+        """Improve a complete cover of this weight in place by some clusters; return its weight then."""
+        change, unfinished = self.search(priced.packing.arrays, owner, rng, tries, deadline)
+        if unfinished > _TOO_LARGE:
+            self.size = max(self.size - 6, min(_LEAST, self._most))
+        elif change == 0.0:
+            self.size = min(self.size + 1, self._most)
+        return weight + change
+
+    def search(
+        self,
+        packing: PackingArrays,
         owner: NDArray[np.int32],
         rng: np.random.Generator,
-        steps: int,
-        size: int,
-        *,
-        node_limit: int = 1000,
-        sideways: float = 0.3,
+        tries: int,
         deadline: float = np.inf,
+        nodes: int = _NODES,
     ) -> tuple[float, float]:
         """Try some clusters.
 
         Parameters
         ----------
+        packing : PackingArrays
+            The component.
         owner : int32 array, shape (R,)
             The cover (chosen column of each row, or -1), every row without slack covered; changed in
             place, never to a worse one.
         rng : Generator
             Draws the clusters.
-        steps : int
+        tries : int
             Clusters to try.
-        size : int
-            Rows to free.
-        node_limit : int
-            Nodes of the depth-first search for one cluster.
-        sideways : float
-            Share of clusters in which another choice of the same weight is taken too.
         deadline : float
             No cluster is begun after this (clock.py).
+        nodes : int
+            Nodes of the depth-first search for one cluster.
 
         Returns
         -------
         float, float
             The change of weight (<= 0), and the share of clusters not searched to the end.
         """
-        packing = self.packing
-        change, cut = _search_clusters(
-            packing.cols,
-            packing.slack,
-            packing.row_ptr,
-            self.by_row,
-            self.reduced,
-            self.duals,
-            owner,
-            rng,
-            steps,
-            min(size, packing.num_rows),
-            self.step,
-            node_limit,
-            sideways,
-            deadline,
-        )
-        return float(change), float(cut) / max(steps, 1)
+        effort = _Effort(tries, min(self.size, owner.size), self.step, nodes, _SIDEWAYS)
+        change, cut = _search_clusters(packing, self.by_row, self.prices, owner, rng, effort, deadline)
+        return float(change), float(cut) / max(tries, 1)
 
 
 @njit
@@ -155,10 +172,11 @@ def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int
 
 @njit
 def _grow(
-    cols: Any, row_ptr: Any, by_row: Any, reduced: Floats, duals: Floats, owner: Any, rng: Any, size: int,
-    local: Any, rows: Any
-) -> int:  # fmt: skip
+    packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, size: int, local: Any, rows: Any
+) -> int:
     """Fill ``rows`` with a cluster and ``local`` with its numbering; starts where something is to be gained."""
+    cols, row_ptr = packing.cols, packing.row_ptr
+    reduced, duals = prices
     num_rows = owner.size
     start = rng.integers(0, num_rows)
     if rng.random() < 0.8:
@@ -186,49 +204,50 @@ def _grow(
 
 @njit
 def _search_clusters(
-    cols: Any, slack: Any, row_ptr: Any, by_row: Any, reduced: Floats, duals: Floats, owner: Any, rng: Any,
-    steps: int, size: int, step: float, node_limit: int, sideways: float, deadline: float
-) -> Any:  # fmt: skip
+    packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, effort: _Effort, deadline: float
+) -> Any:
+    """Try clusters; the change of weight, and how many were not searched to the end."""
+    cols = packing.cols
+    reduced, duals = prices
+    tries, size, step, node_limit, sideways = effort
     num_rows, num_sensors = owner.size, cols.shape[1]
     local = np.full(num_rows, -1, np.int32)
     rows = np.empty(num_rows, np.int32)
-    place = np.empty((_CAPACITY, num_sensors), np.int32)
-    cost = np.empty(_CAPACITY)
-    origin = np.empty(_CAPACITY, np.int32)
-    primal = np.empty(_CAPACITY)
-    pointer = np.empty(num_rows + 1, np.int64)
-    by_place = np.empty(_CAPACITY * num_sensors, np.int32)
+    found = ClusterColumns(
+        np.empty((_CAPACITY, num_sensors), np.int32), np.empty(_CAPACITY), np.empty(_CAPACITY, np.int32)
+    )
+    place, cost, origin = found
+    sweep = Sweep(
+        np.empty(num_rows + 1, np.int64),
+        np.empty(_CAPACITY * num_sensors, np.int32),
+        np.empty(num_rows),
+        np.empty(_CAPACITY),
+    )
     current = np.empty(_CAPACITY, np.bool_)
-    u = np.empty(num_rows)
     lists = np.empty((min(size + num_sensors, num_rows) + 2, _CAPACITY + 1), np.int32)
     best = np.empty(num_rows, np.int64)
     change = 0.0
     cut = 0
-    for _ in range(steps):
+    for _ in range(tries):
         if is_over(deadline):
             break
-        num = _grow(cols, row_ptr, by_row, reduced, duals, owner, rng, size, local, rows)
+        num = _grow(packing, by_row, prices, owner, rng, size, local, rows)
         excess = 0.0
         for i in range(num):
             k = owner[rows[i]]
             if k < 0:
                 excess -= duals[rows[i]]
-            elif _is_first(cols, k, rows[i]):
+            elif first_row(cols, k) == rows[i]:
                 excess += reduced[k]
         tolerance = 1e-9 * max(1.0, excess)
         budget = excess + tolerance if rng.random() < sideways else excess - step + tolerance
         if excess > step * 0.999 or budget > excess:
             limit = budget
-            count = collect(cols, slack, row_ptr, by_row, reduced, duals, rows, num, local, limit, place, cost, origin)
+            count = collect(packing, by_row, prices, rows[:num], local, limit, found)
             while count < 0:
                 limit *= 0.7
-                count = collect(
-                    cols, slack, row_ptr, by_row, reduced, duals, rows, num, local, limit, place, cost, origin
-                )
-            count, base = tighten(
-                place, cost, origin, count, num, budget, max(0.15 * excess, 1e-12),
-                pointer, by_place, u, primal
-            )  # fmt: skip
+                count = collect(packing, by_row, prices, rows[:num], local, limit, found)
+            count, base = tighten(found, count, num, budget, max(0.15 * excess, 1e-12), sweep)
             if count > 0:
                 order = np.argsort(cost[:count])
                 lists[0, 0] = count
@@ -237,16 +256,15 @@ def _search_clusters(
                     lists[0, t + 1] = e
                     k = origin[e]
                     if k >= 0:
-                        current[e] = owner[_row(cols, k)] == k
+                        current[e] = owner[first_row(cols, k)] == k
                     else:
                         current[e] = owner[rows[max(place[e])]] < 0
-                found, num_best, nodes = depth_first(
-                    place, cost, current, num, budget - base, excess - base, step, node_limit, lists, best
-                )
+                limits = Limits(budget - base, excess - base, step, node_limit)
+                total, num_best, nodes = depth_first(place, cost, current, num, limits, lists, best)
                 if nodes > node_limit:
                     cut += 1
-                if found < np.inf:
-                    change += found + base - excess
+                if total < np.inf:
+                    change += total + base - excess
                     for i in range(num):
                         owner[rows[i]] = -1
                     for t in range(num_best):
@@ -258,16 +276,3 @@ def _search_clusters(
         for i in range(num):
             local[rows[i]] = -1
     return change, cut
-
-
-@njit
-def _row(cols: Any, j: int) -> int:
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0:
-            return cols[j, s]
-    return -1
-
-
-@njit
-def _is_first(cols: Any, j: int, r: int) -> bool:
-    return _row(cols, j) == r

@@ -1,32 +1,62 @@
 """The exact half of cluster search: which columns a cluster's duals leave, and the best choice among them.
 
-See cluster_search.py for the method. A column is described by ``place``: the cluster's row for each sensor, or
+See cluster.py for the method. A column is described by ``place``: the cluster's row for each sensor, or
 -1; a row with slack that stays uncovered is a column with that one row and ``origin`` -1.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.bounds.priced import Prices
+from assoc.packing.packing import PackingArrays
 
 _LEVELS = 4
 _SWEEPS = 8
 
 
+class ClusterColumns(NamedTuple):
+    """Room for the columns of a cluster: their places, costs, and columns of the packing (-1: stays uncovered)."""
+
+    place: Any
+    cost: Any
+    origin: Any
+
+
+class Sweep(NamedTuple):
+    """Room for the ascent on a cluster: its columns by place, its multipliers, smoothed primal values."""
+
+    pointer: Any
+    by_place: Any
+    duals: Any
+    primal: Any
+
+
+class Limits(NamedTuple):
+    """What the depth-first search keeps to: total cost, that of the present choice, least gain, nodes."""
+
+    budget: float
+    present: float
+    step: float
+    nodes: int
+
+
 @njit
 def collect(
-    cols: Any, slack: Any, row_ptr: Any, by_row: Any, reduced: Floats, duals: Floats, rows: Any, num: int,
-    local: Any, limit: float, place: Any, cost: Floats, origin: Any
-) -> int:  # fmt: skip
+    packing: PackingArrays, by_row: Any, prices: Prices, rows: Any, local: Any, limit: float, found: ClusterColumns
+) -> int:
     """List the columns within the cluster of reduced cost up to ``limit``; -1 when they are too many."""
+    cols, slack, row_ptr = packing.cols, packing.slack, packing.row_ptr
+    reduced, duals = prices
+    place, cost, origin = found
     num_sensors = cols.shape[1]
     count = 0
-    for i in range(num):
+    for i in range(rows.size):
         r = rows[i]
         if slack[r] and -duals[r] <= limit:
             if count == cost.size:
@@ -90,14 +120,13 @@ def _index(place: Any, count: int, num: int, pointer: Any, by_place: Any) -> Non
 
 
 @njit
-def tighten(
-    place: Any, cost: Floats, origin: Any, count: int, num: int, budget: float, temperature: float,
-    pointer: Any, by_place: Any, u: Floats, primal: Floats
-) -> Any:  # fmt: skip
+def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperature: float, sweep: Sweep) -> Any:
     """Raise the cluster's multipliers, drop what they exclude; ``cost`` becomes the new reduced cost.
 
     Returns what is left and the bound; nothing is left where the bound exceeds the budget.
     """
+    place, cost, origin = found
+    pointer, by_place, u, primal = sweep
     num_sensors = place.shape[1]
     base = 0.0
     for _ in range(_LEVELS):
@@ -147,16 +176,14 @@ def tighten(
 
 
 @njit
-def depth_first(
-    place: Any, cost: Floats, current: Any, num: int, budget: float, present: float, step: float,
-    node_limit: int, lists: Any, best: Any
-) -> Any:  # fmt: skip
+def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits, lists: Any, best: Any) -> Any:
     """Choose columns that cover each of ``num`` places once, of total cost up to ``budget``.
 
     ``lists[0]`` has the columns in order of cost. A choice equal to the present one is passed over; after
     any other only those better than the present by ``step`` count. Returns the cost (``inf``: none), the
     number of columns in ``best``, and the nodes used (more than the limit: not searched to the end).
     """
+    budget, present, step, node_limit = limits
     num_sensors = place.shape[1]
     depths = num + 1
     size = np.zeros(depths, np.int64)

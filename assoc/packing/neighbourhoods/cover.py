@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.neighbourhoods.insertion import _add_greedily, _improve, penalised
+from assoc.packing.branching.feasibility import first_solution
+from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
@@ -39,7 +40,7 @@ class Cover:
     def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
         """Return the cover of columns that share no row."""
         cover = cls.empty(packing)
-        own(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
+        own_all(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
         return cover
 
     def columns(self) -> NDArray[np.int32]:
@@ -50,24 +51,21 @@ class Cover:
     @property
     def weight(self) -> float:
         """Total weight of the chosen columns."""
-        return float(self.packing.weights[self.columns()].sum())
+        return weight_of(self.packing, self.owner)
 
     @property
-    def complete_already(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all rows without slack are covered."""
-        return not bool((self.owner[~self.packing.slack] < 0).any())
+        return is_complete(self.packing, self.owner)
 
     def add_greedily(self, order: NDArray[np.integer]) -> None:
         """Add columns in the given order while they fit; with slack only those of negative weight."""
-        packing = self.packing
-        _add_greedily(packing.cols, packing.weights, packing.slack, order, self.owner)
+        add_greedily(self.packing.arrays, order, self.owner)
 
     def improve(self, deadline: float = np.inf) -> None:
         """Insert with ejection until no insertion improves or time is over (clock.py)."""
-        packing = self.packing
-        weights = packing.weights if not packing.is_axial else penalised(packing)
-        rows = np.arange(packing.num_rows, dtype=np.int32)
-        _improve(packing.cols, weights, packing.row_ptr, packing.row_cols, self.owner, rows, deadline)
+        rows = np.arange(self.packing.num_rows, dtype=np.int32)
+        insert_and_eject(search_arrays(self.packing), self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
         """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
@@ -77,14 +75,12 @@ class Cover:
         InfeasibleError
             Never; the caller knows the problem's words for it.
         """
-        if self.complete_already:
+        if self.is_complete:
             return True
         # a moment beyond the time, if need be: most dead ends are left in less, and there is nothing else to return
         self.improve(max(run.deadline(), time.monotonic() + _GRACE))
-        if self.complete_already:
+        if self.is_complete:
             return True
-        from assoc.packing.branching.feasibility import first_solution
-
         columns = first_solution(self.packing, run)
         if columns is None:
             return False
@@ -92,13 +88,29 @@ class Cover:
         return True
 
 
+def weight_of(packing: Packing, owner: NDArray[np.int32]) -> float:
+    """Return the weight of a cover."""
+    return float(packing.weights[chosen_columns(packing.cols, owner)].sum())
+
+
+def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:
+    """Return whether a cover covers all rows without slack."""
+    return not bool((owner[~packing.slack] < 0).any())
+
+
 @njit
-def own(cols: Any, columns: Any, owner: Any) -> None:
+def own(cols: Any, j: int, owner: Any) -> None:
+    """Make column j the owner of its rows."""
+    for s in range(cols.shape[1]):
+        if cols[j, s] >= 0:
+            owner[cols[j, s]] = j
+
+
+@njit
+def own_all(cols: Any, columns: Any, owner: Any) -> None:
     """Make these columns the owners of their rows."""
     for j in columns:
-        for s in range(cols.shape[1]):
-            if cols[j, s] >= 0:
-                owner[cols[j, s]] = j
+        own(cols, j, owner)
 
 
 @njit

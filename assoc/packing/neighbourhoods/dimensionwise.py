@@ -2,7 +2,7 @@
 
 Every chosen tuple falls into two halves, one for each part of the sensors; a free measurement is a half of
 its own. Which halves belong together at the least cost is a two-dimensional assignment over the listed
-tuples (assignment2d.py). A half may stay alone: as the tuple that it is, where that is listed, or broken up
+tuples (kernels/matching.py). A half may stay alone: as the tuple that it is, where that is listed, or broken up
 into false alarms. Over all splits (one sensor against the others for S = 3, all 2^(S-1) - 1 bipartitions
 for S up to 6) until none improves.
 
@@ -22,10 +22,35 @@ from numpy.typing import NDArray
 from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.bounds.priced import Priced
+from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.packing import Packing
+from assoc.packing.neighbourhoods.cover import own, weight_of
+from assoc.packing.packing import Packing, PackingArrays
 
 _MOST_SPLITS_FOR = 6
+# rounds
+_NO_LIMIT = int(np.iinfo(np.int64).max)
+
+
+class Dimensionwise:
+    """The dimensionwise search of one component: every try goes on until no split improves."""
+
+    def __init__(self, priced: Priced) -> None:
+        self._splits = splits(priced.packing.cols.shape[1])
+
+    def improve(
+        self,
+        priced: Priced,
+        owner: NDArray[np.int32],
+        weight: float,
+        rng: np.random.Generator,
+        tries: int,
+        deadline: float = np.inf,
+    ) -> float:
+        """Improve a complete cover of this weight in place; return its weight then."""
+        _improve(priced.packing.arrays, owner, self._splits, _NO_LIMIT, deadline)
+        return weight_of(priced.packing, owner)
 
 
 def improve(
@@ -57,20 +82,11 @@ def improve(
     float
         The change of total weight (<= 0), by ``weights``.
     """
-    used = packing.weights if weights is None else np.ascontiguousarray(weights, dtype=np.float64)
-    return float(
-        _improve(
-            packing.cols,
-            used,
-            packing.slack,
-            packing.row_ptr,
-            packing.row_cols,
-            owner,
-            splits(packing.cols.shape[1]),
-            np.iinfo(np.int64).max if rounds is None else rounds,
-            deadline,
-        )
-    )
+    arrays = packing.arrays
+    if weights is not None:
+        arrays = arrays._replace(weights=np.ascontiguousarray(weights, dtype=np.float64))
+    most = _NO_LIMIT if rounds is None else rounds
+    return float(_improve(arrays, owner, splits(packing.cols.shape[1]), most, deadline))
 
 
 def splits(num_sensors: int) -> NDArray[np.int64]:
@@ -82,17 +98,9 @@ def splits(num_sensors: int) -> NDArray[np.int64]:
 
 
 @njit
-def _improve(
-    cols: Any,
-    weights: Floats,
-    slack: Any,
-    row_ptr: Any,
-    row_cols: Any,
-    owner: Any,
-    masks: Any,
-    rounds: int,
-    deadline: float,
-) -> float:
+def _improve(packing: PackingArrays, owner: Any, masks: Any, rounds: int, deadline: float) -> float:
+    """Re-match by one split after the other; the change of weight."""
+    cols, slack, row_ptr, row_cols = packing.cols, packing.slack, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
     sensor = np.zeros(owner.size, np.int64)
     for r in range(owner.size):
@@ -113,7 +121,7 @@ def _improve(
         mask = masks[at]
         if must & mask == 0:
             mask = everything & ~mask
-        change = _rematch(cols, weights, slack, row_ptr, row_cols, owner, sensor, mask)
+        change = _rematch(packing, owner, sensor, mask)
         total += change
         quiet = 1 if change < 0.0 else quiet + 1
         at = (at + 1) % masks.size
@@ -173,10 +181,10 @@ def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> 
 
 
 @njit
-def _rematch(
-    cols: Any, weights: Floats, slack: Any, row_ptr: Any, row_cols: Any, owner: Any, sensor: Any, mask: int
-) -> float:
+def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> float:
     """Re-match the halves of one split; returns the change of weight (0: nothing better)."""
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
+    row_ptr, row_cols = packing.row_ptr, packing.row_cols
     num_rows = owner.size
     half = np.empty(num_rows, np.int64)
     left_size, left_first = np.empty(num_rows, np.int64), np.empty(num_rows, np.int64)
@@ -238,7 +246,7 @@ def _rematch(
     before = 0.0
     for r in range(num_rows):
         k = owner[r]
-        if k >= 0 and _leads(cols, k, r):
+        if k >= 0 and first_row(cols, k) == r:
             before += weights[k]
     row_edge = np.empty(num_left, np.int64)
     u, v = np.empty(num_left), np.empty(num_right)
@@ -252,25 +260,10 @@ def _rematch(
         e = row_edge[p]
         if e >= 0:
             taken[indices[e]] = True
-            _put(cols, owner, column[e])
+            own(cols, column[e], owner)
         elif left_column[p] >= 0:
-            _put(cols, owner, left_column[p])
+            own(cols, left_column[p], owner)
     for q in range(num_right):
         if not taken[q] and right_column[q] >= 0:
-            _put(cols, owner, right_column[q])
+            own(cols, right_column[q], owner)
     return after - before
-
-
-@njit
-def _leads(cols: Any, k: int, r: int) -> bool:
-    for s in range(cols.shape[1]):
-        if cols[k, s] >= 0:
-            return cols[k, s] == r
-    return False
-
-
-@njit
-def _put(cols: Any, owner: Any, j: int) -> None:
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0:
-            owner[cols[j, s]] = j

@@ -17,20 +17,22 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.packing import Packing
+from assoc.packing.packing import Packing, PackingArrays
 
 # columns looked at between two looks at the clock: about a millisecond
 _LOOK = 50_000
 
 
-def penalised(packing: Packing) -> Floats:
-    """Return weights with a penalty taken off for every row without slack that a column covers."""
-    return np.asarray(penalised_weights(packing.cols, packing.weights, packing.slack))
+def search_arrays(packing: Packing) -> PackingArrays:
+    """Return the packing with the weights to search by: where rows must be covered, penalised ones."""
+    arrays = packing.arrays
+    return arrays._replace(weights=penalised(arrays)) if packing.is_axial else arrays
 
 
 @njit
-def penalised_weights(cols: Any, weights: Floats, slack: Any) -> Floats:
-    """The same from arrays."""
+def penalised(packing: PackingArrays) -> Floats:
+    """Weights with a penalty taken off for every row without slack that a column covers."""
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
     widest = 0.0
     for weight in weights:
         widest = max(widest, abs(weight))
@@ -44,7 +46,9 @@ def penalised_weights(cols: Any, weights: Floats, slack: Any) -> Floats:
 
 
 @njit
-def _add_greedily(cols: Any, weights: Floats, slack: Any, order: Any, owner: Any) -> None:
+def add_greedily(packing: PackingArrays, order: Any, owner: Any) -> None:
+    """Add columns in the given order while they fit; those of rows with slack alone only at negative weight."""
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
     num_sensors = cols.shape[1]
     for j in order:
         fits = True
@@ -104,10 +108,9 @@ def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int
 
 
 @njit
-def _improve(
-    cols: Any, weights: Floats, row_ptr: Any, row_cols: Any, owner: Any, rows: Any, deadline: float
-) -> float:
+def insert_and_eject(packing: PackingArrays, owner: Any, rows: Any, deadline: float) -> float:
     """Insert with ejection around ``rows`` and all rows that change, until time is over; the sum of the gains."""
+    cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
     queue = np.empty(owner.size, np.int32)
     waiting = np.zeros(owner.size, np.bool_)

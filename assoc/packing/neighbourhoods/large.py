@@ -1,8 +1,8 @@
 """Large neighbourhoods: most rows of a solution are set free at random and covered anew, to the optimum.
 
-Cluster search (cluster_search.py) solves what lies close together; what stands between a good solution and the
-optimum is often a chain of exchanges across the whole part. Here the columns of a random choice of rows stay, the
-others go, and branch and bound (branch_and_bound.py) looks for a cover of the free rows that is lighter than the
+Cluster search (cluster.py) solves what lies close together; what stands between a good solution and the
+optimum is often a chain of exchanges across the whole component. Here the columns of a random choice of rows stay, the
+others go, and branch and bound (branching/search.py) looks for a cover of the free rows that is lighter than the
 one they had. Only columns whose reduced cost is below the solution's excess over the bound come into question; with
 good multipliers most tries end at the root. The share of rows set free grows while tries end early, and shrinks
 when they do not end at all.
@@ -15,54 +15,77 @@ P. Shaw, "Using constraint programming and local search methods to solve vehicle
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
+from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.search import Search
-from assoc.packing.neighbourhoods.cover import chosen_columns, own
+from assoc.packing.neighbourhoods.cover import chosen_columns, own_all, weight_of
 from assoc.packing.packing import assemble
-
-if TYPE_CHECKING:
-    from assoc.packing.components.component import Part
 
 # shares of the rows that are set free: at first, at the least and at the most (all would be an exact solver)
 _START, _LEAST, _MOST = 0.5, 0.2, 0.92
 # nodes of one try, and those up to which it was easy
 _NODES, _EASY = 50, 5
+# tries on one cover: then only another one helps
+_TRIES = 300
 
 
 class LargeNeighbourhood:
-    """Tries on the solutions of one part, and the share of rows that suits it."""
+    """Tries on the best covers of one component, and the share of rows that suits it."""
 
-    def __init__(self) -> None:
+    def __init__(self, priced: Priced) -> None:
         self.share = _START
+        self._tried = 0
+        self._weight = np.inf
 
-    def improve(self, part: Part, owner: NDArray[np.int32], weight: float, rng: np.random.Generator) -> float:
-        """Try once to improve a complete cover of this weight in place; return the change of its weight (<= 0)."""
-        packing = part.packing
-        limit = max(weight - part.bound, 0.0)
+    def improve(
+        self,
+        priced: Priced,
+        owner: NDArray[np.int32],
+        weight: float,
+        rng: np.random.Generator,
+        tries: int,
+        deadline: float = np.inf,
+    ) -> float:
+        """Try to improve a complete cover of this weight in place; return its weight then."""
+        for _ in range(tries):
+            if weight < self._weight:
+                self._weight, self._tried = weight, 0
+            if self._tried < _TRIES:
+                self._tried += 1
+                if self._try(priced, owner, weight, rng, deadline):
+                    weight = weight_of(priced.packing, owner)
+        return weight
+
+    def _try(
+        self, priced: Priced, owner: NDArray[np.int32], weight: float, rng: np.random.Generator, deadline: float
+    ) -> bool:
+        """Set rows free and cover them anew; whether something lighter was found."""
+        packing = priced.packing
+        limit = max(weight - priced.bound, 0.0)
         free = _set_free(packing.cols, owner, rng.permutation(packing.num_rows), self.share)
-        inside = np.flatnonzero(_inside(packing.cols, part.reduced, free, limit)).astype(np.int32)
+        inside = np.flatnonzero(_inside(packing.cols, priced.reduced, free, limit)).astype(np.int32)
         # rows that are not free are covered as they should be
         smaller = assemble(
             packing.cols[inside], packing.weights[inside], packing.slack | ~free, inside, packing.granularity
         )
         old = chosen_columns(packing.cols, np.where(free, owner, -1))
         before = float(packing.weights[old].sum())
-        search = Search(smaller, part.duals[smaller.row_origin], before, part.tolerance, part.deadline)
+        search = Search(smaller, priced.duals[smaller.row_origin], before, priced.tolerance, deadline)
         search.run(_NODES)
         if not search.done:
             self.share = max(self.share - 0.02, _LEAST)
         elif search.nodes <= _EASY:
             self.share = min(self.share + 0.005, _MOST)
         if search.columns is None:
-            return 0.0
+            return False
         owner[free] = -1
-        own(packing.cols, smaller.origin[search.columns], owner)
-        return search.weight - before
+        own_all(packing.cols, smaller.origin[search.columns], owner)
+        return True
 
 
 @njit

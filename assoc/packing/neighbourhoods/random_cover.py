@@ -1,8 +1,16 @@
-"""A random greedy cover: the walk that ants, breeding and tabu search share."""
+"""A random greedy cover: the walk that ants, breeding and tabu search share.
+
+Rows are visited in random order. For a row that is still uncovered a column is drawn among those that fit, and
+staying uncovered where the row has slack, with probability proportional to
+
+    tau_j^alpha exp(-beta 2^(ant mod 10) rc_j / T)
+
+with tau_j the pheromone, rc_j the reduced cost and T the temperature; the cover is then improved by insertion.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,57 +18,72 @@ from numpy.typing import NDArray
 from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.components.component import Part
-from assoc.packing.neighbourhoods.insertion import _improve
+from assoc.packing.bounds.priced import Prices
+from assoc.packing.kernels.columns import first_row, fits
+from assoc.packing.neighbourhoods.insertion import insert_and_eject
+from assoc.packing.packing import PackingArrays
 
 
-def random_cover(part: Part, weights: Floats, strictness: float, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Return a random greedy cover, as one ant builds it where no pheromone lies; the larger the stricter."""
-    packing = part.packing
-    owner, _ = walk(
-        packing.cols,
-        weights,
-        packing.slack,
-        packing.row_ptr,
-        packing.row_cols,
-        part.reduced,
-        part.duals,
-        np.ones(packing.num_columns),
-        np.ones(packing.num_rows),
-        1.0,
-        strictness,
-        part.temperature,
-        1,
-        rng,
-        part.deadline,
-    )
-    return owner
+class Trail(NamedTuple):
+    """What draws a walk.
+
+    Attributes
+    ----------
+    pheromone, slack_pheromone : float arrays, shapes (N,) and (R,)
+        Of the columns, and of leaving a row uncovered.
+    alpha, beta : float
+        Exponents of the pheromone and of the visibility.
+    temperature : float
+        Scale of the reduced costs that matter.
+    """
+
+    pheromone: Floats
+    slack_pheromone: Floats
+    alpha: float
+    beta: float
+    temperature: float
+
+
+def random_cover(
+    packing: PackingArrays,
+    prices: Prices,
+    strictness: float,
+    temperature: float,
+    rng: np.random.Generator,
+    deadline: float,
+) -> NDArray[np.int32]:
+    """Return a random greedy cover, as one ant builds it where no pheromone lies.
+
+    Parameters
+    ----------
+    packing : PackingArrays
+        One component, with the weights to search by.
+    prices : Prices
+    strictness : float
+        The larger, the more the reduced costs decide.
+    temperature : float
+        Scale of the reduced costs that matter.
+    rng : Generator
+    deadline : float
+        After this nothing is begun (clock.py).
+    """
+    trail = Trail(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
+    owner, _ = walk(packing, prices, trail, 1, rng, deadline)
+    return np.asarray(owner)
 
 
 @njit
-def walk(
-    cols: Any,
-    weights: Floats,
-    slack: Any,
-    row_ptr: Any,
-    row_cols: Any,
-    reduced: Floats,
-    duals: Floats,
-    pheromone: Floats,
-    slack_pheromone: Floats,
-    alpha: float,
-    beta: float,
-    temperature: float,
-    ants: int,
-    rng: Any,
-    deadline: float,
-) -> Any:
+def walk(packing: PackingArrays, prices: Prices, trail: Trail, ants: int, rng: Any, deadline: float) -> Any:
     """Let all ants build a cover and improve it by insertion, until time is over; the best one and its weight."""
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
+    row_ptr, row_cols = packing.row_ptr, packing.row_cols
+    reduced, duals = prices
+    alpha, beta, temperature = trail.alpha, trail.beta, trail.temperature
     num, num_sensors = cols.shape
     num_rows = slack.size
     value = np.empty(num)
-    trail = pheromone**alpha
-    slack_trail = slack_pheromone**alpha
+    trace = trail.pheromone**alpha
+    slack_trace = trail.slack_pheromone**alpha
     stay = np.zeros(num_rows)
     best = np.full(num_rows, -1, np.int32)
     best_weight = np.inf
@@ -75,10 +98,10 @@ def walk(
         strictness = beta * 2.0 ** (ant % 10) / temperature
         for j in range(num):
             power = strictness * reduced[j]
-            value[j] = trail[j] * np.exp(-power) if power < 40.0 else 0.0
+            value[j] = trace[j] * np.exp(-power) if power < 40.0 else 0.0
         for r in range(num_rows):
             if slack[r]:
-                stay[r] = slack_trail[r] * np.exp(strictness * min(duals[r], 0.0))
+                stay[r] = slack_trace[r] * np.exp(strictness * min(duals[r], 0.0))
         owner[:] = -1
         for i in range(num_rows - 1, 0, -1):
             k = rng.integers(0, i + 1)
@@ -108,26 +131,13 @@ def walk(
                 for s in range(num_sensors):
                     if cols[chosen, s] >= 0:
                         owner[cols[chosen, s]] = chosen
-        _improve(cols, weights, row_ptr, row_cols, owner, everything, deadline)
+        insert_and_eject(packing, owner, everything, deadline)
         weight = 0.0
         for r in range(num_rows):
             j = owner[r]
-            if j >= 0:
-                for s in range(num_sensors):
-                    if cols[j, s] >= 0:
-                        if cols[j, s] == r:
-                            weight += weights[j]
-                        break
+            if j >= 0 and first_row(cols, j) == r:
+                weight += weights[j]
         if weight < best_weight:
             best_weight = weight
             best[:] = owner
     return best, best_weight
-
-
-@njit
-def fits(cols: Any, owner: Any, j: int) -> bool:
-    """Whether all rows of column j are free."""
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0 and owner[cols[j, s]] >= 0:
-            return False
-    return True

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.components.component import Part, incomplete
-from assoc.packing.neighbourhoods.insertion import penalised
-from assoc.packing.neighbourhoods.random_cover import walk
+from assoc.packing.components.component import Component
+from assoc.packing.neighbourhoods.random_cover import Trail, walk
 
 if TYPE_CHECKING:
     from assoc.solvers.aco.parameters import AcoParameters
@@ -32,51 +31,32 @@ _RENEWAL = 15
 
 
 class Colony:
-    """The pheromone of one part and the ants that walk on it."""
+    """The pheromone of one component and the ants that walk on it."""
 
-    def __init__(self, part: Part, parameters: AcoParameters) -> None:
+    def __init__(self, component: Component, parameters: AcoParameters) -> None:
         self.parameters = parameters
-        self.pheromone = np.ones(part.packing.num_columns)
-        self.slack_pheromone = np.ones(part.packing.num_rows)
-        self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
+        self.pheromone = np.ones(component.packing.num_columns)
+        self.slack_pheromone = np.ones(component.packing.num_rows)
         # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
-        degree = part.packing.row_cols.size / max(part.packing.num_rows, 1)
+        degree = component.packing.row_cols.size / max(component.packing.num_rows, 1)
         self.lowest = 1.0 / (2.0 * max(degree, 1.0))
         # the best since the pheromone was laid anew
         self.recent: NDArray[np.int32] | None = None
         self.least = np.inf
-        if part.best is not None:
-            self._deposit(part.packing.cols, part.best, 1.0 - parameters.rho)
+        if component.best is not None:
+            self._deposit(component.packing.cols, component.best, 1.0 - parameters.rho)
 
-    def iterate(self, part: Part, rng: np.random.Generator) -> None:
+    def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One cycle: all ants walk, the best is improved, the pheromone evaporates and is laid."""
-        packing, p = part.packing, self.parameters
-        owner, _ = walk(
-            packing.cols,
-            self.weights,
-            packing.slack,
-            packing.row_ptr,
-            packing.row_cols,
-            part.reduced,
-            part.duals,
-            self.pheromone,
-            self.slack_pheromone,
-            p.alpha,
-            p.beta,
-            part.temperature,
-            p.ants,
-            rng,
-            part.deadline,
-        )
-        weight = part.polish(owner)
-        if weight - part.bound > part.tolerance:
-            weight += part.improve(owner, rng, p.clusters)
-        part.offer(owner, weight)
-        if weight < self.least and not incomplete(part, owner):
+        packing, p = component.packing, self.parameters
+        trail = Trail(self.pheromone, self.slack_pheromone, float(p.alpha), float(p.beta), component.temperature)
+        owner, _ = walk(component.arrays, component.prices, trail, p.ants, rng, component.deadline)
+        weight = component.settle(owner, rng, p.clusters)
+        if weight < self.least and component.is_complete(owner):
             self.recent, self.least = owner, weight
-        elite = self.recent if self.recent is not None and part.iterations % 3 == 2 else owner
+        elite = self.recent if self.recent is not None and component.iterations % 3 == 2 else owner
         self._deposit(packing.cols, elite, 1.0 - p.rho)
-        if part.stalled and part.stalled % _RENEWAL == 0:
+        if component.stalled and component.stalled % _RENEWAL == 0:
             self.pheromone[:] = 1.0
             self.slack_pheromone[:] = 1.0
             self.recent, self.least = None, np.inf

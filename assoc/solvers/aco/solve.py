@@ -24,11 +24,11 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
         from assoc.solvers.aco.paper import solve_as_in_the_paper
 
         return solve_as_in_the_paper(packing, parameters, run)
-    from assoc.packing.components.search import solve_by
+    from assoc.packing.components.search import search_components
     from assoc.solvers.aco.max_min import Colony
 
-    return solve_by(
-        lambda part, rng: Colony(part, parameters),
+    return search_components(
+        lambda component, rng: Colony(component, parameters),
         packing,
         run,
         parameters.iterations,

@@ -16,7 +16,7 @@ class ExactParameters(Parameters):
     nodes : int
         Nodes of branch and bound at the most; what is then open keeps its gap.
     patience : int
-        Iterations of tabu search without improvement on an open part, for every 60 measurements, before
+        Iterations of tabu search without improvement on an open component, for every 60 measurements, before
         branching starts; while it is branched on, one more iteration follows every three turns.
     """
 

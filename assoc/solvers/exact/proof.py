@@ -1,4 +1,4 @@
-"""The exact solver's course: reduce, improve, fix, and search the open parts in turns until all are proved."""
+"""The exact solver's course: reduce, improve, fix, and search the open components in turns until all are proved."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.branching.search import Search
-from assoc.packing.components.component import Part
-from assoc.packing.components.search import complete
-from assoc.packing.components.splitting import split_part
-from assoc.packing.neighbourhoods.cover import Cover, chosen_columns
+from assoc.packing.components.component import Component
+from assoc.packing.components.search import complete_greedily
+from assoc.packing.components.splitting import split_component
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
@@ -25,14 +25,14 @@ from assoc.solvers.tabu.parameters import TabuParameters
 _LARGE = 30
 _MANY = 90
 _TURNS = 3
-# columns up to which a part is branched on before anything else, and for how many nodes
+# columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 400
 _SHORT = 50
 
 
 @dataclass(slots=True)
 class _Task:
-    part: Part
+    component: Component
     search: Search | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
@@ -40,39 +40,39 @@ class _Task:
 
     @property
     def bound(self) -> float:
-        part = self.part
-        if part.closed and part.packing.granularity:
-            return part.weight
-        bound = part.bound if self.search is None else max(part.bound, self.search.lower_bound)
-        return min(bound, part.weight)
+        component = self.component
+        if component.closed and component.packing.granularity:
+            return component.weight
+        bound = component.bound if self.search is None else max(component.bound, self.search.lower_bound)
+        return min(bound, component.weight)
 
     def take_over(self) -> bool:
-        """Take the branching's incumbent where it is better than the part's; whether it was."""
-        search, part = self.search, self.part
-        if search is None or search.columns is None or search.weight >= part.weight:
+        """Take the branching's incumbent where it is better than the component's; whether it was."""
+        search, component = self.search, self.component
+        if search is None or search.columns is None or search.weight >= component.weight:
             return False
-        part.weight = search.weight
-        part.best = Cover.of(part.packing, search.columns).owner
+        component.weight = search.weight
+        component.best = Cover.of(component.packing, search.columns).owner
         return True
 
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
     reduction = Reduction(packing, run)
-    parts = reduction.reduce()
+    components = reduction.reduce()
     tasks: list[_Task] = []
     settled: list[_Task] = []
     nodes = 0
     deadline = run.deadline()
-    for part in parts:
-        part.deadline = deadline
-        task = _branch_shortly(part, min(_SHORT, node_limit - nodes), run)
+    for component in components:
+        component.deadline = deadline
+        task = _branch_shortly(component, min(_SHORT, node_limit - nodes), run)
         if task.search is not None:
             nodes += task.search.nodes
-        if part.closed or (task.search is not None and task.search.done):
+        if component.closed or (task.search is not None and task.search.done):
             settled.append(task)
         else:
-            tasks.extend(_Task(piece) for piece in _sharpen(part, run))
+            tasks.extend(_Task(one) for one in _sharpen(component, run))
     columns = reduction.closed_columns
     weight, bound = reduction.closed_weight, reduction.closed_bound
     _record(run, nodes, weight, bound, settled + tasks)
@@ -80,81 +80,85 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     short = False
     while tasks:
         task = tasks.pop(0)
-        part = task.part
-        if not part.closed and not run.should_stop() and nodes < node_limit:
+        component = task.component
+        if not component.closed and not run.should_stop() and nodes < node_limit:
             if task.search is None:
-                task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
-                part.stalled = 0
+                task.search = _branching(component, run)
+                component.stalled = 0
             before = task.search.nodes
             # some ten milliseconds of work between two looks at the clock
-            task.search.run(min(max(1, 20_000 // max(part.packing.num_columns, 1)), node_limit - nodes))
+            task.search.run(min(max(1, 20_000 // max(component.packing.num_columns, 1)), node_limit - nodes))
             nodes += task.search.nodes - before
             better = task.take_over()
             if not task.search.done:
                 task.turns += 1
                 # as long as they improve it, metaheuristics get half the time; then less and less
-                if task.turns >= _TURNS * min(1 + part.stalled // 5, 5):
+                if task.turns >= _TURNS * min(1 + component.stalled // 5, 5):
                     task.turns = 0
                     if _search_better(task, run):
-                        task.search.weight = part.weight
+                        task.search.weight = component.weight
                         better = True
-                # a better incumbent rules columns out, and what falls apart is searched part by part: in one search
-                # the nodes of independent parts multiply
-                pieces = split_part(part) if better else None
-                tasks.extend([task] if pieces is None else [_Task(piece) for piece in pieces])
+                # a better incumbent rules columns out, and what falls apart is searched component by component:
+                # in one search the nodes of independent components multiply
+                smaller = split_component(component) if better else None
+                tasks.extend([task] if smaller is None else [_Task(one) for one in smaller])
                 if better:
                     _record(run, nodes, weight, bound, tasks)
                 continue
             if better:
                 _record(run, nodes, weight, bound, [task, *tasks])
-        if part.best is None:
+        if component.best is None:
             if task.search is not None and task.search.done and not task.search.out_of_memory:
-                raise infeasible(part.packing)
-            complete(part, run)
-        assert part.best is not None
+                raise infeasible(component.packing)
+            complete_greedily(component, run)
+        assert component.best is not None
         short = short or (task.search is not None and task.search.out_of_memory)
-        columns.append(part.origin[chosen_columns(part.packing.cols, part.best)])
-        weight += part.weight
+        columns.append(component.origin[component.best_columns()])
+        weight += component.weight
         bound += task.bound
     if (short or nodes >= node_limit) and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if short else "iterations"
     _record(run, nodes, weight, bound, [])
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    return Outcome(chosen, nodes, bound, None if parts else reduction.proof)
+    return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branch_shortly(part: Part, nodes: int, run: Run) -> _Task:
-    """Branch at once: a small part is mostly done before its bound could be made any better."""
-    task = _Task(part)
-    if part.closed or part.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
+def _branching(component: Component, run: Run) -> Search:
+    return Search(component.packing, component.duals, component.weight, component.tolerance, run.deadline())
+
+
+def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
+    """Branch at once: a small component is mostly done before its bound could be made any better."""
+    task = _Task(component)
+    if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
+    task.search = _branching(component, run)
     task.search.run(nodes)
     task.take_over()
     return task
 
 
-def _sharpen(part: Part, run: Run) -> list[Part]:
-    """Ascend anew, with time enough at every temperature, on a part that the reduction left open."""
-    part.take_over(dual_bound(part.packing, run=run))
-    if not part.closed and not run.should_stop():
-        part.sharpen(run)
-    return (None if part.closed else split_part(part, share=0.9)) or [part]
+def _sharpen(component: Component, run: Run) -> list[Component]:
+    """Ascend anew, with time enough at every temperature, on a component that the reduction left open."""
+    component.take_over(dual_bound(component.packing, run=run))
+    if not component.closed and not run.should_stop():
+        component.sharpen(run)
+    return (None if component.closed else split_component(component, share=0.9)) or [component]
 
 
 def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
-    """Bring the incumbents of open parts near the optimum before any branching, and split what that allows."""
+    """Bring the incumbents of open components near the optimum before any branching, and split what that allows."""
     result: list[_Task] = []
     queue = [(task, 0) for task in tasks]
     while queue:
         task, stalled = queue.pop(0)
-        part = task.part
-        # small parts are branched at once, and without an incumbent there is nothing to improve
+        component = task.component
+        # small components are branched at once, and without an incumbent there is nothing to improve
         if (
-            part.closed
-            or part.best is None
-            or part.packing.num_rows < _LARGE
-            or stalled * 60 >= patience * part.packing.num_rows
+            component.closed
+            or component.best is None
+            or component.packing.num_rows < _LARGE
+            or stalled * 60 >= patience * component.packing.num_rows
         ):
             result.append(task)
             continue
@@ -162,16 +166,16 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
             result.append(task)
             continue
         stalled = 0 if _search_better(task, run) else stalled + 1
-        pieces = split_part(part) if stalled == 0 else None
-        if pieces is None:
+        smaller = split_component(component) if stalled == 0 else None
+        if smaller is None:
             queue.append((task, stalled))
         else:
-            queue.extend((_Task(piece), 0) for piece in pieces)
+            queue.extend((_Task(one), 0) for one in smaller)
     # whatever the patience, branching should start on as few columns as the incumbents allow
     split: list[_Task] = []
     for task in result:
-        pieces = None if task.part.closed else split_part(task.part, share=0.9)
-        split.extend([task] if pieces is None else [_Task(piece) for piece in pieces])
+        smaller = None if task.component.closed else split_component(task.component, share=0.9)
+        split.extend([task] if smaller is None else [_Task(one) for one in smaller])
     return split
 
 
@@ -180,20 +184,20 @@ def _search_better(task: _Task, run: Run) -> bool:
 
     Tabu search and breeding take turns: they get stuck in different places.
     """
-    part = task.part
-    if part.best is None or part.packing.num_rows < _LARGE:
+    component = task.component
+    if component.best is None or component.packing.num_rows < _LARGE:
         return False
     if task.heuristics is None:
-        task.heuristics = TabuSearch(part, TabuParameters()), Breeding(part, GeneticParameters())
-    before = part.weight
-    # small parts are branched sooner than a population is bred: most of them end there at once
-    turn = task.improvements % 2 if task.search is not None or part.packing.num_rows >= _MANY else 0
-    task.heuristics[turn].iterate(part, run.rng)
+        task.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+    before = component.weight
+    # small components are branched sooner than a population is bred: most of them end there at once
+    turn = task.improvements % 2 if task.search is not None or component.packing.num_rows >= _MANY else 0
+    task.heuristics[turn].iterate(component, run.rng)
     task.improvements += 1
-    part.refine(run, TabuParameters.clusters)
-    part.stalled = 0 if part.weight < before - part.tolerance else part.stalled + 1
-    return part.stalled == 0
+    component.refine(run, TabuParameters.clusters)
+    component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
+    return component.stalled == 0
 
 
 def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:
-    run.record(nodes, weight + sum(task.part.weight for task in tasks), bound + sum(task.bound for task in tasks))
+    run.record(nodes, weight + sum(task.component.weight for task in tasks), bound + sum(task.bound for task in tasks))

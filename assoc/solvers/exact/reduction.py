@@ -10,7 +10,7 @@ which comes back now and then for a look at the clock.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,24 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.bounds import dual_ascent
-from assoc.packing.bounds.dual_ascent import _component_bounds, _hard_sweeps, _reduced_costs, _smooth_passes, _spread
-from assoc.packing.components.component import TOLERANCE, Part
+from assoc.packing.bounds.dual_ascent import (
+    COOLING,
+    START,
+    SmoothPoint,
+    bounds_by_component,
+    certified_bound,
+    fill_reduced,
+    hard_pass,
+    hard_sweeps,
+    smooth_passes,
+    spread,
+)
+from assoc.packing.bounds.priced import TOLERANCE
+from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_components
-from assoc.packing.neighbourhoods.insertion import _add_greedily, _improve, penalised_weights
-from assoc.packing.packing import Packing, _assemble, _find
+from assoc.packing.kernels.columns import first_row
+from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
+from assoc.packing.packing import Packing, PackingArrays, assembled, find
 from assoc.packing.run import Run
 
 # passes at one temperature; the last temperatures get more, because by then few columns are left
@@ -32,6 +44,63 @@ _PASSES = np.array([10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
 _VISITS = 3_000_000
 # classes of reduced cost, by which columns are sorted before rounding
 _CLASSES = 256
+
+
+class _State(NamedTuple):
+    """What is still open: its packing, and where that comes from in the whole.
+
+    Attributes
+    ----------
+    packing : PackingArrays
+    origin, rows : int32 arrays, shapes (N,) and (R,)
+        Columns and rows of the whole.
+    smooth, hard : float arrays, shape (R,)
+        Multipliers of the smoothed ascent, and the feasible ones of the best bounds.
+    owner : int32 array, shape (R,)
+        The best cover of each component that has one.
+    weight, bound, temperature : float arrays, shape (C,)
+        Of each component: weight of its best cover (``inf``: none), best bound, temperature.
+    """
+
+    packing: PackingArrays
+    origin: Any
+    rows: Any
+    smooth: Any
+    hard: Any
+    owner: Any
+    weight: Any
+    bound: Any
+    temperature: Any
+
+
+class _Closed(NamedTuple):
+    """What is done, filled as it comes.
+
+    Attributes
+    ----------
+    counts : int64 array, shape (3,)
+        Temperatures done, closed columns, closed components.
+    columns : int64 array
+        Optimal columns of the whole.
+    values : float array, shape (R, 2)
+        Bound and weight of each closed component.
+    proof : float array, shape (R,)
+        Multipliers of all rows of the whole.
+    """
+
+    counts: Any
+    columns: Any
+    values: Any
+    proof: Any
+
+
+class _Incumbent(NamedTuple):
+    """Best bounds and covers: ``bound`` (C,), ``duals`` (R,), ``owner`` (R,), ``weight`` (C,)."""
+
+    bound: Any
+    duals: Any
+    owner: Any
+    weight: Any
 
 
 class Reduction:
@@ -62,94 +131,81 @@ class Reduction:
         on small problems mostly without loss.
         """
         duals = self._proof.copy()
-        dual_ascent.hard_pass(self._whole, duals, np.empty(self._whole.num_columns), 2)
-        loss = self.closed_bound - dual_ascent.certified_bound(self._whole, duals)
+        hard_pass(self._whole, duals, np.empty(self._whole.num_columns), 2)
+        loss = self.closed_bound - certified_bound(self._whole, duals)
         return duals if loss <= TOLERANCE * max(1.0, abs(self.closed_bound)) else None
 
-    def reduce(self) -> list[Part]:
-        """Run through all temperatures; return the parts that are still open."""
-        whole = self._whole
-        num = whole.num_rows
-        columns, closed = np.empty(num, dtype=np.int64), np.empty((num, 2))
+    def reduce(self) -> list[Component]:
+        """Run through all temperatures; return the components that are still open."""
+        num, granularity = self._whole.num_rows, self._whole.granularity
         counts = np.zeros(3, dtype=np.int64)
-        state: Any = _start(
-            whole.cols, whole.weights, whole.slack, whole.col_start, whole.row_start, whole.row_ptr, whole.row_cols
-        )
-        while counts[0] < _PASSES.size and state[1].size and not self._run.should_stop():
-            state = _reduce(
-                *state, _PASSES, counts, columns, closed, self._proof, TOLERANCE, whole.granularity, _VISITS,
-                self._run.deadline(),
-            )  # fmt: skip
-        self.closed_columns.append(columns[: counts[1]])
-        self.closed_bound = math.fsum(closed[: counts[2], 0])
-        self.closed_weight = math.fsum(closed[: counts[2], 1])
-        return self._open_parts(*state) if state[2].size else []
+        closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
+        state: _State = _start(self._whole.arrays)
+        while counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
+            state = _reduce(state, closed, _PASSES, TOLERANCE, granularity, _VISITS, self._run.deadline())
+        self.closed_columns.append(closed.columns[: counts[1]])
+        self.closed_bound = math.fsum(closed.values[: counts[2], 0])
+        self.closed_weight = math.fsum(closed.values[: counts[2], 1])
+        return self._open_components(state) if state.packing.slack.size else []
 
-    def _open_parts(
-        self, cols: Any, weights: Any, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,
-        origin: Any, rows: Any, smooth: Any, hard: Any, owner: Any, weight: Any, bound: Any, temperature: Any,
-    ) -> list[Part]:  # fmt: skip
-        packing = Packing(
-            cols, weights, slack, col_start, row_start, row_ptr, row_cols, origin, rows, self._whole.granularity
-        )
-        parts = split_components(packing, hard, origin.astype(np.int64))
-        for c, part in enumerate(parts):
-            if np.isfinite(weight[c]):
-                own = owner[row_start[c] : row_start[c + 1]]
-                part.best = np.where(own >= 0, own - col_start[c], -1).astype(np.int32)
-                part.weight = float(weight[c])
-            part.bound = max(part.bound, float(bound[c]))
-        self._proof[rows] = hard
-        return parts
+    def _open_components(self, state: _State) -> list[Component]:
+        packing = Packing(*state.packing, state.origin, state.rows, self._whole.granularity)
+        components = split_components(packing, state.hard, state.origin.astype(np.int64))
+        for c, component in enumerate(components):
+            if np.isfinite(state.weight[c]):
+                own = state.owner[packing.row_start[c] : packing.row_start[c + 1]]
+                component.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
+                component.weight = float(state.weight[c])
+            component.bound = max(component.bound, float(state.bound[c]))
+        self._proof[state.rows] = state.hard
+        return components
 
 
 @njit
-def _start(cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any) -> Any:
+def _start(packing: PackingArrays) -> _State:
     """The state of the reduction at its start."""
-    num, num_rows, parts = weights.size, slack.size, col_start.size - 1
+    num, num_rows, num_components = packing.weights.size, packing.slack.size, packing.col_start.size - 1
     smooth = np.zeros(num_rows)
     reduced = np.empty(num)
-    _reduced_costs(cols, weights, smooth, reduced)
-    _hard_sweeps(slack, row_ptr, row_cols, smooth, reduced, 1)
-    temperature = _spread(weights, slack, col_start, row_start) * dual_ascent.START
-    return (
-        cols, weights, slack, col_start, row_start, row_ptr, row_cols,
-        np.arange(num).astype(np.int32), np.arange(num_rows).astype(np.int32), smooth, smooth.copy(),
-        np.full(num_rows, -1, np.int32), np.full(parts, np.inf), np.full(parts, -np.inf), temperature,
-    )  # fmt: skip
+    fill_reduced(packing, smooth, reduced)
+    hard_sweeps(packing, smooth, reduced, 1)
+    return _State(
+        packing,
+        np.arange(num).astype(np.int32),
+        np.arange(num_rows).astype(np.int32),
+        smooth,
+        smooth.copy(),
+        np.full(num_rows, -1, np.int32),
+        np.full(num_components, np.inf),
+        np.full(num_components, -np.inf),
+        spread(packing) * START,
+    )
 
 
 @njit
 def _reduce(
-    cols: Any, weights: Floats, slack: Any, col_start: Any, row_start: Any, row_ptr: Any, row_cols: Any,
-    origin: Any, rows: Any, smooth: Floats, hard: Floats, owner: Any, weight: Floats, bound: Floats,
-    temperature: Floats, passes: Any, counts: Any, closed_columns: Any, closed: Floats, proof: Floats,
-    tolerance: float, granularity: float, most_visits: int, deadline: float,
-) -> Any:  # fmt: skip
-    """Go through temperatures until none is left, nothing is open or the visits are used up; the new state.
-
-    ``counts`` holds the temperatures done, the number of closed columns and that of closed components.
-    """
+    state: _State, done: _Closed, passes: Any, tolerance: float, granularity: float, most_visits: int, deadline: float
+) -> _State:
+    """Go through temperatures until none is left, nothing is open or the visits are used up; the new state."""
+    packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
+    counts, closed_columns, closed, proof = done
     visits = 0
-    while counts[0] < passes.size and weights.size > 0 and visits < most_visits:
-        reduced, primal, slack_primal = np.empty(weights.size), np.empty(weights.size), np.empty(slack.size)
-        visits += _smooth_passes(
-            cols, weights, slack, row_start, col_start, row_ptr, row_cols, smooth, reduced, primal, slack_primal,
-            temperature, passes[counts[0]], deadline,
-        )  # fmt: skip
+    while counts[0] < passes.size and packing.weights.size > 0 and visits < most_visits:
+        num, num_rows = packing.weights.size, packing.slack.size
+        reduced = np.empty(num)
+        point = SmoothPoint(smooth, reduced, np.empty(num), np.empty(num_rows))
+        visits += smooth_passes(packing, point, temperature, passes[counts[0]], deadline)
         # the first cover and the first bound are worth being late for
         if counts[0] > 0 and is_over(deadline):
             break
         duals = smooth.copy()
-        _reduced_costs(cols, weights, duals, reduced)
-        _hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2)
-        new_owner = _round(cols, weights, slack, col_start, row_ptr, row_cols, reduced, temperature, deadline)
-        keep, alive = _compare(
-            cols, weights, slack, col_start, row_start,
-            _component_bounds(cols, weights, slack, col_start, row_start, row_ptr, duals), duals, new_owner,
-            reduced, bound, hard, owner, weight, tolerance, granularity,
-        )  # fmt: skip
-        temperature = temperature * dual_ascent.COOLING
+        fill_reduced(packing, duals, reduced)
+        hard_sweeps(packing, duals, reduced, 2)
+        new_owner = _round(packing, reduced, temperature, deadline)
+        best = _Incumbent(bound, hard, owner, weight)
+        new = _Incumbent(bounds_by_component(packing, duals), duals, new_owner, _cover_weights(packing, new_owner))
+        keep, alive = _compare(packing, best, new, reduced, tolerance, granularity)
+        temperature = temperature * COOLING
         counts[0] += 1
         kept = 0
         for j in range(keep.size):
@@ -157,13 +213,14 @@ def _reduce(
         # assembling anew pays when much is gone; till then what is closed is closed again at every temperature
         if 3 * kept >= 2 * keep.size and counts[0] < passes.size:
             continue
+        row_start = packing.row_start
         for c in range(alive.size):
             if not alive[c]:
                 closed[counts[2]] = bound[c], weight[c]
                 counts[2] += 1
                 for r in range(row_start[c], row_start[c + 1]):
                     j = owner[r]
-                    if j >= 0 and _first_row(cols, j) == r:
+                    if j >= 0 and first_row(packing.cols, j) == r:
                         closed_columns[counts[1]] = origin[j]
                         counts[1] += 1
         # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
@@ -177,15 +234,16 @@ def _reduce(
                 chosen[kept] = j
                 kept += 1
         # rows without slack of components that are done have been covered: they leave as rows with slack do
-        free = slack.copy()
-        parent = np.empty(slack.size, np.int32)
+        free = packing.slack.copy()
+        parent = np.empty(num_rows, np.int32)
         for c in range(alive.size):
             parent[row_start[c] : row_start[c + 1]] = c
             if not alive[c]:
                 free[row_start[c] : row_start[c + 1]] = True
-        (cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row) = _assemble(
-            cols[chosen], weights[chosen], free, chosen
+        cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row = assembled(
+            packing.cols[chosen], packing.weights[chosen], free, chosen
         )
+        packing = PackingArrays(cols, weights, slack, col_start, row_start, row_ptr, row_cols)
         for j in range(column.size):
             place[column[j]] = j
         new_owner = np.empty(row.size, np.int32)
@@ -193,27 +251,22 @@ def _reduce(
             j = owner[row[r]]
             new_owner[r] = place[j] if j >= 0 else -1
         owner, smooth, hard, origin, rows = new_owner, smooth[row], hard[row], origin[column], rows[row]
-        # the parts of a component start from the same cover and the same multipliers
+        # what a component falls into starts from the same cover and the same multipliers
         first = parent[row[row_start[:-1]]]
         temperature = temperature[first]
-        new_weight = _cover_weights(weights, cols, row_start, owner)
+        new_weight = _cover_weights(packing, owner)
         for c in range(new_weight.size):
             if weight[first[c]] == np.inf:
                 new_weight[c] = np.inf
         weight = new_weight
-        bound = _component_bounds(cols, weights, slack, col_start, row_start, row_ptr, hard)
-    return (
-        cols, weights, slack, col_start, row_start, row_ptr, row_cols, origin, rows, smooth, hard, owner, weight,
-        bound, temperature,
-    )  # fmt: skip
+        bound = bounds_by_component(packing, hard)
+    return _State(packing, origin, rows, smooth, hard, owner, weight, bound, temperature)
 
 
 @njit
-def _round(
-    cols: Any, weights: Floats, slack: Any, col_start: Any, row_ptr: Any, row_cols: Any, reduced: Floats,
-    temperature: Floats, deadline: float,
-) -> Any:  # fmt: skip
+def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadline: float) -> Any:
     """A cover from the columns of small reduced cost, improved by insertion."""
+    weights, slack, col_start = packing.weights, packing.slack, packing.col_start
     # sorted by counting: classes of 1/64 temperature are fine enough, and ties stay in their order
     which = np.full(weights.size, _CLASSES, np.int32)
     start = np.zeros(_CLASSES + 1, np.int64)
@@ -232,7 +285,7 @@ def _round(
             order[start[which[j]]] = j
             start[which[j]] += 1
     owner = np.full(slack.size, -1, np.int32)
-    _add_greedily(cols, weights, slack, order, owner)
+    add_greedily(packing, order, owner)
     loose = np.flatnonzero(owner < 0).astype(np.int32)
     if loose.size > 0:
         axial = False
@@ -240,33 +293,34 @@ def _round(
             if not slack[r]:
                 axial = True
                 break
-        priced = penalised_weights(cols, weights, slack) if axial else weights
-        _improve(cols, priced, row_ptr, row_cols, owner, loose, deadline)
+        searched = PackingArrays(
+            packing.cols,
+            penalised(packing) if axial else weights,
+            slack,
+            col_start,
+            packing.row_start,
+            packing.row_ptr,
+            packing.row_cols,
+        )
+        insert_and_eject(searched, owner, loose, deadline)
     return owner
 
 
 @njit
-def _first_row(cols: Any, j: int) -> int:
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0:
-            return int(cols[j, s])
-    return -1
-
-
-@njit
-def _cover_weights(weights: Floats, cols: Any, row_start: Any, owner: Any) -> Floats:
+def _cover_weights(packing: PackingArrays, owner: Any) -> Floats:
     """Weight of the chosen columns of each component."""
+    cols, weights, row_start = packing.cols, packing.weights, packing.row_start
     result = np.zeros(row_start.size - 1)
     for c in range(result.size):
         for r in range(row_start[c], row_start[c + 1]):
             j = owner[r]
-            if j >= 0 and _first_row(cols, j) == r:
+            if j >= 0 and first_row(cols, j) == r:
                 result[c] += weights[j]
     return result
 
 
 @njit
-def _best_of_both(
+def best_of_both(
     cols: Any, weights: Floats, top: int, end: int, owner: Any, other: Any, parent: Any, gain: Floats
 ) -> float:  # fmt: skip
     """Take over from another complete cover of a component what is lighter there; the weight then.
@@ -279,44 +333,33 @@ def _best_of_both(
     for r in range(top, end):
         for j in (owner[r], other[r]):
             if j >= 0:
-                one, two = _find(parent, r), _find(parent, _first_row(cols, j))
+                one, two = find(parent, r), find(parent, first_row(cols, j))
                 parent[max(one, two)] = min(one, two)
     for r in range(top, end):
-        root = _find(parent, r)
-        if owner[r] >= 0 and _first_row(cols, owner[r]) == r:
+        root = find(parent, r)
+        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
             gain[root] += weights[owner[r]]
-        if other[r] >= 0 and _first_row(cols, other[r]) == r:
+        if other[r] >= 0 and first_row(cols, other[r]) == r:
             gain[root] -= weights[other[r]]
     total = 0.0
     for r in range(top, end):
-        root = _find(parent, r)
+        root = find(parent, r)
         if gain[root] > 0.0:
             owner[r] = other[r]
-        if owner[r] >= 0 and _first_row(cols, owner[r]) == r:
+        if owner[r] >= 0 and first_row(cols, owner[r]) == r:
             total += weights[owner[r]]
     return total
 
 
 @njit
 def _compare(
-    cols: Any,
-    weights: Floats,
-    slack: Any,
-    col_start: Any,
-    row_start: Any,
-    new_bound: Floats,
-    new_duals: Floats,
-    new_owner: Any,
-    reduced: Floats,
-    bound: Floats,
-    duals: Floats,
-    owner: Any,
-    weight: Floats,
-    tolerance: float,
-    granularity: float,
+    packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, tolerance: float, granularity: float
 ) -> Any:
     """Take over better bounds and covers; the columns worth keeping and the components still open."""
-    new_weight = _cover_weights(weights, cols, row_start, new_owner)
+    cols, weights, slack = packing.cols, packing.weights, packing.slack
+    col_start, row_start = packing.col_start, packing.row_start
+    bound, duals, owner, weight = best
+    new_bound, new_duals, new_owner, new_weight = new
     keep = np.zeros(weights.size, np.bool_)
     alive = np.ones(bound.size, np.bool_)
     parent, gain = np.empty(slack.size, np.int32), np.empty(slack.size)
@@ -328,7 +371,7 @@ def _compare(
                 complete = False
                 break
         if complete and weight[c] < np.inf:
-            weight[c] = _best_of_both(cols, weights, top, end, owner, new_owner, parent, gain)
+            weight[c] = best_of_both(cols, weights, top, end, owner, new_owner, parent, gain)
         elif complete:
             weight[c] = new_weight[c]
             owner[top:end] = new_owner[top:end]

@@ -35,8 +35,8 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
 def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
     """Close a gap that is small beside the weights but not beside the cost, which is their difference to the offset.
 
-    The parts were searched to 1e-9 of their weights. The incumbent is the optimum to that already, so that a search
-    which asks for more has little left to do.
+    The components were searched to 1e-9 of their weights. The incumbent is the optimum to that already, so that a
+    search which asks for more has little left to do.
     """
     last = run.trace[-1]
     wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(last.cost))

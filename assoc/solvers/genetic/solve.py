@@ -20,11 +20,11 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
     multi-sensor multi-target tracking, Mathematical and Computer Modelling 26 (1997), for the approach;
     crossover and local search are this package's own.
     """
-    from assoc.packing.components.search import solve_by
+    from assoc.packing.components.search import search_components
     from assoc.solvers.genetic.population import Breeding
 
-    return solve_by(
-        lambda part, rng: Breeding(part, parameters),
+    return search_components(
+        lambda component, rng: Breeding(component, parameters),
         packing,
         run,
         parameters.iterations,

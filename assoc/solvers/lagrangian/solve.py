@@ -158,22 +158,20 @@ class _Search:
 
     def polish(self) -> None:
         """Improve the best solution by cluster search, within the columns that are left."""
+        from assoc.packing.bounds.priced import Priced
         from assoc.packing.neighbourhoods.cluster import ClusterSearch
         from assoc.packing.neighbourhoods.cover import Cover
 
         if self.columns is None or self._gap_closed() or self.run.should_stop():
             return
-        search = ClusterSearch.of(self.packing, self.best)
+        search = ClusterSearch(Priced.of(self.packing, self.best))
+        search.size = _POLISH_TUPLES * self.packing.cols.shape[1]
         cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.place, self.columns)))
         for _ in range(_POLISH_ROUNDS):
             if self.run.should_stop():
                 return
-            change, _ = search.run(
-                cover.owner,
-                self.run.rng,
-                _POLISH_STEPS,
-                _POLISH_TUPLES * self.packing.cols.shape[1],
-                deadline=self.run.deadline(),
+            change, _ = search.search(
+                self.packing.arrays, cover.owner, self.run.rng, _POLISH_STEPS, self.run.deadline()
             )
             if change == 0.0:
                 return

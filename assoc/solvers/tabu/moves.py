@@ -7,18 +7,19 @@ would lead to a solution better than the best (aspiration). Rows that a move lea
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import njit
-from assoc._types import Floats
-from assoc.packing.components.component import Part, incomplete
+from assoc.packing.components.component import NEIGHBOURHOODS, Component
+from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.neighbourhoods.cover import Cover
-from assoc.packing.neighbourhoods.insertion import insert, insertion_gain, penalised
+from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
 from assoc.packing.neighbourhoods.random_cover import random_cover
+from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
     from assoc.solvers.tabu.parameters import TabuParameters
@@ -30,114 +31,95 @@ _FRESH = 3
 _COVERS = 12
 
 
-class TabuSearch:
-    """The current solution of one part and its tabu list."""
+class _Rules(NamedTuple):
+    """Moves done before, moves to do, tenure, and the column that is forced in first (-1: none)."""
 
-    def __init__(self, part: Part, parameters: TabuParameters) -> None:
+    clock: int
+    moves: int
+    tenure: int
+    forced: int
+
+
+class TabuSearch:
+    """The current solution of one component and its tabu list."""
+
+    def __init__(self, component: Component, parameters: TabuParameters) -> None:
         self.parameters = parameters
-        self.weights = penalised(part.packing) if part.packing.is_axial else part.packing.weights
-        self.until = np.zeros(part.packing.num_columns, dtype=np.int64)
+        self.until = np.zeros(component.packing.num_columns, dtype=np.int64)
         self.clock = 1
         self.restarts = 0
-        self.owner: NDArray[np.int32] | None = None if part.best is None else part.best.copy()
+        self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
 
-    def iterate(self, part: Part, rng: np.random.Generator) -> None:
+    def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """Some moves, then exact sub-steps on the best solution they met."""
-        packing, p = part.packing, self.parameters
+        p = self.parameters
         forced = -1
         if self.owner is None:
-            self.owner = self._afresh(part, rng)
-        elif part.best is not None and part.stalled and part.stalled % p.restart == 0:
+            self.owner = self._afresh(component, rng)
+        elif component.best is not None and component.stalled and component.stalled % p.restart == 0:
             self.restarts += 1
             self.until[:] = 0
             if self.restarts % _FRESH == 0:
                 # far from the best, where no chain of moves from it leads
-                self.owner = self._afresh(part, rng)
+                self.owner = self._afresh(component, rng)
             else:
-                self.owner = part.best.copy()
-                forced = self._force(part, rng)
+                self.owner = component.best.copy()
+                forced = self._force(component, rng)
         best = self.owner.copy()
-        self.clock = _moves(
-            packing.cols,
-            self.weights,
-            packing.row_ptr,
-            packing.row_cols,
-            part.reduced,
-            self.owner,
-            best,
-            self.until,
-            self.clock,
-            p.moves,
-            p.tenure,
-            part.temperature,
-            forced,
-            rng,
-            part.deadline,
-        )
-        weight = part.polish(best)
-        part.offer(best, weight)
-        if p.clusters and not part.closed:
-            weight += part.improve(best, rng, p.clusters)
-            if part.offer(best, weight):
+        rules = _Rules(self.clock, p.moves, p.tenure, forced)
+        self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
+        weight = component.improve(best, rng, 0)
+        component.offer(best, weight)
+        if p.clusters and not component.closed:
+            # halves are matched already
+            weight = component.improve(best, rng, p.clusters, NEIGHBOURHOODS[1:])
+            if component.offer(best, weight):
                 self.owner = best
 
-    def _afresh(self, part: Part, rng: np.random.Generator) -> NDArray[np.int32]:
+    def _afresh(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
         """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
-        best, least = part.best, np.inf
+        best, least = component.best, np.inf
         for number in range(_COVERS):
-            owner = random_cover(part, self.weights, 2.0 ** (number % 6), rng)
-            weight = part.polish(owner)
-            if weight - part.bound > part.tolerance:
-                weight += part.improve(owner, rng, self.parameters.clusters)
-            part.offer(owner, weight)
-            if weight < least and not incomplete(part, owner):
+            owner = random_cover(
+                component.arrays, component.prices, 2.0 ** (number % 6), component.temperature, rng, component.deadline
+            )
+            weight = component.settle(owner, rng, self.parameters.clusters)
+            if weight < least and component.is_complete(owner):
                 best, least = owner, weight
-            if part.closed or part.late:
+            if component.closed or component.late:
                 break
-        return Cover.empty(part.packing).owner if best is None else best.copy()
+        return Cover.empty(component.packing).owner if best is None else best.copy()
 
-    def _force(self, part: Part, rng: np.random.Generator) -> int:
+    def _force(self, component: Component, rng: np.random.Generator) -> int:
         """Return a column to insert and hold: on a row that costs much more than its multiplier allows.
 
         The excess of the present solution over the bound is the sum of the reduced costs of its columns and
         of -u over its uncovered rows: where a term is large, something better is near.
         """
         assert self.owner is not None
-        packing, owner = part.packing, self.owner
-        excess = np.where(owner >= 0, part.reduced[owner], -part.duals) + 1e-3 * part.temperature
+        packing, owner = component.packing, self.owner
+        excess = np.where(owner >= 0, component.reduced[owner], -component.duals) + 1e-3 * component.temperature
         excess = np.maximum(excess, 0.0)
         row = int(rng.choice(excess.size, p=excess / excess.sum()))
         columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
         columns = columns[columns != owner[row]]
         if columns.size == 0:
             return -1
-        reduced = part.reduced[columns]
-        likely = np.exp(-(reduced - reduced.min()) / part.temperature)
+        reduced = component.reduced[columns]
+        likely = np.exp(-(reduced - reduced.min()) / component.temperature)
         return int(rng.choice(columns, p=likely / likely.sum()))
 
 
 @njit
 def _moves(
-    cols: Any,
-    weights: Floats,
-    row_ptr: Any,
-    row_cols: Any,
-    reduced: Floats,
-    owner: Any,
-    best: Any,
-    until: Any,
-    clock: int,
-    moves: int,
-    tenure: int,
-    temperature: float,
-    forced: int,
-    rng: Any,
-    deadline: float,
+    packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Rules, rng: Any, deadline: float
 ) -> int:
     """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
 
     A ``forced`` column is inserted first and held for a third of the moves.
     """
+    cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
+    clock, moves, tenure, forced = rules
     num, num_sensors = cols.shape
     gain = np.empty(num)
     for j in range(num):
@@ -170,7 +152,7 @@ def _moves(
         if chosen < 0:
             # everything is tabu: a random column is forced in
             chosen = rng.integers(0, num)
-            if owner[_first(cols, chosen)] == chosen or chosen == held:
+            if owner[first_row(cols, chosen)] == chosen or chosen == held:
                 continue
         current += gain[chosen]
         count = 0
@@ -195,7 +177,7 @@ def _moves(
             fill, most = -1, -1e-12
             for k in range(row_ptr[r], row_ptr[r + 1]):
                 j = row_cols[k]
-                if weights[j] < most and until[j] < clock and _free(cols, owner, j):
+                if weights[j] < most and until[j] < clock and fits(cols, owner, j):
                     fill, most = j, weights[j]
             if fill >= 0 and num_changed + num_sensors <= changed.size:
                 current += weights[fill]
@@ -208,19 +190,3 @@ def _moves(
             record = current
             best[:] = owner
     return clock
-
-
-@njit
-def _first(cols: Any, j: int) -> int:
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0:
-            return cols[j, s]
-    return 0
-
-
-@njit
-def _free(cols: Any, owner: Any, j: int) -> bool:
-    for s in range(cols.shape[1]):
-        if cols[j, s] >= 0 and owner[cols[j, s]] >= 0:
-            return False
-    return True

@@ -20,11 +20,11 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
     target tracking, Progress in Electromagnetics Research 65 (2006), for the approach; the moves are this
     package's own.
     """
-    from assoc.packing.components.search import solve_by
+    from assoc.packing.components.search import search_components
     from assoc.solvers.tabu.moves import TabuSearch
 
-    return solve_by(
-        lambda part, rng: TabuSearch(part, parameters),
+    return search_components(
+        lambda component, rng: TabuSearch(component, parameters),
         packing,
         run,
         parameters.iterations,
