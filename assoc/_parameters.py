@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import math
 import types
 from dataclasses import MISSING, Field, fields
+from numbers import Integral, Real
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from assoc.errors import InvalidInputError
@@ -72,14 +74,10 @@ class Option:
         if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         if type(value) is not self.kind:
-            expected = {int: "a whole number", float: "a number", bool: "true or false"}.get(
-                self.kind, "text"
-            )
+            expected = {int: "a whole number", float: "a number", bool: "true or false"}.get(self.kind, "text")
             raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
         if self.choices and value not in self.choices:
-            raise InvalidInputError(
-                f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}"
-            )
+            raise InvalidInputError(f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}")
         return value
 
     def add_to(self, parser: argparse._ActionsContainer, *, hidden: bool = False) -> None:
@@ -96,15 +94,36 @@ class Option:
                 help=text,
             )
         else:
-            parser.add_argument(
-                self.flag, dest=self.name, metavar=self.metavar(), default=argparse.SUPPRESS, help=text
-            )
+            parser.add_argument(self.flag, dest=self.name, metavar=self.metavar(), default=argparse.SUPPRESS, help=text)
 
 
 def options(owner: type) -> list[Option]:
     """Options for the fields of a parameter dataclass that text can give."""
     every = [Option(owner, field) for field in fields(cast(Any, owner))]
     return [option for option in every if option.usable]
+
+
+def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> bool:
+    """Whether a value is a whole number in this range; true and false are none."""
+    return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
+
+
+def is_number(value: object, least: float = -math.inf, most: float = math.inf) -> bool:
+    """Whether a value is a finite number in this range; true and false are none."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        number = float(value)
+    except OverflowError:
+        return False
+    return math.isfinite(number) and least <= number <= most
+
+
+def positive(value: object, what: str, *, zero: bool = False) -> float:
+    """Return a finite number above 0 (or at least 0) as a float."""
+    if not is_number(value, 0.0) or (not zero and value == 0):
+        raise InvalidInputError(f"{what} must be a number {'>= 0' if zero else 'above 0'}, got {value!r}")
+    return float(value)  # type: ignore[arg-type]
 
 
 class Parameters:
@@ -115,3 +134,28 @@ class Parameters:
     def _require(self, condition: bool, name: str, expected: str) -> None:
         if not condition:
             raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+
+    def _whole(self, *names: str, least: int = 1, most: int | None = None) -> None:
+        """Refuse fields that are not whole numbers of at least so much, or from least to most."""
+        expected = f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+        for name in names:
+            self._require(is_whole(getattr(self, name), least, math.inf if most is None else most), name, expected)
+
+    def _number(
+        self, *names: str, above: float = -math.inf, least: float = -math.inf, most: float | None = None
+    ) -> None:
+        """Refuse fields that are not finite numbers above a limit, at least a limit, or from least to most."""
+        if most is not None:
+            expected = f"a number from {least:g} to {most:g}"
+        else:
+            expected = f"a number above {above:g}" if above > -math.inf else f"a number, at least {least:g}"
+        for name in names:
+            value = getattr(self, name)
+            good = is_number(value, least, math.inf if most is None else most) and value > above
+            self._require(good, name, expected)
+
+    def _probability(self, *names: str) -> None:
+        """Refuse fields that are not strictly between 0 and 1."""
+        for name in names:
+            value = getattr(self, name)
+            self._require(is_number(value) and 0 < value < 1, name, "a number strictly between 0 and 1")

@@ -193,7 +193,7 @@ def _is_npz(file: str) -> bool:
 def _make(
     name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
 ) -> Tracker:
-    from assoc.filters.motion.models import positive
+    from assoc._parameters import positive
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
 

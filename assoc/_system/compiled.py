@@ -1,17 +1,16 @@
 """The one way to numba: lazy signatures, cached on disk, without the GIL, and never stale.
 
 numba keeps a compiled kernel as long as the kernel's own file is unchanged, so an edited helper in another
-file, or an upgrade that leaves one file as it was, would leave stale code. Here the stamp of every kernel
-is that of all files with kernels that it could call. Where no cache folder can be written (a read-only installation
-and home), numba would fail at import; the cache then goes to a temporary folder, and where there is none of
-these either, nothing is kept.
+file, or an upgrade that leaves one file as it was, would leave stale code, and an edited comment would compile anew
+what is below it. Here the stamp of every kernel is that of what it can reach (kernel_stamp.py). Where no cache folder
+can be written (a read-only installation and home), numba would fail at import; the cache then goes to a temporary
+folder, and where there is none of these either, nothing is kept.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import os
 import sys
 import tempfile
@@ -24,30 +23,11 @@ import numpy as np
 from numba.core import caching, event
 
 from assoc._system import temporary
+from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# these rooms know no other room's kernels but the clock
-_SOLVING = ("packing", "solvers", "ranking")
 
-
-@functools.cache
-def _source_stamp(solvers: bool) -> str:
-    """Digest of names and contents of all files with kernels, of the solvers or of the other rooms.
-
-    The solvers know no other room, so that a change elsewhere leaves their kernels as they are. Contents
-    rather than times: a copied or checked-out tree keeps its compiled kernels.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        content = path.read_bytes()
-        if _is_solving(path) == solvers and b"njit" in content:
-            digest.update(f"{path.relative_to(_PACKAGE)} {len(content)}\n".encode() + content)
-    return digest.hexdigest()
-
-
-def _is_solving(path: Path) -> bool:
-    return path.relative_to(_PACKAGE).parts[0] in _SOLVING
-
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 _CACHES: Any = caching.CacheImpl
 _CONFIG: Any = numba.config
@@ -73,8 +53,9 @@ class _PackageCacheLocator:
             temporary.add(folder)
             _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
             locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
-        stamp = _source_stamp(_is_solving(path))
-        locator.get_source_stamp = lambda: stamp
+        # neither the place in the file nor its time: a copied or checked-out tree keeps its compiled kernels
+        locator.get_source_stamp = lambda: KernelStamp(py_func, _OPTIONS)
+        locator.get_disambiguator = lambda: "kernel"
         return locator
 
 
@@ -86,6 +67,10 @@ _FUNCTION_CACHE: Any = caching.FunctionCache
 
 class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
     """numba's cache of one kernel, which is a help and never an obstacle."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """Tell records apart whose fields have the same types in another order."""
+        return (*super()._index_key(sig, codegen), argument_kinds(sig))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep compiled code; on a full disk, say, it is compiled again next time."""
@@ -116,7 +101,7 @@ def njit(function: Callable[..., Any]) -> Any:
                 return function(*arguments)
 
         return silent
-    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    kernel: Any = numba.njit(**_OPTIONS)(function)
     # nowhere to keep it, not even for a while: each process compiles for itself
     with contextlib.suppress(OSError):
         kernel._cache = _KernelCache(function)

@@ -2,17 +2,43 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 from collections.abc import Callable
 from typing import TypeVar
 
 Answer = TypeVar("Answer")
 
+# seconds that work which was told to stop is given when Python ends
+_FAREWELL = 10.0
 
-def in_time(work: Callable[[], Answer], seconds: float, name: str) -> Answer | None:
+
+class StopSignal:
+    """Tells work in another thread to stop, from whenever it can be told."""
+
+    def __init__(self) -> None:
+        self._sent = False
+        self._stop: Callable[[], object] | None = None
+
+    def connect(self, stop: Callable[[], object]) -> None:
+        """Say how the work is stopped, before it starts."""
+        self._stop = stop
+        if self._sent:
+            stop()
+
+    def send(self) -> None:
+        """Stop the work, at once or as soon as it is connected."""
+        self._sent = True
+        if self._stop is not None:
+            self._stop()
+
+
+def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSignal | None = None) -> Answer | None:
     """Return what the work returns, or None when it is not back in that time; what it raises is raised.
 
-    The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself.
+    The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself. With a
+    `stop` signal it is told to end, and when Python ends it is given some seconds to do so: CP-SAT would take the
+    whole process with it (SIGABRT, whatever the program's exit code was to be).
     """
     answers: list[Answer] = []
     errors: list[BaseException] = []
@@ -28,4 +54,26 @@ def in_time(work: Callable[[], Answer], seconds: float, name: str) -> Answer | N
     thread.join(max(seconds, 0.0))
     if errors:
         raise errors[0]
-    return answers[0] if answers else None
+    if answers:
+        return answers[0]
+    if stop is not None:
+        stop.send()
+        _leave(thread)
+    return None
+
+
+_left: list[threading.Thread] = []
+
+
+def _leave(thread: threading.Thread) -> None:
+    """Remember a thread that was told to stop until Python ends."""
+    if not _left:
+        # registered once more where all have ended: that does no harm
+        atexit.register(_take_leave)
+    _left[:] = [one for one in _left if one.is_alive()]
+    _left.append(thread)
+
+
+def _take_leave() -> None:
+    for one in _left:
+        one.join(_FAREWELL)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -15,7 +16,7 @@ from assoc.filters.base import Expected, Filter, Update, check_dimension, compla
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.points import ensemble_update, move_ensemble
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion.models import Motion, positive
+from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 
 _NOTHING2 = np.zeros((0, 0))

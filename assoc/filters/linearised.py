@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.filters.base import (
     Expected,
@@ -24,7 +25,7 @@ from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.gaussian import step as step_kernel
 from assoc.filters.kernels.gaussian import update as update_kernel
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion.models import LinearMotion, Motion, positive
+from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import Gaussian, gaussian
 
 _NOTHING2 = np.zeros((0, 0))

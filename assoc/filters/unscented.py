@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
@@ -13,7 +14,7 @@ from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.points import moments, sigma_points, unscented
 from assoc.filters.measurement import Measurement, Observation
-from assoc.filters.motion.models import Motion, positive
+from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, gaussian
 
 _NOTHING2 = np.zeros((0, 0))

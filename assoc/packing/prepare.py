@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,17 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc.packing.packing import Packing, assembled
 from assoc.problem import AssignmentProblem
+
+
+class PreparedArrays(NamedTuple):
+    """What kernels take of a prepared problem; see `Prepared` and `Packing`."""
+
+    cols: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    slack: NDArray[np.bool_]
+    origin: NDArray[np.int32]
+    row_origin: NDArray[np.int32]
+    single: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +46,14 @@ class Prepared:
     single: NDArray[np.int64]
     single_cost: NDArray[np.float64]
 
+    @property
+    def arrays(self) -> PreparedArrays:
+        """The columns and the way back from them, as kernels take them."""
+        packing = self.packing
+        return PreparedArrays(
+            packing.cols, packing.weights, packing.slack, packing.origin, packing.row_origin, self.single
+        )
+
 
 def prepare(problem: AssignmentProblem) -> Prepared:
     """Bring a problem into packing form; the result is kept with the problem, which never changes."""
@@ -44,7 +63,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     offsets = np.cumsum(sizes) - sizes
     arrays: Any
     if problem.dummy:
-        *arrays, whole, single, single_cost = _prepare_with_dummies(
+        arrays, whole, single, single_cost = _prepare_with_dummies(
             problem.tuples, problem.costs, offsets, int(sizes.sum())
         )
     else:
@@ -63,15 +82,10 @@ def prepare(problem: AssignmentProblem) -> Prepared:
 def _prepare_with_dummies(
     tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
 ) -> Any:
-    """Arrays of the packing, whether its weights are whole numbers, and the singletons."""
+    """Arrays of the packing, whether its weights are whole numbers, and the singletons with their costs."""
     rows, weights, origin, single, single_cost = _columns_with_dummies(tuples, costs, offsets, total)
-    cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin = assembled(
-        rows, weights, np.ones(total, np.bool_), origin
-    )
-    return (
-        cols, new_weights, slack, col_start, row_start, row_ptr, row_cols, new_origin, row_origin,
-        _whole_numbers(weights), single, single_cost,
-    )  # fmt: skip
+    arrays = assembled(rows, weights, np.ones(total, np.bool_), origin)
+    return arrays, _whole_numbers(weights), single, single_cost
 
 
 @njit

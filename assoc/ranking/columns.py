@@ -19,7 +19,7 @@ from assoc.packing.packing import Packing, assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.solvers.greedy.fallback import provide
+from assoc.solvers.greedy.fallback import prepare_fallback
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def complete(problem: AssignmentProblem, run: Run) -> Complete:
     rows, weights, origin = distinct_columns(problem)
     if run.time_limit is not None:
         # what stands for the best when time is over: the ascent would leave no time for it
-        provide(packing, run)
+        prepare_fallback(packing, run)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
     own = dual_bound(packing, run=run)

@@ -13,7 +13,7 @@ from assoc.errors import InfeasibleError
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 from assoc.solvers.exact.proof import prove
-from assoc.solvers.greedy.fallback import best_of
+from assoc.solvers.greedy.fallback import better_of
 
 # share of the time that is left
 _SHARE = 0.3
@@ -54,6 +54,6 @@ class HeadStart:
         except InfeasibleError:
             # none found in the share; whether there is none the ranking finds out
             return
-        run.fallback = best_of(packing, outcome.columns, ahead)
+        run.fallback = better_of(packing, outcome.columns, ahead)
         self.weight = float(packing.weights[run.fallback].sum())
         self.bound = outcome.lower_bound

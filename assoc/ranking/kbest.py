@@ -29,10 +29,10 @@ from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
 from assoc.ranking.two_sensors import rank_planar
 from assoc.solution import Solution
-from assoc.solvers.assign import _limit
+from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.certificate import certify
-from assoc.solvers.greedy.fallback import greedy_choice
 from assoc.solvers.greedy.parameters import GreedyParameters
+from assoc.solvers.greedy.solve import greedy_choice
 
 # bytes of a solution and for each measurement in it: in the search's stores while they grow, and as an answer
 _SOLUTION, _MEASUREMENT = 2_000, 130
@@ -106,7 +106,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     k = checked_k(k)
-    run = run or Run(0, time_limit=_limit(time_limit), started=started)
+    run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
     ahead = HeadStart(prepare(problem).packing, run)

@@ -20,8 +20,9 @@ from assoc.ranking.columns import Complete
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
 from assoc.solution import Solution
-from assoc.solvers.assign import _limit
-from assoc.solvers.greedy.fallback import greedy_choice, provide
+from assoc.solvers.assign import checked_time_limit
+from assoc.solvers.greedy.fallback import prepare_fallback
+from assoc.solvers.greedy.solve import greedy_choice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -108,9 +109,9 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     the least of several.
     """
     checked_k(k)
-    run = Run(0, time_limit=_limit(time_limit))
+    run = Run(0, time_limit=checked_time_limit(time_limit))
     # what stands for clusters that there is no time for
-    provide(prepare(problem).packing, run)
+    prepare_fallback(prepare(problem).packing, run)
     tuples, place = distinct(problem.tuples)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0

@@ -18,7 +18,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify
-from assoc.solvers.greedy.fallback import best_of, provide
+from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 
 
 def assign(
@@ -64,13 +64,13 @@ def assign(
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
-    run = Run(_seed(seed), time_limit=_limit(time_limit), callback=callback, started=started)
+    run = Run(_seed(seed), time_limit=checked_time_limit(time_limit), callback=callback, started=started)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset
         packing = prepared.packing
         if solver != "greedy":
-            provide(packing, run)
+            prepare_fallback(packing, run)
         try:
             outcome = solve(packing, chosen, run)
         except InfeasibleError:
@@ -85,7 +85,7 @@ def assign(
 def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
     """Take the greedy choice where the solver's is worse when time is over."""
     columns = np.asarray(outcome.columns, dtype=np.int64)
-    better = best_of(packing, columns, run)
+    better = better_of(packing, columns, run)
     if better is columns:
         return outcome
     run.record(outcome.iterations, float(packing.weights[better].sum()), outcome.lower_bound)
@@ -100,7 +100,8 @@ def _seed(seed: object) -> int | np.random.SeedSequence | np.random.Generator:
     raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
 
 
-def _limit(time_limit: object) -> float | None:
+def checked_time_limit(time_limit: object) -> float | None:
+    """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
     if time_limit is None:
         return None
     if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:

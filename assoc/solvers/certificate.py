@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-from assoc.packing.prepare import Prepared
+from assoc.packing.prepare import Prepared, PreparedArrays
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
@@ -32,10 +32,9 @@ def certify(
     """
     packing = prepared.packing
     columns = np.asarray(outcome.columns, dtype=np.int64)
-    exact, indices, tuples, costs, magnitude = _complete(
-        problem.tuples, problem.costs, problem.sizes, packing.cols, packing.weights, packing.slack, packing.origin,
-        packing.row_origin, prepared.single, columns,
-    )  # fmt: skip
+    exact, indices, tuples, costs, magnitude = as_tuples(
+        problem.tuples, problem.costs, problem.sizes, prepared.arrays, columns
+    )
     if not exact:
         raise InfeasibleError("the solver's answer does not use every measurement exactly once")
     bound, duals = outcome.lower_bound, outcome.duals
@@ -61,15 +60,13 @@ def certify(
 
 
 @njit
-def _complete(
-    tuples: Any, costs: Any, sizes: Any, cols: Any, weights: Any, slack: Any, origin: Any, row_origin: Any, single: Any,
-    columns: Any,
-) -> Any:  # fmt: skip
+def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, columns: Any) -> Any:
     """A choice of columns as rows of ``problem.tuples`` in lexicographic order, completed by singletons.
 
     Returns whether each measurement is used exactly once (each that must be, without dummies), the indices, their
     tuples and costs, and the sum of the chosen weights' magnitudes.
     """
+    cols, weights, slack, origin, row_origin, single = prepared
     num_sensors = sizes.size
     start = np.zeros(num_sensors + 1, np.int64)
     for s in range(num_sensors):

@@ -1,4 +1,8 @@
-"""The names of the solvers, their parameters, and where to find them without importing them all."""
+"""The names of the solvers, and where to find each: by convention, without importing them all.
+
+Solver ``name`` is the folder ``assoc/solvers/name``. Its ``parameters.py`` has the dataclass ``NameParameters`` and
+imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the function ``solve``.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +10,21 @@ import difflib
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 from assoc._parameters import Parameters
 from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
 
-# name -> module with a class `parameters` and a function `solve`; imported on first use
-_MODULES: dict[str, str] = {
-    name: f"assoc.solvers.{name}.solve" for name in ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
-}
+_NAMES = ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
+# solvers from elsewhere, by `register`
 _REGISTERED: dict[str, tuple[type[Parameters], SolveFunction]] = {}
 
 
 def names() -> list[str]:
     """Names of all solvers, the package's own first."""
-    return [*_MODULES, *(name for name in _REGISTERED if name not in _MODULES)]
+    return [*_NAMES, *_REGISTERED]
 
 
 def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> None:
@@ -41,7 +44,7 @@ def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> N
     InvalidInputError
         The name is taken.
     """
-    if name in _MODULES or name in _REGISTERED:
+    if name in names():
         raise InvalidInputError(f"solver: the name {name!r} is taken")
     _REGISTERED[name] = (parameters, solve)
 
@@ -54,7 +57,10 @@ def parameters(name: str) -> type[Parameters]:
     InvalidInputError
         There is no solver of that name.
     """
-    return _entry(name)[0]
+    if name in _REGISTERED:
+        return _REGISTERED[name][0]
+    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
+    return kind
 
 
 def solver(name: str) -> SolveFunction:
@@ -65,7 +71,10 @@ def solver(name: str) -> SolveFunction:
     InvalidInputError
         There is no solver of that name.
     """
-    return _entry(name)[1]
+    if name in _REGISTERED:
+        return _REGISTERED[name][1]
+    solve: SolveFunction = _module(name, "solve").solve
+    return solve
 
 
 def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
@@ -87,13 +96,10 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         raise InvalidInputError(f"parameters of solver {name!r}: {error}") from None
 
 
-def _entry(name: str) -> tuple[type[Parameters], SolveFunction]:
-    if name in _REGISTERED:
-        return _REGISTERED[name]
-    if name not in _MODULES:
+def _module(name: str, part: str) -> ModuleType:
+    if name not in _NAMES:
         raise InvalidInputError(f"solver: unknown name {name!r}; {_near(name, names())}")
-    module = import_module(_MODULES[name])
-    return module.parameters, module.solve
+    return import_module(f"assoc.solvers.{name}.{part}")
 
 
 def _near(name: object, known: list[str]) -> str:

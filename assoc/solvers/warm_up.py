@@ -18,6 +18,7 @@ from assoc.errors import InfeasibleError
 from assoc.packing.kernels.sorting import ascending
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
+from assoc.solvers.assign import assign
 
 # measurements a sensor, and tuples: enough for large parts, few enough for tenths of a second
 _ROWS = 24
@@ -47,8 +48,6 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     InvalidInputError
         There is no solver of a name.
     """
-    from assoc.solvers.assign import assign
-
     started = time.perf_counter()
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
@@ -43,12 +43,12 @@ class Initiation:
 
     def __post_init__(self) -> None:
         for name in ("rest", "birth_rate", "widest"):
-            _positive(getattr(self, name), name)
+            positive(getattr(self, name), name)
         speeds = self.speed if isinstance(self.speed, (tuple, list)) else (self.speed,)
         if not speeds:
             raise InvalidInputError("speed must be one number, or one for each axis")
         for one in speeds:
-            _positive(one, "speed")
+            positive(one, "speed")
 
     def start(self, filter: Filter[Any], positions: Array, covariances: Array) -> Any:
         """States of new tracks, of the filter's own kind.
@@ -88,9 +88,3 @@ def velocity_components(motion: Motion) -> Array:
 def _velocities(dim: int, position: Array) -> Array:
     places = position + len(position)
     return np.asarray(places[places < dim])
-
-
-def _positive(value: object, name: str) -> None:
-    good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not good or not 0 < float(value) < math.inf:  # type: ignore[arg-type]
-        raise InvalidInputError(f"{name} must be a number above 0, got {value!r}")

@@ -21,7 +21,7 @@ from assoc.ranking.clusters import clusters_of, distinct
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
-from assoc.solvers.greedy.fallback import greedy_choice
+from assoc.solvers.greedy.solve import greedy_choice
 from experiments.common.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
 from tests.reliability.limits import WAYS, lateness
@@ -161,10 +161,10 @@ def test_greedy_choice_is_made_first_on_large_problems_alone(problem):
     run = Run(0, time_limit=5.0)
     small = ghosts(20, 500)
     assign(fresh(small), "exact", time_limit=5.0)
-    from assoc.solvers.greedy.fallback import provide
+    from assoc.solvers.greedy.fallback import prepare_fallback
 
-    provide(prepare(small).packing, run)
+    prepare_fallback(prepare(small).packing, run)
     assert run.fallback is None
     packing = prepare(problem).packing
-    provide(packing, run)
+    prepare_fallback(packing, run)
     assert np.array_equal(run.fallback, greedy_choice(packing, Run(0)))

@@ -8,7 +8,8 @@ from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from assoc.solvers.lagrangian.relaxation import Relaxation
+from assoc.solvers.lagrangian.arranged import arrange
+from assoc.solvers.lagrangian.relaxation import relax
 from experiments.common.instances.synthetic import axial_known_optimum, planted
 from experiments.common.oracles import (
     axial_problem,
@@ -69,15 +70,15 @@ def test_relaxation_is_above_the_multipliers_it_starts_from():
         problem = gated_problem(rng, [(6, 7, 8), (5, 5, 5, 5)][number % 2], 0.2)
         packing = prepare(problem).packing
         start = dual_bound(packing, levels=2, passes=5)
-        relaxation = Relaxation(packing)
-        duals, subgradient = relaxation.solve(start)
+        arranged = arrange(packing)
+        duals, subgradient = relax(arranged, start)
         assert certified_bound(packing, duals) == pytest.approx(duals.sum(), abs=1e-9)
         assert duals.sum() >= start.sum() - 1e-9
         assert (duals <= 1e-12).all()
         # a supergradient: no multipliers of sensors 3..S do better than the plane through it
         other = np.minimum(start + rng.normal(0, 1, start.size), 0.0)
-        moved, _ = relaxation.solve(other)
-        upper = relaxation.sensor >= 2
+        moved, _ = relax(arranged, other)
+        upper = arranged.sensor >= 2
         assert moved.sum() <= duals.sum() + subgradient @ ((moved - duals) * upper) + 1e-7
 
 

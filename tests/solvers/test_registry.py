@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,6 +70,34 @@ def test_an_infeasible_answer_is_caught(registered):
     assoc.solvers.register("all", LastParameters, everything)
     with pytest.raises(InfeasibleError, match="does not use every measurement exactly once"):
         assoc.assign(PROBLEM, "all")
+
+
+def test_convention():
+    """Each name is a folder whose parameters.py loads no compiler and whose solve.py solves."""
+    folder = Path(assoc.solvers.__file__).parent
+    folders = {one.name for one in folder.iterdir() if (one / "__init__.py").exists()}
+    assert folders == set(registry.names())
+    code = (
+        "import sys\nfrom importlib import import_module\nfrom assoc.solvers import registry\n"
+        "for name in registry.names():\n"
+        "    kind = registry.parameters(name)\n"
+        "    assert kind.__module__ == f'assoc.solvers.{name}.parameters', kind\n"
+        "assert not {'numba', 'scipy', 'ortools'} & set(sys.modules)\n"
+        "for name in registry.names():\n"
+        "    module = import_module(f'assoc.solvers.{name}.solve')\n"
+        "    assert registry.solver(name) is module.solve and not hasattr(module, 'parameters')\n"
+        "assert 'ortools' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_what_solvers_of_ones_own_are_written_with():
+    assert {"Cover", "Outcome", "Packing", "Parameters", "Run"} <= set(dir(assoc.solvers))
+    for name in assoc.solvers.__all__:
+        assert getattr(assoc.solvers, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'Part'"):
+        assoc.solvers.Part  # noqa: B018
 
 
 def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():

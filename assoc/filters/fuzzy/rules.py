@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
+from assoc._parameters import positive
 from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
-from assoc.filters.motion.models import positive
 
 PAPER_SETS: dict[str, Mapping[str, tuple[float, float, float, float]]] = {
     "input": {

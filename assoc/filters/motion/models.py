@@ -13,20 +13,13 @@ from typing import Literal
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.turn import turn
 from assoc.filters.state import finite
 
 _NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
-
-
-def positive(value: object, what: str, *, zero: bool = False) -> float:
-    """Return a finite number above 0 (or at least 0)."""
-    good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not good or not math.isfinite(float(value)) or float(value) < 0 or (not zero and value == 0):  # type: ignore[arg-type]
-        raise InvalidInputError(f"{what} must be a number {'>= 0' if zero else 'above 0'}, got {value!r}")
-    return float(value)  # type: ignore[arg-type]
 
 
 class Motion(ABC):

@@ -7,9 +7,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.motion.models import Motion, positive
+from assoc.filters.motion.models import Motion
 from assoc.filters.state import finite, positive_definite
 
 

@@ -49,6 +49,29 @@ class Matching(NamedTuple):
     cost: float
 
 
+class _Costs(NamedTuple):
+    """What is to be matched, as the kernels below take it; see `match`."""
+
+    indptr: Any
+    indices: Any
+    costs: Floats
+    row_slack: Floats
+    base: Floats
+    """Cost of leaving a column alone; high, but finite, where it must be matched."""
+
+
+class _State(NamedTuple):
+    """A matching that grows, and its duals; a column's dual is ``base + v``."""
+
+    row_edge: Any
+    u: Any
+    v: Any
+    owner: Any
+    """Row that each column is matched to, or -1."""
+    pending: Any
+    """Rows that are not matched yet, as many as are counted beside it."""
+
+
 def match(
     indptr: ArrayLike, indices: ArrayLike, costs: ArrayLike, row_slack: ArrayLike, column_slack: ArrayLike
 ) -> Matching:
@@ -135,10 +158,10 @@ def match_sparse(
             else:
                 pending[num_pending] = i
                 num_pending += 1
-    num_pending = _reduce_rows(indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending)
-    if num_pending > 0 and not _augment_all(
-        indptr, indices, costs, row_slack, base, row_edge, u, v, owner, pending, num_pending
-    ):
+    problem = _Costs(indptr, indices, costs, row_slack, base)
+    state = _State(row_edge, u, v, owner, pending)
+    num_pending = _reduce_rows(problem, state, num_pending)
+    if num_pending > 0 and not _augment_all(problem, state, num_pending):
         return np.inf
     total = 0.0
     for i in range(n):
@@ -151,11 +174,13 @@ def match_sparse(
 
 
 @njit
-def _reduce_rows(
-    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, base: Floats, row_edge: Any, u: Any, v: Any,
-    owner: Any, pending: Any, num_pending: int
-) -> int:  # fmt: skip
-    """Augmenting row reduction: each row takes its best column at the price of its second best."""
+def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
+    """Augmenting row reduction: each row takes its best column at the price of its second best.
+
+    Returns how many rows are still pending.
+    """
+    indptr, indices, costs, row_slack, base = problem
+    row_edge, u, v, owner, pending = state
     steps = 4 * num_pending + 8
     left = 0
     at = 0
@@ -200,11 +225,10 @@ def _reduce_rows(
 
 
 @njit
-def _augment_all(
-    indptr: Any, indices: Any, costs: Floats, row_slack: Floats, base: Floats, row_edge: Any, u: Any, v: Any,
-    owner: Any, pending: Any, num_pending: int
-) -> bool:  # fmt: skip
+def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     """Shortest augmenting path from each pending row; False when one must be matched and cannot be."""
+    indptr, indices, costs, row_slack, base = problem
+    row_edge, u, v, owner, pending = state
     m = base.size
     distance = np.full(m, np.inf)
     closed = np.zeros(m, np.bool_)

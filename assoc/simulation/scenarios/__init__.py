@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
-from assoc.simulation.scenarios.base import ScenarioParameters
 
 if TYPE_CHECKING:
     from assoc.simulation.scenarios.rotating_radar import SimulatedPlots
@@ -37,7 +37,7 @@ def recording_names() -> list[str]:
     return list(_RECORDINGS)
 
 
-def parameters(name: str) -> type[ScenarioParameters]:
+def parameters(name: str) -> type[Parameters]:
     """Return the parameter dataclass of a scenario; its fields' metadata have a "help" text.
 
     Raises
@@ -48,7 +48,7 @@ def parameters(name: str) -> type[ScenarioParameters]:
     every = {**_MODULES, **_RECORDINGS}
     if name not in every:
         raise InvalidInputError(f"scenario: unknown name {name!r}; known: {', '.join(every)}")
-    return cast("type[ScenarioParameters]", import_module(every[name]).parameters)
+    return cast("type[Parameters]", import_module(every[name]).parameters)
 
 
 def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
@@ -114,7 +114,7 @@ def _simulate(name: str, seed: int, values: dict[str, Any]) -> Any:
     return module.simulate(chosen, np.random.default_rng(int(seed)), _title(name, seed, chosen))
 
 
-def _title(name: str, seed: int, chosen: ScenarioParameters) -> str:
+def _title(name: str, seed: int, chosen: Parameters) -> str:
     """What the scene is called: the scenario, the seed, and the parameters that are not the defaults."""
     parts = [f"seed {seed}"]
     for field in fields(cast(Any, chosen)):

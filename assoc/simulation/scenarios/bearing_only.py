@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.sensors.bearing import BearingSensor
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import MOST, require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
-from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.scenarios.crowd import horizontal_velocities
 
 HEIGHT = 10_000.0
@@ -20,7 +20,7 @@ HEIGHT = 10_000.0
 
 
 @dataclass(frozen=True)
-class BearingOnlyParameters(ScenarioParameters):
+class BearingOnlyParameters(Parameters):
     """Parameters of the bearing-only scene."""
 
     targets: int = field(default=20, metadata={"help": "number of targets"})
@@ -39,8 +39,8 @@ class BearingOnlyParameters(ScenarioParameters):
     false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per sensor and scan"})
 
     def __post_init__(self) -> None:
-        self._whole("targets", "scans")
-        self._whole("sensors", least=2)
+        self._whole("targets", "scans", most=MOST)
+        self._whole("sensors", least=2, most=MOST)
         self._number("interval", "width", "noise", "false_alarms", above=0.0)
         self._number("depth", "speed", least=0.0)
         self._probability("detection_probability")

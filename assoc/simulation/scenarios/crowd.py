@@ -7,22 +7,22 @@ from typing import Literal
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import MOST, require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radar_over
-from assoc.simulation.scenarios.base import ScenarioParameters
 
 REFERENCE_TARGETS = 100
 """With constant density the box is as given for this many targets."""
 
 
 @dataclass(frozen=True)
-class CrowdParameters(ScenarioParameters):
+class CrowdParameters(Parameters):
     """Parameters of the crowd."""
 
     targets: int = field(default=100, metadata={"help": "number of targets"})
@@ -54,7 +54,7 @@ class CrowdParameters(ScenarioParameters):
     )
 
     def __post_init__(self) -> None:
-        self._whole("targets", "scans", "sensors")
+        self._whole("targets", "scans", "sensors", most=MOST)
         self._number("interval", "width", "height", "noise", "false_alarms_per_target", above=0.0)
         self._number("speed", least=0.0)
         self._probability("detection_probability")

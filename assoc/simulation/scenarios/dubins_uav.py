@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
@@ -19,13 +20,12 @@ from assoc.simulation.dubins.paths import Path, Pose
 from assoc.simulation.memory import require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.scenarios.base import ScenarioParameters
 
 _TRIES = 200
 
 
 @dataclass(frozen=True)
-class DubinsParameters(ScenarioParameters):
+class DubinsParameters(Parameters):
     """Parameters of the Dubins scene."""
 
     targets: int = field(default=4, metadata={"help": "number of aircraft"})

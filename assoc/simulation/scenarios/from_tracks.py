@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.scene import Scene
 from assoc.simulation.geodesy import east_north_up
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import MOST, require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 
 COLUMNS = {
@@ -44,7 +44,7 @@ def _column(meaning: str, unit: str) -> Any:
 
 
 @dataclass(frozen=True)
-class FromTracksParameters(ScenarioParameters):
+class FromTracksParameters(Parameters):
     """Parameters of recorded trajectories observed by simulated radars."""
 
     file: str = field(
@@ -77,7 +77,7 @@ class FromTracksParameters(ScenarioParameters):
     false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
 
     def __post_init__(self) -> None:
-        self._whole("radars")
+        self._whole("radars", most=MOST)
         if self.scans is not None:
             self._whole("scans", most=MAX_SCANS)
         self._number("interval", "max_gap", "noise", "false_alarms", above=0.0)

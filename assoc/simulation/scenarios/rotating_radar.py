@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -22,7 +23,6 @@ from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.simulation.antenna import bearings_in_steps, in_steps, looks, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
-from assoc.simulation.scenarios.base import ScenarioParameters
 
 if TYPE_CHECKING:
     from assoc.metrics.trajectories import Trajectories
@@ -37,7 +37,7 @@ PARALLEL_SEPARATION = 5.0
 
 
 @dataclass(frozen=True)
-class RotatingRadarParameters(ScenarioParameters):
+class RotatingRadarParameters(Parameters):
     """Parameters of the rotating radar."""
 
     traffic: Traffic = field(

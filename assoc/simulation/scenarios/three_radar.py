@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import MOST, require_room
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
-from assoc.simulation.scenarios.base import ScenarioParameters
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 
 TRAJECTORIES = (
@@ -36,7 +36,7 @@ TRAJECTORIES = (
 
 
 @dataclass(frozen=True)
-class ThreeRadarParameters(ScenarioParameters):
+class ThreeRadarParameters(Parameters):
     """Parameters of the three-radar scene."""
 
     scans: int = field(default=100, metadata={"help": "number of scans"})
@@ -56,7 +56,7 @@ class ThreeRadarParameters(ScenarioParameters):
     )
 
     def __post_init__(self) -> None:
-        self._whole("scans", "radars")
+        self._whole("scans", "radars", most=MOST)
         self._number("interval", "noise", "false_alarms", above=0.0)
         self._number("radar_distance", "margin", least=0.0)
         self._probability("detection_probability")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, is_number
 
 MODES = ("mmas", "paper")
 TRANSFORMS = ("exponential", "shifted", "reciprocal")
@@ -53,12 +53,10 @@ class AcoParameters(Parameters):
 
     def __post_init__(self) -> None:
         self._require(self.mode in MODES, "mode", " or ".join(MODES))
-        self._require(1 <= self.ants <= 100_000, "ants", "a whole number from 1 to 100000")
-        self._require(0 <= self.alpha <= 20, "alpha", "a number from 0 to 20")
-        self._require(0 <= self.beta <= 20, "beta", "a number from 0 to 20")
-        self._require(0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
-        self._require(self.iterations >= 1, "iterations", "a whole number >= 1")
-        self._require(self.patience >= 1, "patience", "a whole number >= 1")
+        self._whole("ants", most=100_000)
+        self._number("alpha", "beta", least=0.0, most=20.0)
+        self._require(is_number(self.rho) and 0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
+        self._whole("iterations", "patience")
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
-        self._require(0 < self.scale < float("inf"), "scale", "a positive number")
-        self._require(self.clusters >= 0, "clusters", "a whole number >= 0")
+        self._number("scale", above=0.0)
+        self._whole("clusters", least=0)

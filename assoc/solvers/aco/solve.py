@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from assoc.packing.components.search import search_components
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.aco.max_min import Colony
+from assoc.solvers.aco.paper import solve_as_in_the_paper
 from assoc.solvers.aco.parameters import AcoParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.packing import Packing
 
 
 def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
@@ -21,12 +20,7 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     IEEE Transactions on Systems, Man, and Cybernetics B 34 (2004).
     """
     if parameters.mode == "paper":
-        from assoc.solvers.aco.paper import solve_as_in_the_paper
-
         return solve_as_in_the_paper(packing, parameters, run)
-    from assoc.packing.components.search import search_components
-    from assoc.solvers.aco.max_min import Colony
-
     return search_components(
         lambda component, rng: Colony(component, parameters),
         packing,
@@ -35,6 +29,3 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
         parameters.patience,
         parameters.clusters,
     )
-
-
-parameters = AcoParameters

@@ -26,5 +26,4 @@ class ExactParameters(Parameters):
     )
 
     def __post_init__(self) -> None:
-        self._require(self.nodes >= 0, "nodes", "a whole number >= 0")
-        self._require(self.patience >= 0, "patience", "a whole number >= 0")
+        self._whole("nodes", "patience", least=0)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.search import Search
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.exact.parameters import ExactParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.packing import Packing
+from assoc.solvers.exact.proof import prove
 
 # column visits of the search that closes what is left where costs cancel
 _VISITS = 20_000_000
@@ -26,8 +28,6 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
     InfeasibleError
         There is no solution (proved), or none was found in the time.
     """
-    from assoc.solvers.exact.proof import prove
-
     outcome = prove(packing, parameters.nodes, parameters.patience, run)
     return outcome if run.stopped_by else _where_costs_cancel(packing, outcome, run)
 
@@ -42,11 +42,6 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(last.cost))
     if last.cost - last.lower_bound <= 4.0 * wanted:
         return outcome
-    import numpy as np
-
-    from assoc.packing.bounds.dual_ascent import dual_bound
-    from assoc.packing.branching.search import Search
-
     chosen = packing.weights[outcome.columns]
     weight, size = float(chosen.sum()), float(np.abs(chosen).sum())
     # a gap that another cause has left open, or that rounding alone would leave, is not closed so
@@ -60,6 +55,3 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     bound = max(outcome.lower_bound, search.lower_bound)
     nodes = outcome.iterations + search.nodes
     return replace(outcome, columns=columns, iterations=nodes, lower_bound=bound, duals=None)
-
-
-parameters = ExactParameters

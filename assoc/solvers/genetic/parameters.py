@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, is_whole
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class GeneticParameters(Parameters):
     clusters: int = field(default=10, metadata={"help": "exact sub-steps on each child"})
 
     def __post_init__(self) -> None:
-        self._require(2 <= self.population <= 100_000, "population", "a whole number from 2 to 100000")
-        self._require(1 <= self.offspring <= 100_000, "offspring", "a whole number from 1 to 100000")
-        self._require(1 <= self.tournament <= self.population, "tournament", "a whole number from 1 to population")
-        self._require(0 <= self.mutation <= 1, "mutation", "a number from 0 to 1")
-        self._require(self.iterations >= 1, "iterations", "a whole number >= 1")
-        self._require(self.patience >= 1, "patience", "a whole number >= 1")
-        self._require(self.clusters >= 0, "clusters", "a whole number >= 0")
+        self._whole("population", least=2, most=100_000)
+        self._whole("offspring", most=100_000)
+        good = is_whole(self.tournament, 1, self.population)
+        self._require(good, "tournament", "a whole number from 1 to population")
+        self._number("mutation", least=0.0, most=1.0)
+        self._whole("iterations", "patience")
+        self._whole("clusters", least=0)

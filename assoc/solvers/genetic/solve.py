@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from assoc.packing.components.search import search_components
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.genetic.parameters import GeneticParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.packing import Packing
+from assoc.solvers.genetic.population import Breeding
 
 
 def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
@@ -20,9 +18,6 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
     multi-sensor multi-target tracking, Mathematical and Computer Modelling 26 (1997), for the approach;
     crossover and local search are this package's own.
     """
-    from assoc.packing.components.search import search_components
-    from assoc.solvers.genetic.population import Breeding
-
     return search_components(
         lambda component, rng: Breeding(component, parameters),
         packing,
@@ -31,6 +26,3 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
         parameters.patience,
         parameters.clusters,
     )
-
-
-parameters = GeneticParameters

@@ -1,33 +1,28 @@
-"""What is returned when time is over and nothing better is known: the greedy choice, made while there is time."""
+"""What is returned when time is over and nothing better is known: the greedy choice, made while there is time.
+
+It stands at the doors (assign, kbest, marginals).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
+from assoc.solvers.greedy.solve import greedy_choice
 
 # columns from which the choice takes so long that it must be made first, not last: some milliseconds
 LARGE = 20_000
 
 
-def greedy_choice(packing: Packing, run: Run) -> NDArray[np.int32] | None:
-    """Return the columns of the greedy choice; None where it ends in a dead end that time does not lead out of."""
-    cover = Cover.empty(packing)
-    cover.add_greedily(ascending(packing.weights))
-    return cover.columns() if cover.complete(run) else None
-
-
-def provide(packing: Packing, run: Run) -> None:
+def prepare_fallback(packing: Packing, run: Run) -> None:
     """Make the greedy choice first, where a time limit would leave no time for it afterwards."""
     if run.time_limit is not None and run.fallback is None and packing.num_columns >= LARGE:
         run.fallback = greedy_choice(packing, run)
 
 
-def best_of(packing: Packing, columns: NDArray[np.integer], run: Run) -> NDArray[np.integer]:
+def better_of(packing: Packing, columns: NDArray[np.integer], run: Run) -> NDArray[np.integer]:
     """Return a choice that time has cut short, or the greedy one where that is lighter."""
     greedy = run.fallback
     if greedy is None and packing.num_columns < LARGE:

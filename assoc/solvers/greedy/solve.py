@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.kernels.sorting import ascending
+from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
-from assoc.solvers.greedy.parameters import GreedyParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.packing import Packing
 
 
 def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
     """Choose columns in order of weight; one iteration is one column looked at.
 
-    Without dummies the greedy choice can run into a dead end; it is then completed by ejections
-    (``local_search.complete``).
+    Without dummies the greedy choice can run into a dead end; it is then completed by ejections and, where these do
+    not help, by a search.
 
     Raises
     ------
     InfeasibleError
         No complete choice was found.
     """
-    from assoc.packing.branching.feasibility import infeasible
-    from assoc.packing.kernels.sorting import ascending
-    from assoc.packing.neighbourhoods.cover import Cover
+    columns = greedy_choice(packing, run)
+    if columns is None:
+        raise infeasible(packing, run)
+    run.record(packing.num_columns, float(packing.weights[columns].sum()), -math.inf)
+    return Outcome(columns, packing.num_columns)
 
+
+def greedy_choice(packing: Packing, run: Run) -> NDArray[np.int32] | None:
+    """Return the columns of the greedy choice; None where it ends in a dead end that time does not lead out of."""
     cover = Cover.empty(packing)
     cover.add_greedily(ascending(packing.weights))
-    if not cover.complete(run):
-        raise infeasible(packing, run)
-    run.record(packing.num_columns, cover.weight, -math.inf)
-    return Outcome(cover.columns(), packing.num_columns)
-
-
-parameters = GreedyParameters
+    return cover.columns() if cover.complete(run) else None

@@ -38,13 +38,8 @@ class LagrangianParameters(Parameters):
     polish: bool = field(default=True, metadata={"help": "improve recovered solutions by local search"})
 
     def __post_init__(self) -> None:
-        for name in ("iterations", "patience"):
-            value = getattr(self, name)
-            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-            self._require(whole and value >= 1, name, "a whole number >= 1")
-        for name, low, high in (("gap", 0.0, 1.0), ("step", 1e-6, 10.0)):
-            value = getattr(self, name)
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            self._require(number and low <= value <= high, name, f"a number in {low:g}..{high:g}")
+        self._whole("iterations", "patience")
+        self._number("gap", least=0.0, most=1.0)
+        self._number("step", least=1e-6, most=10.0)
         for name in ("warm_start", "polish"):
             self._require(isinstance(getattr(self, name), (bool, np.bool_)), name, "true or false")

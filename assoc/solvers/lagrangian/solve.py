@@ -11,8 +11,8 @@ certified. Multipliers move along the subgradient g_r = 1 - (times that r is use
 the pairs a solution is recovered sensor by sensor: the tuples so far are assigned to the measurements of
 the next sensor, those of later sensors still priced by u, each step again an exact 2-D assignment.
 
-The multipliers start from the smoothed dual ascent (bounds.py), which is near the LP bound in milliseconds;
-columns whose reduced cost exceeds the gap are dropped on the way.
+The multipliers start from the smoothed dual ascent (packing/bounds/dual_ascent.py), which is near the LP bound
+in milliseconds; columns whose reduced cost exceeds the gap are dropped on the way.
 
 References
 ----------
@@ -23,19 +23,24 @@ multisensor-multitarget state estimation", IEEE Trans. AES 33, 523-538 (1997).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass, reduced_costs
+from assoc.packing.bounds.priced import Priced
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.kernels.sorting import ascending
+from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.neighbourhoods.dimensionwise import improve
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.lagrangian.arranged import arrange
 from assoc.solvers.lagrangian.parameters import LagrangianParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.neighbourhoods.cover import Cover
-    from assoc.packing.packing import Packing
-
+from assoc.solvers.lagrangian.recovery import recover
+from assoc.solvers.lagrangian.relaxation import relax
 
 _COARSE_LEVELS = 4
 _COARSE_PASSES = 10
@@ -52,11 +57,6 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     InfeasibleError
         There is no solution, or none was found.
     """
-    from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
-    from assoc.packing.branching.feasibility import infeasible
-    from assoc.packing.kernels.sorting import ascending
-    from assoc.packing.neighbourhoods.cover import Cover
-
     if packing.num_columns == 0:
         if packing.is_axial:
             raise infeasible(packing)
@@ -72,7 +72,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
         raise infeasible(packing)
     if run.fallback is not None and run.should_stop():
         return Outcome(run.fallback, 0, min(bound, float(packing.weights[run.fallback].sum())), duals)
-    search = _Search(packing, duals, parameters, run, bound)
+    search = Subgradient(packing, duals, parameters, run, bound)
     search.iterate()
     if parameters.polish:
         search.polish()
@@ -93,7 +93,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
     return Outcome(columns, search.iterations, bound, proof)
 
 
-class _Search:
+class Subgradient:
     """The state of the method: multipliers, best bound, best solution, and the columns that are left."""
 
     def __init__(
@@ -112,11 +112,9 @@ class _Search:
 
     def _focus(self, packing: Packing, duals: Floats, place: NDArray[np.int64]) -> None:
         """Work on these columns from now on; ``place`` are theirs in the whole problem."""
-        from assoc.solvers.lagrangian.relaxation import Relaxation
-
         self.packing = packing
         self.place = place
-        self.relaxation = Relaxation(packing)
+        self.arranged = arrange(packing)
         self.duals = duals
         self.best = duals
 
@@ -158,10 +156,6 @@ class _Search:
 
     def polish(self) -> None:
         """Improve the best solution by cluster search, within the columns that are left."""
-        from assoc.packing.bounds.priced import Priced
-        from assoc.packing.neighbourhoods.cluster import ClusterSearch
-        from assoc.packing.neighbourhoods.cover import Cover
-
         if self.columns is None or self._gap_closed() or self.run.should_stop():
             return
         search = ClusterSearch(Priced.of(self.packing, self.best))
@@ -191,9 +185,7 @@ class _Search:
 
     def _relax(self) -> Floats | None:
         """Solve the 2-D relaxation; returns the subgradient, None where it has no solution."""
-        from assoc.packing.bounds.dual_ascent import certified_bound
-
-        answer = self.relaxation.solve(self.duals)
+        answer = relax(self.arranged, self.duals)
         if answer is None:
             return None
         self.duals, subgradient = answer
@@ -207,10 +199,7 @@ class _Search:
         self.bound, self.proof = max(self.bound, bound), proof
 
     def _recover(self) -> None:
-        from assoc.packing.neighbourhoods.cover import Cover
-        from assoc.packing.neighbourhoods.dimensionwise import improve
-
-        columns = self.relaxation.recover(self.duals)
+        columns = recover(self.arranged, self.duals)
         if columns is None:
             return
         cover = Cover.of(self.packing, columns)
@@ -237,8 +226,6 @@ class _Search:
 
     def _drop_columns(self) -> bool:
         """Drop what no better solution can use; True if that was worth it."""
-        from assoc.packing.bounds.dual_ascent import reduced_costs
-
         if self.weight == math.inf:
             return False
         room = self.weight - self.bound + 1e-9 * max(1.0, abs(self.weight))
@@ -255,8 +242,6 @@ class _Search:
 
     def _refine(self) -> None:
         """Do the smoothed dual ascent in full, on the columns that are left."""
-        from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-
         duals = dual_bound(self.packing, run=self.run)
         bound = certified_bound(self.packing, duals)
         if bound > certified_bound(self.packing, self.best):
@@ -275,6 +260,3 @@ class _Search:
         moved = self.duals + factor * max(target - self.bound, 1e-9) / norm * direction
         self.duals = np.where(slack, np.minimum(moved, 0.0), moved)
         return True
-
-
-parameters = LagrangianParameters

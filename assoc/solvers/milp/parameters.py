@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from assoc._parameters import Parameters
 
 BACKENDS = ("scip", "cp_sat", "highs")
@@ -29,5 +27,4 @@ class MilpParameters(Parameters):
 
     def __post_init__(self) -> None:
         self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
-        whole = isinstance(self.workers, (int, np.integer)) and not isinstance(self.workers, bool)
-        self._require(whole and 1 <= self.workers <= 1024, "workers", "a whole number in 1..1024")
+        self._whole("workers", most=1024)

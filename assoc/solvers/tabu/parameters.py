@@ -36,9 +36,6 @@ class TabuParameters(Parameters):
     clusters: int = field(default=10, metadata={"help": "exact sub-steps at the end of an iteration"})
 
     def __post_init__(self) -> None:
-        self._require(0 <= self.tenure <= 1_000_000, "tenure", "a whole number from 0 to 1000000")
-        self._require(self.moves >= 1, "moves", "a whole number >= 1")
-        self._require(self.iterations >= 1, "iterations", "a whole number >= 1")
-        self._require(self.patience >= 1, "patience", "a whole number >= 1")
-        self._require(self.restart >= 1, "restart", "a whole number >= 1")
-        self._require(self.clusters >= 0, "clusters", "a whole number >= 0")
+        self._whole("tenure", least=0, most=1_000_000)
+        self._whole("moves", "iterations", "patience", "restart")
+        self._whole("clusters", least=0)

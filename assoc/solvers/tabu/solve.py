@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from assoc.packing.components.search import search_components
+from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
-
-if TYPE_CHECKING:
-    from assoc.packing.packing import Packing
 
 
 def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
@@ -20,9 +18,6 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
     target tracking, Progress in Electromagnetics Research 65 (2006), for the approach; the moves are this
     package's own.
     """
-    from assoc.packing.components.search import search_components
-    from assoc.solvers.tabu.moves import TabuSearch
-
     return search_components(
         lambda component, rng: TabuSearch(component, parameters),
         packing,
@@ -31,6 +26,3 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
         parameters.patience,
         parameters.clusters,
     )
-
-
-parameters = TabuParameters

@@ -1,0 +1,195 @@
+"""Up: from the multipliers to a feasible choice of columns, sensor by sensor."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.kernels.matching import match_sparse
+from assoc.packing.neighbourhoods.cover import chosen_columns
+from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
+
+
+class _Partial(NamedTuple):
+    """The tuples as far as they are built up."""
+
+    of_row: Any
+    """Partial tuple of each row so far, int64 (R,)."""
+    size: Any
+    """Rows of each partial tuple, int64 (R,)."""
+    must: Any
+    """Whether a partial tuple has a row that must be covered, bool (R,)."""
+
+
+def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int64] | None:
+    """Return a feasible choice of columns built up sensor by sensor, None where that met a dead end."""
+    owner = np.full(duals.size, -1, dtype=np.int64)
+    if arranged.cols.shape[1] == 1:
+        # with one sensor there is nothing to assign upward: each row takes its cheapest column
+        order = np.argsort(-arranged.weights, kind="stable")
+        owner[arranged.cols[order, 0]] = order
+    elif not _recover(arranged, duals, owner):
+        return None
+    chosen: NDArray[np.int64] = chosen_columns(arranged.cols, owner)
+    return chosen
+
+
+@njit
+def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
+    """Which partial tuple column j continues: -1 none (it has no row so far), -2 it does not fit."""
+    found = -1
+    members = 0
+    for s in range(stop):
+        r = cols[j, s]
+        if r >= 0:
+            if found >= 0 and of_row[r] != found:
+                return -2
+            found = of_row[r]
+            members += 1
+    if found >= 0 and members != size[found]:
+        return -2
+    return found
+
+
+@njit
+def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
+    """Assign the tuples so far to the next sensor, from the second to the last; False at a dead end."""
+    cols, weights, slack, sensor, _, _ = arranged
+    num_rows, num_sensors = duals.size, cols.shape[1]
+    num_columns = weights.size
+    of_row = np.full(num_rows, -1, np.int64)
+    size = np.zeros(num_rows, np.int64)
+    must = np.zeros(num_rows, np.bool_)
+    partial = _Partial(of_row, size, must)
+    local = np.empty(num_rows, np.int64)
+    rows = np.empty(num_rows, np.int64)
+    num_partial = number_rows(sensor, 0, local, rows)
+    for i in range(num_partial):
+        of_row[rows[i]] = i
+        size[i] = 1
+        must[i] = not slack[rows[i]]
+    left = np.empty(num_columns, np.int64)
+    right = np.empty(num_columns, np.int64)
+    price = np.empty(num_columns)
+    for level in range(1, num_sensors):
+        num_right = number_rows(sensor, level, local, rows)
+        last = level == num_sensors - 1
+        left_alone = np.zeros(num_partial)
+        for p in range(num_partial):
+            if must[p]:
+                left_alone[p] = np.inf
+        right_alone = alone_prices(rows, num_right, slack)
+        left_column, right_column = np.full(num_partial, -1, np.int64), np.full(num_right, -1, np.int64)
+        indptr = np.zeros(num_partial + 1, np.int64)
+        for j in range(num_columns):
+            p = _prefix(cols, j, level, of_row, size)
+            q = cols[j, level]
+            left[j] = -1
+            if p == -2 or (p < 0 and q < 0):
+                continue
+            value = priced(cols, weights, duals, j, level + 1)
+            if q < 0:
+                if value < left_alone[p]:
+                    left_alone[p] = value
+                    left_column[p] = j
+            elif p < 0:
+                if value < right_alone[local[q]]:
+                    right_alone[local[q]] = value
+                    right_column[local[q]] = j
+            else:
+                left[j] = p
+                right[j] = local[q]
+                price[j] = value
+                indptr[p + 1] += 1
+        for p in range(num_partial):
+            indptr[p + 1] += indptr[p]
+        count = indptr[num_partial]
+        indices, column, costs = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
+        fill = indptr[:-1].copy()
+        for j in range(num_columns):
+            if left[j] >= 0:
+                e = fill[left[j]]
+                fill[left[j]] += 1
+                indices[e] = right[j]
+                column[e] = j
+                costs[e] = price[j]
+        drop_needless_prices(left_alone, right_alone)
+        row_edge = np.empty(num_partial, np.int64)
+        u, v = np.empty(num_partial), np.empty(num_right)
+        if match_sparse(indptr, indices, costs, left_alone, right_alone, row_edge, u, v) == np.inf:
+            return False
+        if last:
+            taken = np.zeros(num_right, np.bool_)
+            for p in range(num_partial):
+                e = row_edge[p]
+                if e >= 0:
+                    taken[indices[e]] = True
+                _own(cols, owner, column[e] if e >= 0 else left_column[p])
+            for i in range(num_right):
+                if not taken[i]:
+                    _own(cols, owner, right_column[i])
+            return True
+        partner = np.full(num_partial, -1, np.int64)
+        for p in range(num_partial):
+            if row_edge[p] >= 0:
+                partner[p] = indices[row_edge[p]]
+        num_partial = _grow(arranged, partial, partner, left_column, rows[:num_right], level)
+    return True
+
+
+@njit
+def _grow(arranged: Arranged, partial: _Partial, partner: Any, column: Any, right: Any, level: int) -> int:
+    """Join partial tuples to their partners of the next sensor; returns how many there are then.
+
+    One that is left alone and that no column ends (``column`` is -1) is broken up into its rows.
+    """
+    slack, sensor = arranged.slack, arranged.sensor
+    of_row, size, must = partial
+    num_rows, num_before, num_right = of_row.size, partner.size, right.size
+    before = of_row.copy()
+    before_size = size[:num_before].copy()
+    number = np.full(num_before, -1, np.int64)
+    of_right = np.full(num_right, -1, np.int64)
+    count = 0
+    for p in range(num_before):
+        if partner[p] >= 0 or column[p] >= 0 or before_size[p] == 1:
+            number[p] = count
+            size[count] = before_size[p]
+            if partner[p] >= 0:
+                of_right[partner[p]] = count
+                size[count] += 1
+            count += 1
+    for r in range(num_rows):
+        if sensor[r] < level:
+            p = before[r]
+            if number[p] >= 0:
+                of_row[r] = number[p]
+            else:
+                of_row[r] = count
+                size[count] = 1
+                count += 1
+    for i in range(num_right):
+        if of_right[i] < 0:
+            of_right[i] = count
+            size[count] = 1
+            count += 1
+        of_row[right[i]] = of_right[i]
+    for p in range(count):
+        must[p] = False
+    for r in range(num_rows):
+        if sensor[r] <= level and not slack[r]:
+            must[of_row[r]] = True
+    return count
+
+
+@njit
+def _own(cols: Any, owner: Any, j: int) -> None:
+    """Make a column, if it is one, the owner of its rows."""
+    if j >= 0:
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                owner[cols[j, s]] = j

@@ -1,0 +1,48 @@
+"""What a backend answers, in the packing's own units, and what its answer is checked by."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc.packing.packing import Packing
+
+
+class Answer(NamedTuple):
+    """A backend's answer.
+
+    Attributes
+    ----------
+    columns : int array or None
+        The chosen columns, where there is a solution.
+    bound : float
+        No solution weighs less; -inf where the backend has no bound.
+    proven : bool
+        Whether the columns are optimal.
+    infeasible : bool
+        Whether there is no solution.
+    nodes : int
+        Nodes of the search (branches of CP-SAT).
+    """
+
+    columns: NDArray[np.int64] | None
+    bound: float
+    proven: bool
+    infeasible: bool
+    nodes: int
+
+
+def solution_or_none(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Return the columns if they are a solution, else None."""
+    rows = packing.cols[columns]
+    covered = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
+    wrong = (covered > 1).any() or (covered[~packing.slack] != 1).any()
+    return None if wrong else columns
+
+
+def most_columns(packing: Packing) -> int:
+    """Return how many columns a solution can have at the most."""
+    sizes = np.count_nonzero(packing.cols >= 0, axis=1)
+    return packing.num_rows // max(int(sizes.min()), 1)

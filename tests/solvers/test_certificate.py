@@ -1,0 +1,96 @@
+"""No wrong choice of columns passes the certificate, and a right one comes back as the problem's own tuples."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from assoc.errors import InfeasibleError
+from assoc.packing.prepare import prepare
+from assoc.packing.run import Outcome, Run
+from assoc.problem import AssignmentProblem
+from assoc.solvers.certificate import certify
+from assoc.solvers.greedy.parameters import GreedyParameters
+from experiments.common.oracles import small_problems
+
+PROBLEM = AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], [-3.0, -2.0, -4.0, -0.5], [2, 2])
+AXIAL = AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], [3.0, 2.0, 4.0, 0.5], [2, 2], dummy=False)
+
+
+def answer(problem, columns, bound=-np.inf):
+    outcome = Outcome(np.array(columns, dtype=np.int64), 1, bound)
+    return certify(problem, prepare(problem), outcome, Run(0), "test", GreedyParameters())
+
+
+def column(problem, *tuple_):
+    """Return the column of a tuple."""
+    place = np.flatnonzero((problem.tuples == tuple_).all(axis=1))[0]
+    return int(np.flatnonzero(prepare(problem).packing.origin == place)[0])
+
+
+def test_a_right_choice_is_completed_by_singletons():
+    solution = answer(PROBLEM, [column(PROBLEM, 1, 2)])
+    assert solution.tuples.tolist() == [[0, 1], [1, 2], [2, 0]]
+    assert solution.cost == -4.0 and solution.lower_bound <= -5.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        pytest.param([(1, 1), (1, 2)], id="a measurement twice"),
+        pytest.param([(1, 1), (1, 1)], id="a column twice"),
+    ],
+)
+@pytest.mark.parametrize("problem", [PROBLEM, AXIAL], ids=["dummies", "axial"])
+def test_a_measurement_used_twice_is_refused(problem, wrong):
+    with pytest.raises(InfeasibleError, match="does not use every measurement exactly once"):
+        answer(problem, [column(problem, *one) for one in wrong])
+
+
+@pytest.mark.parametrize("wrong", [[-1], [4], [0, 99]])
+def test_a_column_that_is_none_is_refused(wrong):
+    with pytest.raises(InfeasibleError, match="does not use every measurement exactly once"):
+        answer(PROBLEM, wrong)
+
+
+def test_a_measurement_left_out_is_refused_where_there_are_no_dummies():
+    for columns in ([], [column(AXIAL, 1, 1)]):
+        with pytest.raises(InfeasibleError):
+            answer(AXIAL, columns)
+    assert answer(PROBLEM, []).cost == 0.0
+
+
+@pytest.mark.parametrize("dummy", [True, False])
+def test_choices_of_columns_against_a_plain_count(dummy):
+    """Every choice of up to three columns of small problems: accepted if and only if each measurement is used once."""
+    rng = np.random.default_rng(4)
+    accepted = refused = 0
+    for problem in small_problems(40, seed=3, dummy=dummy):
+        packing = prepare(problem).packing
+        for _ in range(20):
+            if packing.num_columns == 0:
+                break
+            columns = rng.integers(0, packing.num_columns, rng.integers(0, 4)).tolist()
+            used = [(s, i) for j in columns for s, i in enumerate(problem.tuples[packing.origin[j]]) if i > 0]
+            must = 0 if dummy else int(problem.sizes.min()) * int((problem.sizes == problem.sizes.min()).sum())
+            smallest = [s for s, size in enumerate(problem.sizes) if size == problem.sizes.min()]
+            right = len(set(used)) == len(used) and (dummy or sum(s in smallest for s, _ in used) == must)
+            if not right:
+                refused += 1
+                with pytest.raises(InfeasibleError):
+                    answer(problem, columns)
+                continue
+            accepted += 1
+            solution = answer(problem, columns)
+            assert solution.cost == math.fsum(problem.costs[solution.indices])
+            rows = [tuple(row) for row in solution.tuples.tolist()]
+            assert rows == sorted(rows)
+            assert (problem.tuples[solution.indices] == solution.tuples).all()
+    assert accepted > 20 and refused > 20
+
+
+def test_a_bound_above_the_cost_is_cut_to_it():
+    solution = answer(PROBLEM, [column(PROBLEM, 1, 2)], bound=1e9)
+    assert solution.lower_bound == solution.cost
