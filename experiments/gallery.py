@@ -222,9 +222,15 @@ def screenshot() -> bytes | None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the pictures named, or all."""
-    parser = argparse.ArgumentParser(prog="experiments.gallery", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*PICTURES, "report"]))
-    parser.add_argument("-o", "--output", type=Path, default=FOLDER, metavar="FOLDER")
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.gallery", description="Draw the pictures of the documentation again."
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"pictures to draw (default: all): {', '.join([*PICTURES, 'report'])}"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, default=FOLDER, metavar="FOLDER", help="where to write them (default docs/images)"
+    )
     given = parser.parse_args(arguments)
     names = given.names or [*PICTURES, "report"]
     for name in names:

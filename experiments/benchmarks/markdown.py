@@ -28,7 +28,7 @@ ABOUT = {
 }
 
 HOW = """\
-Instances are code and seed (`experiments/instances`); the seeds here, from 1000 on, tuned nothing. Our
+Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, tuned nothing. Our
 solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers get the same tuples in
 the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both cores, `scip_1` and HiGHS (scipy, gap
 1e-9) on one; `sequential` assigns sensor after sensor with scipy, as most trackers do; `nrl_tracker` needs a
@@ -156,19 +156,21 @@ def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
     speed = median(speeds)
     return [
         found,
-        _percent(median(excess)),
-        _percent(max(excess)),
-        _percent(median(row.gap for row in rows)),
-        _time(median(row.seconds for row in rows)),
+        as_percent(median(excess)),
+        as_percent(max(excess)),
+        as_percent(median(row.gap for row in rows)),
+        as_time(median(row.seconds for row in rows)),
         f"{speed:.3g}" if math.isfinite(speed) and all(row.hit for row in rows) else "-",
     ]
 
 
-def _percent(value: float) -> str:
+def as_percent(value: float) -> str:
+    """Return a share as a number of percent, three digits; "-" where there is none."""
     if not math.isfinite(value):
         return "-"
     return "0" if abs(value) < 1e-9 else f"{100 * value:.3g}"
 
 
-def _time(seconds: float) -> str:
+def as_time(seconds: float) -> str:
+    """Return a time in milliseconds or seconds, three digits."""
     return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"

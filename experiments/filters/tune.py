@@ -116,12 +116,26 @@ def search(name: str, objective: Callable[[Array], float], start: Array, evaluat
 def main(arguments: list[str] | None = None) -> int:
     """Tune and write; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog="experiments.filters.tune", description="Tune the fuzzy rules and the IMM on random flights."
+        prog="python -m experiments.filters.tune", description="Tune the fuzzy rules and the IMM on random flights."
     )
-    parser.add_argument("--evaluations", type=int, default=500, help="of each of the two searches (default 500)")
-    parser.add_argument("--flights", type=int, default=120, help="random flights (default 120)")
-    parser.add_argument("--seed", type=int, default=20_000, help="of flights, noise and search (default 20000)")
-    parser.add_argument("--output", type=Path, default=OUTPUT, help="the parameter file to write")
+    parser.add_argument(
+        "--evaluations",
+        type=int,
+        default=500,
+        metavar="N",
+        help="evaluations of each of the two searches (default 500)",
+    )
+    parser.add_argument("--flights", type=int, default=120, metavar="N", help="number of random flights (default 120)")
+    parser.add_argument(
+        "--seed", type=int, default=20_000, metavar="N", help="seed of flights, noise and search (default 20000)"
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=OUTPUT,
+        metavar="FILE",
+        help="the parameter file to write (default: the package's own)",
+    )
     chosen = parser.parse_args(arguments)
     if chosen.evaluations < 1 or chosen.flights < 1 or chosen.seed < 0:
         parser.error("--evaluations and --flights must be at least 1, --seed at least 0")
