@@ -1,6 +1,6 @@
-"""Every picture of the documentation, drawn anew: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
+"""All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds. What is timed on the machine is in none of them but the report's screenshot.
+Pictures are of fixed scenes and seeds. Only the report's screenshot shows measured times.
 `stonesoup-fusion.png` takes its experiment's full run, which draws it:
 ``experiments.trackers.fusion_in_stone_soup --figure``.
 """

@@ -78,6 +78,8 @@ def main(argv: list[str] | None = None) -> int:
     rows: list[Row] = []
     if options.report_only:
         rows = storage.load(table)
+        if options.remark is None and report.exists():
+            options.remark = reporting.remark_of(report.read_text(encoding="utf-8"))
         write(None)
         return 0
     start = time.perf_counter()

@@ -1,15 +1,15 @@
 """Table 1 of the ant colony paper: ``python -m experiments.papers.ant_colony [--quick] [--json FILE]``.
 
 All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
-"paper" (equations 7 to 11 to the letter) and in mode "mmas", several seeds each.
+"paper" (equations 7 to 11 exactly as published) and in mode "mmas", several seeds each.
 
 *Cycles to convergence* in mode "paper" are the cycles of all ants on one scan's whole problem until all have
 walked the same tour, where a tour is a set of tuples, in whatever order. The first, greedy cycle counts, and
 so does the last, in which all agree; a search that is cut off at the limit counts with the limit. The nodes are
 the tuples that cost less than their measurements as false alarms, and the false alarms of measurements in such
 tuples: a measurement in no such tuple is a false alarm in every tour and takes no part. A scan without
-nodes takes 0 cycles. In mode "mmas" a cycle is one of all ants on one independent component, and the
-number is that until the last component is left; it ends with the certificate and has no counterpart in the paper.
+nodes takes 0 cycles. In mode "mmas" a cycle is one walk of all ants on one independent component, and the cycles of all
+components are counted; the search ends with the certificate, which has no counterpart in the paper.
 """
 
 from __future__ import annotations

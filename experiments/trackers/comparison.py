@@ -1,4 +1,4 @@
-"""Our trackers side by side: three radars, and recorded air traffic if a file is given.
+"""Our trackers compared: three radars, and recorded air traffic if a file is given.
 
     python -m experiments.trackers.comparison [FILE.csv] [--scans N] [--quick] [--seed N] [--json FILE] [--figure FILE]
 
@@ -153,7 +153,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     )
 
 
-NAME, TITLE = "trackers.comparison", "Our trackers side by side"
+NAME, TITLE = "trackers.comparison", "Our trackers compared"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Three radars in Stone Soup: our fusion in front of its tracker, beside its global nearest neighbour alone.
+"""Three radars in Stone Soup: our fusion before its tracker, compared with its global nearest neighbour alone.
 
     python -m experiments.trackers.fusion_in_stone_soup [--quick] [--seed N] [--json FILE] [--figure FILE]
     python -m experiments.trackers.fusion_in_stone_soup --tune

@@ -161,3 +161,11 @@ def test_the_readme_is_written_with_the_report(tmp_path: Path, monkeypatch: pyte
 def test_report_says_what_its_reader_should_know() -> None:
     assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "make bench", "two runs.")
     assert "These rows" not in markdown.render([ROW, PEER], None, "make bench")
+
+
+def test_a_report_written_again_keeps_its_remark(tmp_path: Path) -> None:
+    path = tmp_path / "b.csv"
+    rows.save(path, [ROW, PEER])
+    assert main(["--report-only", "--csv", str(path), "--remark", "two runs."]) == 0
+    assert main(["--report-only", "--csv", str(path)]) == 0
+    assert "**These rows**: two runs." in (tmp_path / "b.md").read_text()
