@@ -3,11 +3,11 @@
     python -m experiments.long_runs [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 The multi-sensor tracker processes 10^5 scans of three radars (four circling targets and false alarms), a tracker of
-each other family a fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by another
-solver. All in one process, one after the other, as in a program that never ends. Measured a hundred times on the way:
-resident memory, the objects that Python's collector knows, processor time a step, the least eigenvalue of the
-correlation matrix of every track (above 0: positive definite), its asymmetry, and the distance of confirmed tracks
-from the targets.
+each other family a fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by
+another solver. All in one process, one after the other, as in a program that never ends. Measured a hundred times on
+the way: resident memory, the objects that Python's collector knows, processor time a step, the least eigenvalue of
+the correlation matrix of every track (above 0: positive definite), its asymmetry, and the distance of confirmed
+tracks from the targets.
 
 Processor time depends on the load of the machine (caches, clock rate). So a fixed piece of work that uses nothing of
 this package is done and timed between the steps; the time of a step divided by the time of that work must not grow.

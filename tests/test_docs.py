@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from assoc import solvers
+from assoc.solvers import registry
 from experiments.benchmarks import readme, rows
 
 ROOT = Path(__file__).parents[1]
@@ -126,6 +127,40 @@ def test_defaults_on_the_page_of_solvers(solver, parameter, value):
 
 def test_the_page_of_solvers_gives_defaults():
     assert {solver for solver, _, _ in defaults()} == {"exact", "lagrangian", "aco", "genetic", "tabu"}
+
+
+@pytest.mark.parametrize("page", NAMES)
+def test_names_on_the_pages_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for name in set(re.findall(r"`(assoc(?:\.\w+)+)", text)):
+        parts = name.split(".")
+        if "stonesoup" in parts or "plotting" in parts:
+            continue  # extras, and the pages of the API are tested above
+        cut = next(n for n in range(len(parts), 0, -1) if find_spec_of(parts[:n]))
+        value = import_module(".".join(parts[:cut]))
+        for part in parts[cut:]:
+            assert hasattr(value, part), f"{page}: {name} does not exist"
+            value = getattr(value, part)
+
+
+def find_spec_of(parts: list[str]) -> bool:
+    """Whether there is a module of that name."""
+    try:
+        return find_spec(".".join(parts)) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def test_the_example_of_an_own_solver_runs(capsys):
+    text = (ROOT / "docs" / "own_solver.md").read_text(encoding="utf-8")
+    cells = "\n".join(re.findall(r"```\{code-cell\}\n(.*?)```", text, re.DOTALL))
+    known = dict(registry._REGISTERED)
+    try:
+        exec(compile(cells, "own_solver.md", "exec", dont_inherit=True), {"__name__": "page"})
+    finally:
+        registry._REGISTERED.clear()
+        registry._REGISTERED.update(known)
+    assert "noisy" in capsys.readouterr().out
 
 
 def test_figures_of_the_readme_are_those_of_the_benchmark():

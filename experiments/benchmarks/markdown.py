@@ -30,11 +30,11 @@ ABOUT = {
 
 HOW = """\
 Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, were not used
-for tuning. Our solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers (other solvers) get
-the same tuples in the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both cores, `scip_1` and HiGHS (scipy, gap
-1e-9) on one; `sequential` assigns one sensor at a time with scipy, as most trackers do; `nrl_tracker` needs a
-dense tensor and takes part if that has at most 8 million elements. Independent code checks the feasibility and
-cost of every answer.
+for tuning. Our solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers (other
+solvers) get the same tuples in the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both
+cores, `scip_1` and HiGHS (scipy, gap 1e-9) on one; `sequential` assigns one sensor at a time with scipy, as
+most trackers do; `nrl_tracker` needs a dense tensor and takes part if that has at most 8 million elements.
+Independent code checks the feasibility and cost of every answer.
 
 *Found*: runs whose cost is the reference: the optimum (by construction, or proven by any solver) or else,
 marked ~, the best cost that any solver found. *Excess* is relative to it. aco, genetic and tabu stop when they reach a

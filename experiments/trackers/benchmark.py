@@ -193,9 +193,12 @@ def draw(figure: Any, shown: tuple[dict[tuple[int, float], dict[str, list[Result
         axes.spines[["top", "right"]].set_visible(False)
 
 
+TITLE = "Our trackers compared with Stone Soup's, and goals"
+
+
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment as a program; returns its exit code."""
-    return main("trackers.benchmark", "Our trackers compared with Stone Soup's, and goals", experiment, draw, (8, 6), arguments)
+    return main("trackers.benchmark", TITLE, experiment, draw, (8, 6), arguments)
 
 
 if __name__ == "__main__":
