@@ -1,6 +1,6 @@
-"""Every picture of the documentation, drawn anew: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
+"""All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds. What is timed on the machine is in none of them but the report's screenshot.
+Pictures are of fixed scenes and seeds. Only the report's screenshot shows measured times.
 `stonesoup-fusion.png` takes its experiment's full run, which draws it:
 ``experiments.trackers.fusion_in_stone_soup --figure``.
 """
@@ -222,9 +222,15 @@ def screenshot() -> bytes | None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the pictures named, or all."""
-    parser = argparse.ArgumentParser(prog="experiments.gallery", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*PICTURES, "report"]))
-    parser.add_argument("-o", "--output", type=Path, default=FOLDER, metavar="FOLDER")
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.gallery", description="Draw the pictures of the documentation again."
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"pictures to draw (default: all): {', '.join([*PICTURES, 'report'])}"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, default=FOLDER, metavar="FOLDER", help="where to write them (default docs/images)"
+    )
     given = parser.parse_args(arguments)
     names = given.names or [*PICTURES, "report"]
     for name in names:

@@ -1,16 +1,16 @@
-"""Trackers and solvers that run for weeks: is memory flat, does nothing become slower, do covariances stay sound?
+"""Trackers and solvers that run for weeks: memory, speed and covariances must not get worse.
 
     python -m experiments.long_runs [--quick] [--seed N] [--json FILE] [--figure FILE]
 
-10^5 scans of three radars, four targets that circle on and false alarms, for the multi-sensor tracker, a fifth of
-that for a tracker of each other family, and 10^5 solves of problems that are drawn anew, most of them by `exact`, one
-in fifty by another solver. All in one process, one after the other, as a program that runs on and on would have it.
-Watched a hundred times on the way: the resident memory, the objects that Python's collector knows, processor time a
-step, the least eigenvalue of the correlation matrix of every track (above 0: positive definite), its asymmetry, and
-how far confirmed tracks are from the targets.
+The multi-sensor tracker processes 10^5 scans of three radars (four circling targets and false alarms), a tracker of
+each other family a fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by
+another solver. All in one process, one after the other, as in a program that never ends. Measured a hundred times on
+the way: resident memory, the objects that Python's collector knows, processor time a step, the least eigenvalue of
+the correlation matrix of every track (above 0: positive definite), its asymmetry, and the distance of confirmed
+tracks from the targets.
 
-Processor time depends on what else a machine does (caches, clock rate). Between the steps some work that never changes
-and is none of this package is done and timed too; what must not grow is the time of a step over the time of that.
+Processor time depends on the load of the machine (caches, clock rate). So a fixed piece of work that uses nothing of
+this package is done and timed between the steps; the time of a step divided by the time of that work must not grow.
 """
 
 from __future__ import annotations
@@ -242,12 +242,12 @@ def draw(figure: Any, shown: Any) -> None:
         below.plot(watch.steps[1:], watch.pace()[1:], label=name, linewidth=1.0)
     above.set(ylabel="resident memory, MB")
     above.set_ylim(bottom=0.0)
-    below.set(xlabel="steps, solves", ylabel="time of one / unchanging work")
+    below.set(xlabel="steps, solves", ylabel="time of one / fixed work")
     below.set_ylim(bottom=0.0)
     above.legend(ncols=4, fontsize=8, loc="lower right")
 
 
-TITLE = "Long runs"
+TITLE = "Long runs: memory, time and covariances"
 
 
 def program(arguments: list[str] | None = None) -> int:

@@ -1,14 +1,14 @@
-"""What a parameter study costs beside its solves, on every backend.
+"""The overhead of a parameter study, its time without the solves, on every backend.
 
     python -m experiments.sweep_overhead [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 The wall time of a study from the moment when a tenth of its runs is done until its end, less the seconds that those
 runs took in the solver, shared among the workers, is the overhead of these runs: all of it, from design to disk.
-The start of processes comes before and is given apart. Runs that take longer (those of the paper's ant colony)
-travel in smaller batches than short ones (greedy): batches hold 0.2 s of work, 0.5 s on a cluster.
+The start of processes comes before and is reported separately. Runs that take longer (those of the paper's ant colony)
+are sent in smaller batches than short ones (greedy): batches hold 0.2 s of work, 0.5 s on a cluster.
 
-Wall times grow with whatever else the machine does; so the processor time of the process that sweeps is given, too:
-beside workers all of it, in one process the share that is not the solver's.
+Wall times grow with the load of the machine, so the processor time of the sweeping process is given, too: with
+workers all of it, in one process the share outside the solver.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def draw(figure: Any, shown: Any) -> None:
     axes.legend()
 
 
-TITLE = "Overhead of a study (goal in the column of the paper)"
+TITLE = "Overhead of a parameter study (the goal is in the column of the paper)"
 
 
 def program(arguments: list[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""The program: ``python -m experiments.benchmarks [--quick] [--families ...] [--seeds N] [--csv FILE]``."""
+"""Command line: ``python -m experiments.benchmarks [--quick] [--families ...] [--seeds N] [--csv FILE]``."""
 
 from __future__ import annotations
 
@@ -20,30 +20,32 @@ if TYPE_CHECKING:
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+TABLE, QUICK_TABLE, README = Path("docs/benchmarks.csv"), Path("docs/benchmarks-quick.csv"), Path("README.md")
 FAMILIES = ("paper", "gated", "ghost", "known optimum", "random axial", "planted", "scale", "kbest")
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m experiments.benchmarks",
-        description="Run our solvers and their peers on the benchmark families and write the report.",
+        description="Run our solvers and other people's on the benchmark families; write the rows, the report "
+        f"and, for {TABLE}, the tables of README.md.",
     )
-    parser.add_argument("--quick", action="store_true", help="small instances and few seeds, under 3 minutes")
+    parser.add_argument("--quick", action="store_true", help="small instances and few seeds: under 3 minutes")
     parser.add_argument("--families", nargs="+", metavar="NAME", help=f"only these: {', '.join(FAMILIES)}")
     parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
-    parser.add_argument("--solvers", nargs="+", metavar="NAME", help="only these of ours and of the peers")
-    parser.add_argument("--seeds", type=int, metavar="N", help="seeds per size instead of each family's own")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="rows (default docs/benchmarks.csv)")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="report (default: beside the rows)")
+    parser.add_argument("--solvers", nargs="+", metavar="NAME", help="only these solvers, ours and others")
+    parser.add_argument(
+        "--seeds", type=int, metavar="N", help="number of seeds for each size (default: each family's own)"
+    )
+    parser.add_argument("--csv", type=Path, metavar="FILE", help=f"the rows (default {TABLE})")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
     parser.add_argument(
         "--update",
         action="store_true",
-        help="keep the rows of what is not run now (with --solvers: of the other solvers) from the CSV",
+        help="keep the rows of the CSV that this run does not measure (with --solvers: those of other solvers)",
     )
-    parser.add_argument("--remark", metavar="TEXT", help="what readers of the report should know of its rows")
-    parser.add_argument(
-        "--report-only", action="store_true", help="run nothing, write the report from the CSV"
-    )
+    parser.add_argument("--remark", metavar="TEXT", help="a remark on the rows, printed in the report")
+    parser.add_argument("--report-only", action="store_true", help="run nothing; write the report again from the CSV")
     return parser
 
 
@@ -57,22 +59,27 @@ def main(argv: list[str] | None = None) -> int:
             parser.error(f"--families: unknown {name!r}; known: {', '.join(FAMILIES)}")
     if options.seeds is not None and options.seeds < 1:
         parser.error(f"--seeds: expected at least 1, got {options.seeds}")
-    table: Path = options.csv or Path("docs/benchmarks-quick.csv" if options.quick else "docs/benchmarks.csv")
+    table: Path = options.csv or (QUICK_TABLE if options.quick else TABLE)
     report: Path = options.markdown or table.with_suffix(".md")
     if options.report_only and not table.exists():
         parser.error(f"--report-only: {table} does not exist")
 
     from experiments.benchmarks import markdown as reporting
+    from experiments.benchmarks import readme
     from experiments.benchmarks import rows as storage
 
     def write(minutes: float | None) -> None:
         command = "make bench-quick" if options.quick else "make bench"
         storage.save(table, rows)
         write_text(report, reporting.render(rows, minutes, command, options.remark))
+        if table == TABLE and README.exists():
+            write_text(README, readme.insert(README.read_text(encoding="utf-8"), rows))
 
     rows: list[Row] = []
     if options.report_only:
         rows = storage.load(table)
+        if options.remark is None and report.exists():
+            options.remark = reporting.remark_of(report.read_text(encoding="utf-8"))
         write(None)
         return 0
     start = time.perf_counter()

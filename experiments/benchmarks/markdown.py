@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+import re
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -18,7 +19,7 @@ ABOUT = {
     "paper": "The 100 scans of the ant colony paper's scene: three targets, three radars, P_d 0.9.",
     "gated": "Position sensors (0.1 km, P_d 0.9) over a box, 10 % false alarms; sensors x targets.",
     "ghost": "Three bearing-only sensors (5 mrad, P_d 0.95) over 100 x 100 km, whose lines cross in many "
-    "places where nothing is; number of targets.",
+    "places without a target; number of targets.",
     "known optimum": "Axial n x n x n with a known unique optimum (Grundel & Pardalos).",
     "random axial": "Axial n x n x n, integer costs uniform in 0..99.",
     "planted": "With dummies and a planted optimum, by number of sensors.",
@@ -28,18 +29,18 @@ ABOUT = {
 }
 
 HOW = """\
-Instances are code and seed (`experiments/instances`); the seeds here, from 1000 on, tuned nothing. Our
-solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers get the same tuples in
-the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both cores, `scip_1` and HiGHS (scipy, gap
-1e-9) on one; `sequential` assigns sensor after sensor with scipy, as most trackers do; `nrl_tracker` needs a
-dense tensor and takes part where that has at most 8 million elements. Every answer's feasibility and cost
-are checked by code that no solver shares.
+Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, were not used
+for tuning. Our solvers are timed from the tuples to the Solution, after warm-up, on one core. Peers (other
+solvers) get the same tuples in the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both
+cores, `scip_1` and HiGHS (scipy, gap 1e-9) on one; `sequential` assigns one sensor at a time with scipy, as
+most trackers do; `nrl_tracker` needs a dense tensor and takes part if that has at most 8 million elements.
+Independent code checks the feasibility and cost of every answer.
 
-*Found*: runs whose cost is the reference: the optimum (by construction, or proven by anyone) or else,
-marked ~, the best cost anyone has. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
+*Found*: runs whose cost is the reference: the optimum (by construction, or proven by any solver) or else,
+marked ~, the best cost that any solver found. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
 known optimum, so their time is the time to it; `lagrangian@0.1%` stops at that gap. *Speed* is the median
-over instances of the fastest peer's time to a proven optimum divided by this solver's time, where that found
-the reference in every run."""
+over instances of the fastest peer's time to a proven optimum divided by this solver's time; it is given if this
+solver found the reference in every run."""
 
 
 def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str | None = None) -> str:
@@ -67,6 +68,12 @@ def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str
     for family in dict.fromkeys(row.family for row in rows):
         parts += ["", f"## {family}", "", ABOUT.get(family, ""), "", _table(results, family)]
     return "\n".join(parts) + "\n"
+
+
+def remark_of(report: str) -> str | None:
+    """Return the remark of a report written by `render`."""
+    found = re.search(r"^\*\*These rows\*\*: (.*)$", report, re.MULTILINE)
+    return found[1] if found else None
 
 
 def _missing(rows: Sequence[Row]) -> str:
@@ -156,19 +163,21 @@ def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
     speed = median(speeds)
     return [
         found,
-        _percent(median(excess)),
-        _percent(max(excess)),
-        _percent(median(row.gap for row in rows)),
-        _time(median(row.seconds for row in rows)),
+        as_percent(median(excess)),
+        as_percent(max(excess)),
+        as_percent(median(row.gap for row in rows)),
+        as_time(median(row.seconds for row in rows)),
         f"{speed:.3g}" if math.isfinite(speed) and all(row.hit for row in rows) else "-",
     ]
 
 
-def _percent(value: float) -> str:
+def as_percent(value: float) -> str:
+    """Return a share as a number of percent, three digits; "-" where there is none."""
     if not math.isfinite(value):
         return "-"
     return "0" if abs(value) < 1e-9 else f"{100 * value:.3g}"
 
 
-def _time(seconds: float) -> str:
+def as_time(seconds: float) -> str:
+    """Return a time in milliseconds or seconds, three digits."""
     return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"

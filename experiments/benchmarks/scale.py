@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -95,5 +96,20 @@ def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]
     return rows
 
 
+def program(arguments: list[str] | None = None) -> int:
+    """Measure one size and print it as JSON; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.benchmarks.scale",
+        description="Associate one simulated scan of three radars; print time, memory and cost as one line of JSON.",
+    )
+    parser.add_argument("targets", type=int, metavar="TARGETS", help="number of targets")
+    parser.add_argument("seed", type=int, metavar="SEED", help="seed of the scene")
+    chosen = parser.parse_args(arguments)
+    if chosen.targets < 1 or chosen.seed < 0:
+        parser.error("expected TARGETS of at least 1 and SEED of at least 0")
+    print(json.dumps(measure(chosen.targets, chosen.seed)))
+    return 0
+
+
 if __name__ == "__main__":
-    print(json.dumps(measure(int(sys.argv[1]), int(sys.argv[2]))))
+    sys.exit(program())

@@ -19,7 +19,7 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Claim:
-    """One quantity of a paper beside ours.
+    """One quantity of a paper, and our measurement of it.
 
     Parameters
     ----------

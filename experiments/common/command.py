@@ -1,4 +1,4 @@
-"""The command line that the experiments with filters share: --quick, --seed, --json, --figure."""
+"""The command line that most experiments share: --quick, --seed, --json, --figure."""
 
 from __future__ import annotations
 
@@ -38,23 +38,44 @@ def main(
     size : (float, float)
         Of the figure, inches.
     """
-    picture = f"{name.rpartition('.')[2]}.png"
-    parser = argparse.ArgumentParser(prog=f"experiments.{name}", description=title)
-    parser.add_argument("--quick", action="store_true", help="a tenth of the runs, in seconds")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the random generator (default 0)")
-    parser.add_argument("--json", metavar="FILE", help="write the claims here")
-    parser.add_argument("--figure", metavar="FILE", help=f"the figure's file (default {picture})")
-    chosen = parser.parse_args(arguments)
+    parser = make_parser(name, title)
+    return run(parser, parser.parse_args(arguments), name, title, experiment, draw, size)
+
+
+def make_parser(name: str, title: str) -> argparse.ArgumentParser:
+    """Return the parser of the options that the experiments share; an experiment may add its own."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=f"{title}.")
+    parser.add_argument("--quick", action="store_true", help="fewer or shorter runs, for a first look")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default 0)")
+    parser.add_argument("--json", metavar="FILE", help="write the results here")
+    parser.add_argument("--figure", metavar="FILE", help=f"write the figure here (default {_picture(name)})")
+    return parser
+
+
+def run(
+    parser: argparse.ArgumentParser,
+    chosen: argparse.Namespace,
+    name: str,
+    title: str,
+    experiment: Experiment,
+    draw: Draw,
+    size: tuple[float, float],
+) -> int:
+    """Run an experiment with the options chosen; see `main`."""
     if chosen.seed < 0:
         parser.error("--seed must be at least 0")
     claims, shown = experiment(chosen.quick, np.random.default_rng(chosen.seed))
     print_table(claims, title)
     if chosen.json:
         save_json(chosen.json, claims, name, chosen.seed)
-    figure_file = Path(chosen.figure or picture)
+    figure_file = Path(chosen.figure or _picture(name))
     save_figure(figure_file, draw, shown, size)
     print(f"{figure_file}: written")
     return 0
+
+
+def _picture(name: str) -> str:
+    return f"{name.rpartition('.')[2]}.png"
 
 
 def save_figure(path: Path, draw: Draw, shown: Any, size: tuple[float, float]) -> None:

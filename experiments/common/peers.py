@@ -1,8 +1,8 @@
-"""What people would use instead of assoc, run on the same tuples.
+"""Other solvers that could be used instead of assoc, run on the same tuples.
 
 Every peer takes a problem and a time limit and returns a `PeerAnswer`; its time runs from the tuples to the
-chosen tuples, building its model included, importing its package not. Its answer is priced by
-`experiments.common.checking`, not by itself.
+chosen tuples: it includes building the model, but not importing the package. The cost of its answer is
+computed by `experiments.common.checking`, not by the peer.
 
 ======================  ==========================================================================
 ``cp_sat``              OR-Tools CP-SAT, two workers, costs times 1e6 rounded to integers

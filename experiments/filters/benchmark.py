@@ -3,11 +3,11 @@
     python -m experiments.filters.benchmark [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 The problem: tracks of nearly constant velocity; position measurements for the Kalman filter, a radar (range, azimuth,
-elevation) for the others, N = 100 for the ensemble. The others take one track at a time; ours takes all tracks in
-one call, which is how its filters are meant to be used, and, stated apart, one track at a time: all steps of its
-recording in one call (`run`), a step a call (`step`), and two calls a step (`predict`, `update`). Each row is a
-prediction and an update together, the least of several rounds, in which the packages take turns. Times are the
-processor's, which count less of what else the machine does.
+elevation) for the others, N = 100 for the ensemble. The other packages take one track at a time. Ours takes all tracks
+in one call, which is how its filters are meant to be used, and in separate rows one track at a time: all steps of its
+recording in one call (`run`), one call a step (`step`), and two calls a step (`predict`, `update`). Each row is a
+prediction and an update together, the least of several rounds, in which the packages alternate. Times are processor
+times, which depend less on the load of the machine.
 """
 
 from __future__ import annotations
@@ -251,7 +251,7 @@ def draw(figure: Any, shown: Any) -> None:
     axes.legend(ncols=3, fontsize=8)
 
 
-TITLE = "Time of a prediction and update (goal in the column of the paper)"
+TITLE = "Time of a prediction and update (the goal is in the column of the paper)"
 
 
 def program(arguments: list[str] | None = None) -> int:

@@ -2,9 +2,9 @@
 
     python -m experiments.filters.consistency [--quick] [--seed N] [--json FILE] [--figure FILE]
 
-NEES is averaged over the runs at the last step, because that of one run is correlated in time; NIS, which for an exact
-filter is not, also over the second half of the steps. The bounds are those of means of so many independent values. On
-the linear case the filters that are exact must lie inside; on B1 nobody is exact, and the table says by how much.
+NEES is averaged over the runs at the last step, because NEES of one run is correlated in time. NIS is not for an exact
+filter, so it is averaged over the second half of the steps, too. The bounds are those of means of as many independent
+values. On the linear case the exact filters must lie inside; on B1 no filter is exact, and the table says by how much.
 """
 
 from __future__ import annotations

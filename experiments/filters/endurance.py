@@ -3,7 +3,7 @@
     python -m experiments.filters.endurance [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 A target that stands still is measured by a radar (by a position sensor for the Kalman filter), corrections come in
-bursts of three for a prediction, which is hardest on a covariance. Watched every 100 steps: the least
+bursts of three for each prediction, which is the hardest case for a covariance. Checked every 100 steps: the least
 eigenvalue of the correlation matrix (above 0: positive definite, whatever the units), and the largest asymmetry, in
 units of the standard deviations.
 """

@@ -1,11 +1,11 @@
-"""Tune the fuzzy rules and the IMM with the same care; writes assoc/filters/fuzzy/tuned_parameters.json.
+"""Tune the fuzzy rules and the IMM in the same way; writes assoc/filters/fuzzy/tuned_parameters.json.
 
     python -m experiments.filters.tune [--evaluations N] [--flights N] [--seed N] [--output FILE]
 
 Both see the same random flights and the same measurements, and have the same search: adaptation of a covariance matrix
-(CMA-ES, package `cma`), as many evaluations, the same first spread, begun at the parameters that the package has. None
-of these flights is in the report (experiments/papers/fuzzy_ekf.py); at the end both are measured on as many others,
-which shows whether they have learned the flights by heart. About three minutes of one core.
+(CMA-ES, package `cma`), as many evaluations, the same first spread, starting from the package's parameters. None
+of these flights is in the report (experiments/papers/fuzzy_ekf.py). At the end both are measured on as many others,
+which shows whether they are overfitted. About three minutes of one core.
 """
 
 from __future__ import annotations
@@ -116,12 +116,26 @@ def search(name: str, objective: Callable[[Array], float], start: Array, evaluat
 def main(arguments: list[str] | None = None) -> int:
     """Tune and write; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog="experiments.filters.tune", description="Tune the fuzzy rules and the IMM on random flights."
+        prog="python -m experiments.filters.tune", description="Tune the fuzzy rules and the IMM on random flights."
     )
-    parser.add_argument("--evaluations", type=int, default=500, help="of each of the two searches (default 500)")
-    parser.add_argument("--flights", type=int, default=120, help="random flights (default 120)")
-    parser.add_argument("--seed", type=int, default=20_000, help="of flights, noise and search (default 20000)")
-    parser.add_argument("--output", type=Path, default=OUTPUT, help="the parameter file to write")
+    parser.add_argument(
+        "--evaluations",
+        type=int,
+        default=500,
+        metavar="N",
+        help="evaluations of each of the two searches (default 500)",
+    )
+    parser.add_argument("--flights", type=int, default=120, metavar="N", help="number of random flights (default 120)")
+    parser.add_argument(
+        "--seed", type=int, default=20_000, metavar="N", help="seed of flights, noise and search (default 20000)"
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=OUTPUT,
+        metavar="FILE",
+        help="the parameter file to write (default: the package's own)",
+    )
     chosen = parser.parse_args(arguments)
     if chosen.evaluations < 1 or chosen.flights < 1 or chosen.seed < 0:
         parser.error("--evaluations and --flights must be at least 1, --seed at least 0")

@@ -1,15 +1,15 @@
 """Table 1 of the ant colony paper: ``python -m experiments.papers.ant_colony [--quick] [--json FILE]``.
 
 All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
-"paper" (equations 7 to 11 to the letter) and in mode "mmas", several seeds each.
+"paper" (equations 7 to 11 exactly as published) and in mode "mmas", several seeds each.
 
 *Cycles to convergence* in mode "paper" are the cycles of all ants on one scan's whole problem until all have
 walked the same tour, where a tour is a set of tuples, in whatever order. The first, greedy cycle counts, and
 so does the last, in which all agree; a search that is cut off at the limit counts with the limit. The nodes are
 the tuples that cost less than their measurements as false alarms, and the false alarms of measurements in such
 tuples: a measurement in no such tuple is a false alarm in every tour and takes no part. A scan without
-nodes takes 0 cycles. In mode "mmas" a cycle is one of all ants on one independent component, and the
-number is that until the last component is left; it ends with the certificate and has no counterpart in the paper.
+nodes takes 0 cycles. In mode "mmas" a cycle is one walk of all ants on one independent component, and the cycles of all
+components are counted; the search ends with the certificate, which has no counterpart in the paper.
 """
 
 from __future__ import annotations
@@ -109,18 +109,27 @@ def _main(arguments: Sequence[str] | None) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m experiments.papers.ant_colony", description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="30 scans and 2 seeds, under a minute")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the scene and the ants (default 0)")
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.papers.ant_colony",
+        description="Table 1 of the ant colony paper: 24 settings of alpha, beta and rho on the scene of the paper.",
+    )
+    parser.add_argument("--quick", action="store_true", help="30 scans and 2 seeds: under a minute")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the scene and the ants (default 0)")
     parser.add_argument("--scans", type=int, metavar="N", help="scans of the scene (default 100)")
     parser.add_argument("--seeds", type=int, metavar="N", help="runs of each setting on each scan (default 10)")
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the claims here")
-    parser.add_argument("--study", metavar="FOLDER", help="keep the runs here, and go on with what is there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the results here")
     parser.add_argument(
-        "-o", "--output", default="results/aco_parameters", metavar="FOLDER", help="default results/aco_parameters"
+        "--study", metavar="FOLDER", help="keep the runs in this folder, and run only what is missing there"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        default="results/aco_parameters",
+        metavar="FOLDER",
+        help="where to write tables and figures (default results/aco_parameters)",
     )
     return parser
 

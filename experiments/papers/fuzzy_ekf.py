@@ -1,11 +1,11 @@
-"""Fuzzy-adaptive EKF on manoeuvring targets, beside the best fixed EKF and an IMM.
+"""Fuzzy-adaptive EKF on manoeuvring targets, compared with the best fixed EKF and an IMM.
 
     python -m experiments.papers.fuzzy_ekf [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 The paper shows one trajectory without units or membership functions and reports 42 % (EKF) and 60 % (EKF with
 inference) below the raw measurements. Here: scenarios C, D and E; the rules and the IMM were both tuned on random
 flights that are not among them (experiments.filters.tune.py). The fixed EKFs are chosen in hindsight, for
-each scenario the best of a grid, which is more than any fixed filter could know.
+each scenario the best of a grid: no filter fixed in advance could be better.
 """
 
 from __future__ import annotations

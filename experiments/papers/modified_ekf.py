@@ -1,9 +1,10 @@
-"""Modified EKF for a 3-D radar: when it pays, and whether its covariances are right.
+"""Modified EKF for a 3-D radar: when it is better than an EKF, and whether its covariances are right.
 
     python -m experiments.papers.modified_ekf [--quick] [--seed N] [--json FILE] [--figure FILE]
 
-The paper reports 0.77-1.15 % (RMSE x 100) at a range of 20 m. What decides is beta = r sigma_angle^2 / sigma_range:
-with the covariance R_k that the paper states it is 0.09, and the modified filter cannot differ from an EKF.
+The paper reports 0.77-1.15 % (RMSE x 100) at a range of 20 m. The deciding quantity is
+beta = r sigma_angle^2 / sigma_range: with the covariance R_k that the paper states it is 0.09,
+and the modified filter cannot differ from an EKF.
 Benchmark B1 is chosen where it matters.
 """
 

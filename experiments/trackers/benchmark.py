@@ -1,13 +1,14 @@
-"""Our trackers against Stone Soup's on the same detections, and against what a tracker must reach.
+"""Our trackers compared with Stone Soup's on the same detections, and with the goals for a tracker.
 
     python -m experiments.trackers.benchmark [--quick] [--seed N] [--json FILE] [--figure FILE]
 
 Stone Soup's multi-frame assignment and its global nearest neighbour are given the targets at time 0, and so are ours:
 a square of targets in nearly straight flight, two clutter densities, the same window of 3 scans, the same gates. Stone
-Soup neither starts nor ends tracks; ours do, at their own risk. Times are CPU seconds of a scan, all in one process.
-A peer stops when its time is over: then both are compared on the scans that it did, and the table says how many.
+Soup neither starts nor ends tracks; ours do, which may cost them accuracy. Times are CPU seconds of a scan, all in one
+process. Stone Soup's trackers stop when their time is over: then both are compared on the scans that were done, and the
+table says how many.
 
-The second part are goals: three radars (second scan, false tracks, error against one radar) and a thousand targets.
+The second part measures goals: three radars (second scan, false tracks, error against one radar), a thousand targets.
 """
 
 from __future__ import annotations
@@ -192,9 +193,12 @@ def draw(figure: Any, shown: tuple[dict[tuple[int, float], dict[str, list[Result
         axes.spines[["top", "right"]].set_visible(False)
 
 
+TITLE = "Our trackers compared with Stone Soup's, and goals"
+
+
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment as a program; returns its exit code."""
-    return main("trackers.benchmark", "Trackers against Stone Soup, and goals", experiment, draw, (8, 6), arguments)
+    return main("trackers.benchmark", TITLE, experiment, draw, (8, 6), arguments)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Our trackers side by side: three radars, and recorded air traffic if a file is given.
+"""Our trackers compared: three radars, and recorded air traffic if a file is given.
 
     python -m experiments.trackers.comparison [FILE.csv] [--scans N] [--quick] [--seed N] [--json FILE] [--figure FILE]
 
@@ -9,7 +9,6 @@ GOSPA (order 2), identity switches, and CPU time per scan.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -22,7 +21,7 @@ from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from experiments.common.claims import Claim
-from experiments.common.command import main
+from experiments.common.command import make_parser, run
 from experiments.trackers.running import through
 
 CUTOFF = 500.0
@@ -138,25 +137,23 @@ def draw(figure: Any, shown: dict[str, tuple[Array, dict[str, Array]]]) -> None:
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment as a program; returns its exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    file = words.pop(0) if words and not words[0].startswith("-") else None
-    scans = None
-    if "--scans" in words:
-        place = words.index("--scans")
-        try:
-            scans = int(words[place + 1])
-        except (IndexError, ValueError):
-            raise SystemExit("--scans: expected a whole number") from None
-        del words[place : place + 2]
-    return main(
-        "tracking_comparison",
-        "Trackers side by side",
-        lambda quick, rng: experiment(file, scans, quick, rng),
+    """Run the experiment; returns its exit code."""
+    parser = make_parser(NAME, TITLE)
+    parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
+    parser.add_argument("--scans", type=int, metavar="N", help="scans of the recorded trajectories (default: all)")
+    chosen = parser.parse_args(arguments)
+    return run(
+        parser,
+        chosen,
+        NAME,
+        TITLE,
+        lambda quick, rng: experiment(chosen.file, chosen.scans, quick, rng),
         draw,
-        (8, 4.0 if file is None else 7.0),
-        words,
+        (8, 4.0 if chosen.file is None else 7.0),
     )
+
+
+NAME, TITLE = "trackers.comparison", "Our trackers compared"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Three radars in Stone Soup: our fusion in front of its tracker, beside its global nearest neighbour alone.
+"""Three radars in Stone Soup: our fusion before its tracker, compared with its global nearest neighbour alone.
 
     python -m experiments.trackers.fusion_in_stone_soup [--quick] [--seed N] [--json FILE] [--figure FILE]
     python -m experiments.trackers.fusion_in_stone_soup --tune
@@ -11,7 +11,6 @@ Mahalanobis distance) are those that did best for it on other seeds.
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -44,7 +43,7 @@ from assoc._types import Array
 from assoc.integrations.stonesoup import AssignmentAssociator, FusionFeeder, adapt
 from assoc.simulation.radars import azimuth_interval, on_circle, padded, padded_azimuth, range_interval
 from experiments.common.claims import Claim
-from experiments.common.command import main, mean_interval
+from experiments.common.command import make_parser, mean_interval, run
 
 Stream = list[tuple[datetime, set[Any]]]
 
@@ -245,15 +244,19 @@ def draw(figure: Any, shown: Any) -> None:
     right.legend(fontsize=8)
 
 
-TITLE = "Three radars in Stone Soup: fusion by S-D assignment beside its global nearest neighbour"
+NAME = "trackers.fusion_in_stone_soup"
+TITLE = "Three radars in Stone Soup: fusion by S-D assignment compared with its global nearest neighbour"
 
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    if arguments == ["--tune"] or (arguments is None and sys.argv[1:] == ["--tune"]):
+    parser = make_parser(NAME, TITLE)
+    parser.add_argument("--tune", action="store_true", help="only try the settings of each way on two other scenes")
+    chosen = parser.parse_args(arguments)
+    if chosen.tune:
         tune()
         return 0
-    return main("trackers.fusion_in_stone_soup", TITLE, experiment, draw, (11, 4.6), arguments)
+    return run(parser, chosen, NAME, TITLE, experiment, draw, (11, 4.6))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import FIRST_SEED, goals, markdown, rows
+from experiments.benchmarks import FIRST_SEED, goals, markdown, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
@@ -145,6 +145,27 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "## gated" in (tmp_path / "b.md").read_text()
 
 
+def test_the_readme_is_written_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / "README.md"
+    page.write_text(f"before\n{readme.BEGIN}\nold\n{readme.END}\nafter\n")
+    sequential = replace(ROW, solver="sequential", peer=True, cost=-98.0, status="feasible")
+    rows.save(tmp_path / "docs" / "benchmarks.csv", [ROW, PEER, sequential])
+    assert main(["--report-only"]) == 0
+    text = page.read_text()
+    assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
+    assert "| 3 sensors, 300 targets | 10 ms | 300 ms (HiGHS) | 2 % |" in text
+
+
 def test_report_says_what_its_reader_should_know() -> None:
     assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "make bench", "two runs.")
     assert "These rows" not in markdown.render([ROW, PEER], None, "make bench")
+
+
+def test_a_report_written_again_keeps_its_remark(tmp_path: Path) -> None:
+    path = tmp_path / "b.csv"
+    rows.save(path, [ROW, PEER])
+    assert main(["--report-only", "--csv", str(path), "--remark", "two runs."]) == 0
+    assert main(["--report-only", "--csv", str(path)]) == 0
+    assert "**These rows**: two runs." in (tmp_path / "b.md").read_text()

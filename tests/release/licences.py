@@ -109,7 +109,7 @@ def tables() -> str:
         found = _installed(name)
         licence = "?" if found is None else " and ".join(families(found)) or "?"
         lines.append(f"| {name} | {oldest} | {', '.join(_PURPOSES[group] for group in groups)} | {licence} |")
-    lines += ["", "What the packages of users (not those for tests, pages and checks) bring along:", ""]
+    lines += ["", "What these packages install in turn (without those for tests, pages and checks):", ""]
     lines += ["| package | through | licence |", "|---|---|---|"]
     used = [name for name, (_, groups) in needed.items() if {*groups} - {"docs", "test", "lint", "release", "build"}]
     for name, roots in behind(used).items():

@@ -2,7 +2,7 @@
 
     python -m experiments.papers.clustering_time_window [--quick] [--seed N] [--json FILE] [--figure FILE]
 
-The paper's recording is not public. Scenario S1 (`rotating-radar`) is made after what the paper prints of it: 14
+The paper's recording is not public. Scenario S1 (`rotating-radar`) follows what the paper tells about it: 14
 aircraft, 1,130 s, a rotation of 9.5 s, P_d 0.78, ranges in whole nautical miles. Its CT, MT and IT are described in
 words; docs/metrics.md says what they mean here. Its grouping without window is irregular: here of gamma-distributed
 lengths with the paper's mean of 6.2 s. "Time stamps" are each plot's own; without them a fixed time passes from group

@@ -1,0 +1,78 @@
+"""List of the experiments: ``python -m experiments``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class Experiment(NamedTuple):
+    """One program below ``experiments``.
+
+    Attributes
+    ----------
+    name : str
+        What follows ``python -m experiments.``.
+    measures : str
+        What it does, in one line.
+    regenerates : str
+        Pages, pictures and files whose figures it gives.
+    """
+
+    name: str
+    measures: str
+    regenerates: str
+
+
+EXPERIMENTS = (
+    Experiment(
+        "benchmarks",
+        "our solvers and other people's on eight families of problems",
+        "docs/benchmarks.csv, docs/benchmarks.md, the tables of README.md",
+    ),
+    Experiment(
+        "benchmarks.scale",
+        "time and memory of one large scan, in a process of its own",
+        "one line of JSON: family scale of the benchmarks",
+    ),
+    Experiment("papers.ant_colony", "table 1 of the ant colony paper", "docs/sweeps.md (table 1), docs/papers.md"),
+    Experiment(
+        "papers.clustering_time_window",
+        "the clustering time window of Cahyono's thesis",
+        "docs/recordings.md (what the window is worth), docs/papers.md",
+    ),
+    Experiment("papers.modified_ekf", "the modified EKF for a 3-D radar", "docs/filters.md, docs/papers.md"),
+    Experiment("papers.fuzzy_ekf", "the EKF with fuzzy inference", "docs/filters.md, docs/papers.md"),
+    Experiment("papers.dubins_enkf", "Dubins paths and the ensemble Kalman filter", "docs/filters.md, docs/papers.md"),
+    Experiment("filters.benchmark", "time of our filters and of other packages'", "docs/filters.md (speed)"),
+    Experiment("filters.consistency", "NEES and NIS of every filter", "docs/filters.md (consistency)"),
+    Experiment("filters.endurance", "covariances after 100,000 corrections", "docs/filters.md (consistency)"),
+    Experiment("filters.tune", "tuning of the fuzzy rules and of the IMM", "assoc/filters/fuzzy/tuned_parameters.json"),
+    Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
+    Experiment("trackers.comparison", "our trackers side by side", "docs/tracking.md (measured)"),
+    Experiment(
+        "trackers.fusion_in_stone_soup",
+        "fusion before tracking, in Stone Soup",
+        "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
+    ),
+    Experiment("sweep_overhead", "time of a parameter study besides its solves", "docs/sweeps.md (overhead)"),
+    Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
+    Experiment("gallery", "the pictures of the documentation", "docs/images"),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the list; returns the exit code."""
+    argparse.ArgumentParser(
+        prog="python -m experiments",
+        description="List the experiments. Each has its own program, python -m experiments.NAME, with --help.",
+    ).parse_args(arguments)
+    print("python -m experiments.NAME [--help]\n")
+    for name, measures, regenerates in EXPERIMENTS:
+        print(f"{name}\n    {measures}\n    -> {regenerates}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,113 @@
+"""The tables of README.md, written from the same rows as docs/benchmarks.md."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from statistics import median
+
+from experiments.benchmarks.families import HEURISTICS
+from experiments.benchmarks.goals import PROVING_PEERS, Results, judge
+from experiments.benchmarks.markdown import as_percent, as_time
+from experiments.benchmarks.rows import Row
+
+BEGIN = "<!-- from here to the end mark: written by python -m experiments.benchmarks -->"
+END = "<!-- end mark -->"
+
+PEERS = {"cp_sat": "CP-SAT", "highs": "HiGHS", "scip": "SCIP", "scip_1": "SCIP"}
+TIMED = {
+    ("gated", "3x100"): "3 sensors, 100 targets",
+    ("gated", "3x300"): "3 sensors, 300 targets",
+    ("gated", "3x1000"): "3 sensors, 1,000 targets",
+    ("gated", "4x300"): "4 sensors, 300 targets",
+    ("gated", "5x200"): "5 sensors, 200 targets",
+    ("ghost", "20"): "bearings only, 20 targets",
+    ("ghost", "40"): "bearings only, 40 targets",
+    ("random axial", "n=26"): "axial, random costs, 26 x 26 x 26",
+}
+"""Family and size -> how the table of times calls it."""
+GHOSTS = ("20", "40", "60", "100")
+"""Sizes of family ghost in the second table."""
+_SHORT, _LONG = 5.0, 60.0
+_FAR = 1.0
+
+
+def insert(readme: str, rows: Sequence[Row]) -> str:
+    """Return README's text with the part between the marks written anew.
+
+    Raises
+    ------
+    ValueError
+        The marks are not there, each once and in order.
+    """
+    if readme.count(BEGIN) != 1 or readme.count(END) != 1 or readme.index(BEGIN) > readme.index(END):
+        raise ValueError(f"README.md: expected the marks {BEGIN} and {END}, each once")
+    before, rest = readme.split(BEGIN)
+    after = rest.split(END)[1]
+    return f"{before}{BEGIN}\n\n{render(rows)}\n\n{END}{after}"
+
+
+def render(rows: Sequence[Row]) -> str:
+    """Return the tables and the number of goals met."""
+    results = Results(rows)
+    lines = [
+        "| | `exact` | fastest other solver with a proof | assigning one sensor at a time |",
+        "|---|---:|---:|---:|",
+    ]
+    lines += [_timed(results, *key, name) for key, name in TIMED.items() if results.of(*key)]
+    lines += ["", *_ghosts(results)]
+    verdicts = [v for v in judge(rows) if not v.stretch]
+    met = sum(v.met for v in verdicts)
+    lines += ["", f"{met} of {len(verdicts)} goals are met; [benchmarks](docs/benchmarks.md) lists each."]
+    return "\n".join(lines)
+
+
+def _timed(results: Results, family: str, size: str, name: str) -> str:
+    """One instance family: median times to a proven optimum, and the excess cost of one sensor at a time."""
+    mine = results.of(family, size, "exact")
+    proved = all(row.status == "optimal" for row in mine)
+    ours = as_time(median(row.seconds for row in mine)) if proved else "no proof"
+    runs: dict[tuple[str, float], list[Row]] = {}
+    for row in results.of(family, size):
+        if row.solver in PROVING_PEERS:
+            runs.setdefault((row.solver, row.limit), []).append(row)
+    times = [
+        (median(row.seconds for row in theirs), peer)
+        for (peer, _), theirs in runs.items()
+        if all(row.status == "optimal" for row in theirs)
+    ]
+    other = f"{as_time(min(times)[0])} ({PEERS[min(times)[1]]})" if times else "no proof"
+    return f"| {name} | {ours} | {other} | {_excess(results.of(family, size, 'sequential'))} |"
+
+
+def _excess(rows: Sequence[Row]) -> str:
+    if not rows:
+        return "-"
+    middle = median(row.excess if math.isfinite(row.cost) else math.inf for row in rows)
+    return f"{as_percent(middle)} %" if middle < _FAR else f"{1 + middle:.0f} times the cost"
+
+
+def _ghosts(results: Results) -> list[str]:
+    """Bearings only: what is reached in a short time, as the worst excess over the best cost known."""
+    kinds = [*(f"`{name}`, {_SHORT:g} s" for name in HEURISTICS), f"best other solver, {_LONG:g} s"]
+    lines = ["| bearings only | " + " | ".join(kinds) + " | optimum |", "|---|" + "---:|" * len(kinds) + "---|"]
+    for size in GHOSTS:
+        rows = results.of("ghost", size)
+        if not rows:
+            continue
+        cells = [_worst([row for row in rows if row.solver == name]) for name in HEURISTICS]
+        found = {}
+        for row in rows:
+            if row.peer and row.limit <= _LONG:
+                instance = row.seed, row.item
+                if instance not in found or row.cost < found[instance].cost:
+                    found[instance] = row
+        cells.append(_worst(list(found.values())))
+        known = "proven" if all(row.proven for row in rows) else "best known"
+        lines.append(f"| {size} targets | " + " | ".join(cells) + f" | {known} |")
+    return lines
+
+
+def _worst(rows: Sequence[Row]) -> str:
+    """Largest excess of any run."""
+    return f"{as_percent(max(row.excess for row in rows))} %" if rows else "-"

@@ -1,0 +1,174 @@
+"""The pages agree with the code: rooms and paths exist, API targets import, README's figures come from the CSV."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from assoc import solvers
+from assoc.solvers import registry
+from experiments.benchmarks import readme, rows
+
+ROOT = Path(__file__).parents[1]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *sorted(path for path in (ROOT / "docs").rglob("*.md") if "_build" not in path.parts),
+]
+ARCHITECTURE = ROOT / "docs" / "architecture.md"
+NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
+
+
+def rooms() -> list[str]:
+    """Folders (``solvers/``) and modules (``errors.py``) at the top of the package."""
+    top = ROOT / "assoc"
+    folders = [f"{path.parent.name}/" for path in top.glob("*/__init__.py")]
+    modules = [path.name for path in top.glob("*.py") if not path.name.startswith("__")]
+    return sorted(folders + modules)
+
+
+def house() -> str:
+    """The plan on the page: its first block of code."""
+    text = ARCHITECTURE.read_text(encoding="utf-8")
+    return text.split("```")[1]
+
+
+@pytest.mark.parametrize("room", rooms())
+def test_every_room_is_in_the_plan_of_the_house(room):
+    assert re.search(rf"(?<![\w/]){re.escape(room)}(?!\w)", house()), f"docs/architecture.md: {room} is missing"
+
+
+def test_the_plan_shows_no_room_that_is_not_there():
+    shown = set(re.findall(r"(?<![\w/])\w+(?:/|\.py)(?!\w)", house()))
+    assert shown == set(rooms())
+
+
+@pytest.mark.parametrize("page", NAMES)
+def test_paths_on_the_pages_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    paths = re.findall(r"(?<![\w/.-])(?:assoc|experiments|tests)/[\w/.]*\w/?", text)
+    for path in paths:
+        assert (ROOT / path).exists(), f"{page}: {path} does not exist"
+
+
+def test_paths_of_the_architecture_exist():
+    heads = "|".join(re.escape(room.rstrip("/")) for room in rooms() if room.endswith("/"))
+    text = ARCHITECTURE.read_text(encoding="utf-8")
+    paths = re.findall(rf"`((?:{heads})/[\w/.]*)`", text)
+    assert len(paths) > 50
+    for path in paths:
+        assert "NAME" in path or (ROOT / "assoc" / path).exists(), f"docs/architecture.md: {path} does not exist"
+
+
+@pytest.mark.parametrize("page", NAMES)
+def test_modules_on_the_pages_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for name in re.findall(r"python\s+-m\s+((?:assoc|experiments|tests)[\w.]*\w)", text):
+        assert find_spec(name) is not None, f"{page}: python -m {name} does not exist"
+
+
+@pytest.mark.parametrize("page", NAMES)
+def test_links_lead_somewhere(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#\s]+)", text):
+        if "://" not in target:
+            assert ((ROOT / page).parent / target).exists(), f"{page}: {target} does not exist"
+
+
+def test_every_page_is_in_a_list_of_contents():
+    listed = set()
+    for page in PAGES:
+        for block in re.findall(r"```\{toctree\}(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            lines = [line.strip() for line in block.splitlines() if line.strip() and not line.startswith(":")]
+            listed |= {(page.parent / f"{line}.md").resolve() for line in lines}
+    pages = {path for path in PAGES if path.parent != ROOT and path.name != "benchmarks-quick.md"}
+    assert pages - listed == {ROOT / "docs" / "index.md"}
+
+
+def targets() -> list[str]:
+    """What the API pages let autodoc describe."""
+    found = []
+    for path in sorted((ROOT / "docs" / "api").glob("*.md")):
+        found += re.findall(r"\.\. auto\w+:: ([\w.]+)", path.read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.mark.parametrize("target", targets())
+def test_what_the_api_pages_describe_can_be_imported(target):
+    module, _, name = target.rpartition(".")
+    if module.startswith("assoc.integrations.stonesoup"):
+        pytest.importorskip("stonesoup")
+    if module == "assoc.plotting":
+        pytest.importorskip("matplotlib")
+    assert getattr(import_module(module), name).__doc__
+
+
+def defaults() -> list[tuple[str, str, str]]:
+    """Solver, parameter and default as docs/solvers.md gives them."""
+    text = (ROOT / "docs" / "solvers.md").read_text(encoding="utf-8")
+    found = []
+    for section in text.split("\n## ")[1:]:
+        name = section.split()[0]
+        if name in solvers.names():
+            pairs = re.findall(r"`(\w+)` \(([\d.e-]*\d)", section)
+            found += [(name, parameter, value) for parameter, value in pairs]
+    return found
+
+
+@pytest.mark.parametrize(("solver", "parameter", "value"), defaults())
+def test_defaults_on_the_page_of_solvers(solver, parameter, value):
+    known = {field.name: field.default for field in fields(solvers.parameters(solver))}
+    assert known[parameter] == float(value)
+
+
+def test_the_page_of_solvers_gives_defaults():
+    assert {solver for solver, _, _ in defaults()} == {"exact", "lagrangian", "aco", "genetic", "tabu"}
+
+
+@pytest.mark.parametrize("page", NAMES)
+def test_names_on_the_pages_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for name in set(re.findall(r"`(assoc(?:\.\w+)+)", text)):
+        parts = name.split(".")
+        if "stonesoup" in parts or "plotting" in parts:
+            continue  # extras, and the pages of the API are tested above
+        cut = next(n for n in range(len(parts), 0, -1) if find_spec_of(parts[:n]))
+        value = import_module(".".join(parts[:cut]))
+        for part in parts[cut:]:
+            assert hasattr(value, part), f"{page}: {name} does not exist"
+            value = getattr(value, part)
+
+
+def find_spec_of(parts: list[str]) -> bool:
+    """Whether there is a module of that name."""
+    try:
+        return find_spec(".".join(parts)) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def test_the_example_of_an_own_solver_runs(capsys):
+    text = (ROOT / "docs" / "own_solver.md").read_text(encoding="utf-8")
+    cells = "\n".join(re.findall(r"```\{code-cell\}\n(.*?)```", text, re.DOTALL))
+    known = dict(registry._REGISTERED)
+    try:
+        exec(compile(cells, "own_solver.md", "exec", dont_inherit=True), {"__name__": "page"})
+    finally:
+        registry._REGISTERED.clear()
+        registry._REGISTERED.update(known)
+    assert "noisy" in capsys.readouterr().out
+
+
+def test_figures_of_the_readme_are_those_of_the_benchmark():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    measured = rows.load(ROOT / "docs" / "benchmarks.csv")
+    assert readme.insert(text, measured) == text, "run python -m experiments.benchmarks --report-only"
+
+
+def test_the_readme_must_have_its_marks():
+    with pytest.raises(ValueError, match="expected the marks"):
+        readme.insert(f"{readme.END} {readme.BEGIN}", [])
