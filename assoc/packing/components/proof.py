@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Part
 from assoc.packing.components.splitting import _columns, split_components
 from assoc.packing.neighbourhoods.cover import Cover
@@ -24,7 +24,7 @@ def bound_of_part(part: Part, run: Run) -> float:
         return part.weight if part.packing.granularity else min(part.bound, part.weight)
     if run.should_stop():
         return part.bound
-    search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
+    search = BranchAndBound(part.packing, part.duals, part.weight, part.tolerance, run.deadline(), run.memory_allows)
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)
     return min(max(part.bound, search.lower_bound), part.weight)

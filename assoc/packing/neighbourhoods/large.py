@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.neighbourhoods.cover import chosen_columns, own
 from assoc.packing.packing import assemble
 
@@ -52,7 +52,7 @@ class LargeNeighbourhood:
         )
         old = chosen_columns(packing.cols, np.where(free, owner, -1))
         before = float(packing.weights[old].sum())
-        search = Search(smaller, part.duals[smaller.row_origin], before, part.tolerance, part.deadline)
+        search = BranchAndBound(smaller, part.duals[smaller.row_origin], before, part.tolerance, part.deadline)
         search.run(_NODES)
         if not search.done:
             self.share = max(self.share - 0.02, _LEAST)

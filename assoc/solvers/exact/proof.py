@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Part
 from assoc.packing.components.search import complete
 from assoc.packing.components.splitting import split_part
@@ -33,7 +33,7 @@ _SHORT = 50
 @dataclass(slots=True)
 class _Task:
     part: Part
-    search: Search | None = None
+    search: BranchAndBound | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
     turns: int = 0
@@ -83,7 +83,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         part = task.part
         if not part.closed and not run.should_stop() and nodes < node_limit:
             if task.search is None:
-                task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
+                task.search = BranchAndBound(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
                 part.stalled = 0
             before = task.search.nodes
             # some ten milliseconds of work between two looks at the clock
@@ -128,7 +128,7 @@ def _branch_shortly(part: Part, nodes: int, run: Run) -> _Task:
     task = _Task(part)
     if part.closed or part.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = Search(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
+    task.search = BranchAndBound(part.packing, part.duals, part.weight, part.tolerance, run.deadline())
     task.search.run(nodes)
     task.take_over()
     return task
