@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
+from assoc._system import memory
 from assoc.solution import TracePoint
 
 if TYPE_CHECKING:
@@ -20,6 +21,11 @@ Callback = Callable[[TracePoint], object]
 
 # points of a trace at the most
 _TRACE = 100_000
+
+
+def memory_allows(needed: float) -> bool:
+    """Whether there is memory for so many bytes more: the budget of a search that belongs to no run."""
+    return memory.fits(needed)
 
 
 @dataclass(slots=True)
@@ -77,6 +83,10 @@ class Run:
         if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:
             self.stopped_by = "time_limit"
         return bool(self.stopped_by)
+
+    def memory_allows(self, needed: float) -> bool:
+        """Whether so many bytes more may be taken: for searches that grow, and can do without."""
+        return memory_allows(needed)
 
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""

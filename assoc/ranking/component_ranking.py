@@ -1,13 +1,14 @@
 """The k lightest solutions of one component or of many: enumeration where it is quick, else branching first.
 
 Enumeration (enumeration.py) is quick where the multipliers' bound is near the optimum. Where it is not, the
-component is branched as in branch_and_bound.py (are two measurements of the same source or not?), the
+component is branched as in packing/branching (are two measurements of the same source or not?), the
 multipliers are improved at every node, and what is left of a node is enumerated as soon as a small budget
 suffices. The two answers exclude each other, so that every solution is in exactly one leaf.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,33 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.branching.doubtful_pairs import doubtful_pairs
-from assoc.packing.branching.nodes import OpenNodes, hard_sweeps, index_by_row, push_children, reduced_of, smooth_sweeps
-from assoc.packing.packing import Packing
-from assoc.ranking.enumeration import NOT_COMPLETE, cut_of, enumerate_solutions, new_store
+from assoc.packing.branching.doubtful_pairs import doubtful_pairs, new_doubts
+from assoc.packing.branching.nodes import (
+    CLOSED,
+    LEVELS,
+    OVER,
+    NodeArrays,
+    OpenNodes,
+    has_room,
+    index_by_row,
+    new_node,
+    next_temperature,
+    push_children,
+    raise_bound,
+    soften,
+    take_node,
+)
+from assoc.packing.packing import Packing, PackingArrays
+from assoc.packing.run import memory_allows
+from assoc.ranking.enumeration import (
+    NOT_COMPLETE,
+    PricedColumns,
+    Store,
+    Wanted,
+    cut_of,
+    enumerate_solutions,
+    new_store,
+)
 
 FIRST_BUDGET = 3000
 NODE_BUDGET = 500
@@ -44,6 +68,8 @@ class ComponentRanking:
         Decisions of enumeration at a node, beyond one for each row, before it is branched.
     deadline : float
         When time is over, by the kernels' clock (clock.py): the node at work stays open.
+    memory_allows : callable, optional
+        Whether the search may take so many bytes more (`Run.memory_allows`).
     """
 
     def __init__(
@@ -56,13 +82,12 @@ class ComponentRanking:
         *,
         budget: int = NODE_BUDGET,
         deadline: float = np.inf,
+        memory_allows: Callable[[float], bool] = memory_allows,
     ) -> None:
         self._packing = packing
-        self._budget = budget
         self._deadline = deadline
-        self._k = k
-        self._limit = limit
-        self._tolerance = tolerance
+        self._memory_allows = memory_allows
+        self._wanted = Wanted(k, limit, tolerance, budget + packing.num_rows, deadline)
         self._store = new_store(packing.num_rows)
         self._open = OpenNodes(packing, duals)
         self.nodes = 0
@@ -75,12 +100,12 @@ class ComponentRanking:
     @property
     def out_of_memory(self) -> bool:
         """Whether nodes were given up that could hold one of the k lightest."""
-        return self._open.given_up < float(cut_of(self._store, self._k, self._limit, self._tolerance))
+        return self._open.given_up < float(cut_of(self._store, self._wanted))
 
     @property
     def proven(self) -> float:
         """Every solution that was not found weighs at least this."""
-        cut = float(cut_of(self._store, self._k, self._limit, self._tolerance))
+        cut = float(cut_of(self._store, self._wanted))
         return min(cut, self._open.least_bound)
 
     def solutions(self) -> tuple[Floats, list[NDArray[np.int32]]]:
@@ -93,173 +118,105 @@ class ComponentRanking:
         target = self.nodes + nodes
         while not self.done and self.nodes < target and not is_over(self._deadline):
             self._open.count, done, self._store = _rank(
-                self._packing.cols,
-                self._packing.weights,
-                *self._open.arrays,
+                self._packing.arrays,
+                self._open.arrays,
                 self._open.count,
-                self._k,
-                self._limit,
-                self._tolerance,
-                target - self.nodes,
-                self._budget + self._packing.num_rows,
+                self._wanted,
                 self._store,
-                self._deadline,
+                target - self.nodes,
             )
             self.nodes += done
             if not self.done and self.nodes < target and not is_over(self._deadline):
-                self._open.grow()
+                self._open.grow(self._memory_allows)
 
 
 @njit
-def _sorted_store(store: Any) -> Any:
-    key, slot, _, chosen, meta = store
-    order = np.argsort(-key[: meta[0]])
-    weights = np.empty(meta[0])
-    columns = np.empty((meta[0], chosen.shape[1]), np.int32)
-    for i in range(meta[0]):
-        weights[i] = -key[order[i]]
-        columns[i] = chosen[slot[order[i]]]
+def _sorted_store(store: Store) -> Any:
+    order = np.argsort(-store.key[: store.num[0]])
+    weights = np.empty(order.size)
+    columns = np.empty((order.size, store.columns.shape[1]), np.int32)
+    for i in range(order.size):
+        weights[i] = -store.key[order[i]]
+        columns[i] = store.columns[store.slot[order[i]]]
     return weights, columns
 
 
 @njit
 def _rank(
-    cols: Any, weights: Floats, arena: Any, first: Any, size: Any, node_duals: Floats, node_slack: Any,
-    node_bound: Floats, num_open: int, k: int, limit: float, tolerance: float, node_limit: int, budget: int,
-    store: Any, deadline: float
-) -> Any:  # fmt: skip
+    packing: PackingArrays, stack: NodeArrays, num_open: int, wanted: Wanted, store: Store, node_limit: int
+) -> Any:
     """Search depth first; the number of open nodes, the nodes done, and the store.
 
     Stops early with nodes open when there is no room left for two children, or time is over.
     """
-    num_sensors = cols.shape[1]
-    num_rows = node_duals.shape[1]
-    most = 1
-    for t in range(num_open):
-        most = max(most, size[t])
-    active = np.empty(most, np.int32)
-    own_cols = np.empty((most, num_sensors), np.int32)
-    row_ptr = np.zeros(num_rows + 1, np.int64)
-    row_cols = np.empty(most * num_sensors, np.int32)
-    reduced = np.empty(most)
-    blocked = np.empty(most, np.int32)
-    primal = np.empty(most)
-    slack_primal = np.empty(num_rows)
-    duals = np.empty(num_rows)
-    kept_duals = np.empty(num_rows)
-    together = np.zeros(num_rows)
-    partners = np.empty(num_rows, np.int32)
-    pairs = np.zeros((1, 2), np.int32)
-    doubts = np.empty(1)
-    values = np.empty(1)
+    tolerance, deadline = wanted.tolerance, wanted.deadline
+    node = new_node(packing, stack, num_open)
+    num_rows = node.duals.size
+    own_cols = np.empty((node.active.size, packing.cols.shape[1]), np.int32)
+    blocked = np.empty(node.active.size, np.int32)
+    doubts = new_doubts(1, num_rows)
     nodes = 0
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
-        num = size[top]
-        if num_open + 1 >= first.size or first[top] + 2 * num > arena.size:
+        if not has_room(stack, top):
             break
         num_open = top
-        cut = cut_of(store, k, limit, tolerance)
-        if node_bound[top] >= cut:
+        cut = cut_of(store, wanted)
+        lower = stack.bound[top]
+        if lower >= cut:
             continue
         nodes += 1
-        active[:num] = arena[first[top] : first[top] + num]
-        duals[:] = node_duals[top]
-        kept_duals[:] = duals
-        slack = node_slack[top].copy()
-        lower = node_bound[top]
+        num = take_node(stack, top, node)
+        kept = num
         temperature = 0.0
-        closed = False
-        over = False
-        for level in range(3):
-            over = is_over(deadline)
-            if over:
+        for level in range(LEVELS):
+            kept, bound, lower = raise_bound(packing, node, num, lower, temperature, cut, cut, deadline)
+            if kept < 0:
                 break
-            index_by_row(cols, active, num, row_ptr, row_cols)
-            if level > 0:
-                smooth_sweeps(
-                    slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.5, deadline
-                )
-            reduced_of(cols, weights, active, num, duals, reduced)
-            if not hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 2):
-                closed = True
-                break
-            bound = 0.0
-            for r in range(num_rows):
-                bound += duals[r]
-            if bound >= lower:
-                lower = bound
-                kept_duals[:] = duals
-            if lower >= cut:
-                closed = True
-                break
-            kept = 0
-            for a in range(num):
-                if bound + reduced[a] < cut:
-                    active[kept] = active[a]
-                    reduced[kept] = reduced[a]
-                    kept += 1
             if level == 0 or kept < num:
-                num = kept
-                index_by_row(cols, active, num, row_ptr, row_cols)
-                for a in range(num):
-                    own_cols[a] = cols[active[a]]
-                steps, store = enumerate_solutions(
-                    own_cols, active, reduced[:num], slack, duals, row_ptr, row_cols, 0, num_rows,
-                    bound, k, limit, tolerance, budget, True, store, blocked, deadline,
+                index_by_row(packing.cols, node, kept)
+                for a in range(kept):
+                    own_cols[a] = packing.cols[node.active[a]]
+                columns = PricedColumns(
+                    own_cols, node.active, node.reduced[:kept], node.slack, node.duals, node.row_ptr, node.row_cols,
+                    blocked,
                 )  # fmt: skip
+                steps, store = enumerate_solutions(columns, 0, num_rows, bound, wanted, True, store)
                 if steps != NOT_COMPLETE:
-                    closed = True
+                    kept = CLOSED
                     break
-                cut = cut_of(store, k, limit, tolerance)
+                cut = cut_of(store, wanted)
+            num = kept
             gap = cut - lower if cut < np.inf else max(0.1 * abs(lower), 1e3 * tolerance)
-            temperature = max(gap * (0.1 if level == 0 else 0.03), tolerance)
-        if over:
+            temperature = next_temperature(gap, level, tolerance)
+        if kept == OVER:
             # the node's columns and multipliers are as they were; what it listed already is known again
             num_open = top + 1
             nodes -= 1
             break
-        if closed or lower >= cut:
+        if kept == CLOSED or lower >= cut:
             continue
-        index_by_row(cols, active, num, row_ptr, row_cols)
-        duals[:] = kept_duals
-        reduced_of(cols, weights, active, num, duals, reduced)
-        smooth_sweeps(
-            slack, row_ptr, row_cols, num, duals, reduced, primal, slack_primal, temperature, 60, 1.0, deadline
-        )
+        soften(packing, node, num, node.best_duals, temperature, deadline)
         # with distinct columns there always is one: without an open question enumeration would have been complete
-        doubtful_pairs(cols, active, slack, row_ptr, row_cols, primal, together, partners, pairs, doubts, values)
-        one, two = pairs[0]
-        num_open = push_children(
-            cols, active, num, one, two, values[0], lower, kept_duals, slack, arena, first, size, node_duals,
-            node_slack, node_bound, top,
-        )  # fmt: skip
+        doubtful_pairs(packing.cols, node, doubts)
+        pair = doubts.pairs[0, 0], doubts.pairs[0, 1], doubts.values[0]
+        num_open = push_children(packing, stack, top, node, num, pair, lower, node.best_duals)
     return num_open, nodes, store
 
 
 @njit
-def rank_components(
-    cols: Any, reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, row_start: Any, budget: int,
-    k: int, room: float, tolerance: float, deadline: float
-) -> Any:  # fmt: skip
+def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, wanted: Wanted) -> Any:
     """Enumerate the k lightest solutions of each component of a packing.
 
     Parameters
     ----------
-    cols, slack, row_ptr, row_cols, row_start
-        Of the packing; ``row_cols`` is reordered.
+    packing
+        The lists of ``row_cols`` are reordered.
     reduced, duals : float arrays
         Reduced costs and multipliers.
-    budget : int
-        Decisions for each component at the most, beyond one for each of its rows.
-    k : int
-        Solutions to keep for each.
-    room : float
-        How far above their bounds all components together may be.
-    tolerance : float
-        Differences of weight that are ties.
-    deadline : float
-        When time is over (clock.py).
+    wanted : Wanted
+        Its budget is that of each component, beyond one decision for each of its rows; its limit is how far above
+        their bounds all components together may be.
 
     Returns
     -------
@@ -272,6 +229,7 @@ def rank_components(
     proven : float array, shape (C,)
         What is not among a component's solutions weighs at least this; -inf: the budget or the time did not suffice.
     """
+    row_start = packing.row_start
     num_components = row_start.size - 1
     start = np.zeros(num_components + 1, np.int64)
     weights = np.empty(64)
@@ -279,21 +237,21 @@ def rank_components(
     columns = np.empty(256, np.int32)
     proven = np.full(num_components, -np.inf)
     names = np.arange(reduced.size).astype(np.int32)
-    blocked = np.empty(reduced.size, np.int32)
+    priced = PricedColumns(
+        packing.cols, names, reduced, packing.slack, duals, packing.row_ptr, packing.row_cols,
+        np.empty(reduced.size, np.int32),
+    )  # fmt: skip
+    room = wanted.limit
     count = 0
     for c in range(num_components):
         top, end = row_start[c], row_start[c + 1]
         base = 0.0
         for r in range(top, end):
             base += duals[r]
-        limit = base + room
-        steps, store = enumerate_solutions(
-            cols, names, reduced, slack, duals, row_ptr, row_cols, top, end,
-            base, k, limit, tolerance, budget + end - top, False, new_store(end - top),
-            blocked, deadline,
-        )  # fmt: skip
+        own_wanted = Wanted(wanted.k, base + room, wanted.tolerance, wanted.budget + end - top, wanted.deadline)
+        steps, store = enumerate_solutions(priced, top, end, base, own_wanted, False, new_store(end - top))
         if steps != NOT_COMPLETE:
-            proven[c] = cut_of(store, k, limit, tolerance)
+            proven[c] = cut_of(store, own_wanted)
             own, chosen = _sorted_store(store)
             if own.size:
                 # what this component needs above its bound the others cannot use

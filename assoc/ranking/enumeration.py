@@ -11,14 +11,15 @@ lightest solution known, so that only ties and better ones are looked for.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.kernels.heap import pop, push
+from assoc.packing.kernels.heap import doubled, pop, push
 
 NOT_COMPLETE = -1
 _ALONE = -1
@@ -27,14 +28,64 @@ _LONG = 40
 _LOOK = 8
 
 
-@njit
-def new_store(num_rows: int) -> Any:
-    """Room for solutions: a heap of (-weight, slot), and for each slot its hash and its columns.
+class Wanted(NamedTuple):
+    """Which solutions are looked for, and how long.
 
-    ``meta`` is [number of solutions]; column lists end with -1.
+    The ``k`` lightest that weigh less than ``limit``; weights that differ by ``tolerance`` are ties. ``budget`` is the
+    number of decisions at the most, ``deadline`` when time is over (clock.py).
     """
+
+    k: int
+    limit: float
+    tolerance: float
+    budget: int
+    deadline: float
+
+
+class PricedColumns(NamedTuple):
+    """Columns over rows with feasible multipliers, as the enumeration takes them.
+
+    Attributes
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of each column.
+    names : int32 array, shape (N,)
+        What the store calls the columns.
+    reduced : float array, shape (N,)
+        Reduced costs (what rounding left below 0 counts as 0).
+    slack, duals : arrays, shape (R,)
+        Whether a row may stay uncovered, and the multipliers.
+    row_ptr, row_cols : int arrays
+        Columns of each row; each row's part of ``row_cols`` is put in order of reduced cost.
+    blocked : int32 array, shape (N,)
+        Room for work: how many of a column's rows are decided.
+    """
+
+    cols: NDArray[np.int32]
+    names: NDArray[np.int32]
+    reduced: NDArray[np.float64]
+    slack: NDArray[np.bool_]
+    duals: NDArray[np.float64]
+    row_ptr: NDArray[np.int64]
+    row_cols: NDArray[np.int32]
+    blocked: NDArray[np.int32]
+
+
+class Store(NamedTuple):
+    """Solutions kept: a heap of (-weight, slot), for each slot its mark and its columns (-1 ends them); how many."""
+
+    key: NDArray[np.float64]
+    slot: NDArray[np.int64]
+    marks: NDArray[np.uint64]
+    columns: NDArray[np.int32]
+    num: NDArray[np.int64]
+
+
+@njit
+def new_store(num_rows: int) -> Store:
+    """Room for solutions of so many rows."""
     capacity = 4
-    return (
+    return Store(
         np.empty(capacity),
         np.empty(capacity, np.int64),
         np.empty(capacity, np.uint64),
@@ -44,26 +95,11 @@ def new_store(num_rows: int) -> Any:
 
 
 @njit
-def _grown(store: Any) -> Any:
-    key, slot, marks, chosen, meta = store
-    capacity = 2 * key.size
-    new_key = np.empty(capacity)
-    new_slot = np.empty(capacity, np.int64)
-    new_marks = np.empty(capacity, np.uint64)
-    new_chosen = np.empty((capacity, chosen.shape[1]), np.int32)
-    new_key[: key.size] = key
-    new_slot[: key.size] = slot
-    new_marks[: key.size] = marks
-    new_chosen[: key.size] = chosen
-    return new_key, new_slot, new_marks, new_chosen, meta
-
-
-@njit
-def cut_of(store: Any, k: int, limit: float, tolerance: float) -> float:
+def cut_of(store: Store, wanted: Wanted) -> float:
     """Only solutions that weigh less than this are still of interest."""
-    if store[4][0] >= k:
-        return min(limit, -store[0][0] - tolerance)
-    return limit
+    if store.num[0] >= wanted.k:
+        return min(wanted.limit, -store.key[0] - wanted.tolerance)
+    return wanted.limit
 
 
 @njit
@@ -76,87 +112,69 @@ def _mark(column: int) -> np.uint64:
 
 
 @njit
-def _keep(store: Any, k: int, weight: float, columns: Any, count: int, check: bool) -> Any:
+def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: bool) -> Store:
     """Add a solution, in the place of the heaviest if there are k; with ``check`` only if it is new."""
-    key, slot, marks, chosen, meta = store
     mark = np.uint64(0)
     for t in range(count):
         mark ^= _mark(columns[t])
     own = np.sort(columns[:count])
     if check:
-        for i in range(meta[0]):
-            at = slot[i]
-            if marks[at] == mark and chosen[at, count] < 0:
+        for i in range(store.num[0]):
+            at = store.slot[i]
+            if store.marks[at] == mark and store.columns[at, count] < 0:
                 same = True
                 for t in range(count):
-                    if chosen[at, t] != own[t]:
+                    if store.columns[at, t] != own[t]:
                         same = False
                         break
                 if same:
                     return store
-    if meta[0] < k:
-        if meta[0] == key.size:
-            store = _grown(store)
-            key, slot, marks, chosen, meta = store
-        at = meta[0]
-        push(key, slot, meta[0], -weight, at)
-        meta[0] += 1
+    if store.num[0] < k:
+        if store.num[0] == store.key.size:
+            store = Store(
+                doubled(store.key), doubled(store.slot), doubled(store.marks), doubled(store.columns), store.num
+            )
+        at = store.num[0]
+        push(store.key, store.slot, at, -weight, at)
+        store.num[0] += 1
     else:
-        at = slot[0]
-        pop(key, slot, k - 1)
-        push(key, slot, k - 1, -weight, at)
-    marks[at] = mark
-    chosen[at, :count] = own
-    chosen[at, count] = -1
+        at = store.slot[0]
+        pop(store.key, store.slot, k - 1)
+        push(store.key, store.slot, k - 1, -weight, at)
+    store.marks[at] = mark
+    store.columns[at, :count] = own
+    store.columns[at, count] = -1
     return store
 
 
 @njit
 def enumerate_solutions(
-    cols: Any, names: Any, reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, top: int, end: int,
-    base: float, k: int, limit: float, tolerance: float, budget: int, check: bool, store: Any, blocked: Any,
-    deadline: float
-) -> Any:  # fmt: skip
-    """Search rows ``top:end`` for solutions lighter than ``limit``.
+    priced: PricedColumns, top: int, end: int, base: float, wanted: Wanted, check: bool, store: Store
+) -> Any:
+    """Search rows ``top:end`` for solutions that are wanted.
 
     Parameters
     ----------
-    cols : int32 array, shape (N, S)
-        Rows of each column.
-    names : int32 array, shape (N,)
-        What the store calls the columns.
-    reduced : float array, shape (N,)
-        Reduced costs (what rounding left below 0 counts as 0).
-    slack, duals : arrays, shape (R,)
-        Whether a row may stay uncovered, and the multipliers.
-    row_ptr, row_cols : int arrays
-        Columns of each row; each row's part of ``row_cols`` is put in order of reduced cost.
+    priced : PricedColumns
+        The columns; ``row_cols`` and ``blocked`` are changed.
     top, end : int
         The rows to cover; no column of theirs uses others.
     base : float
         Sum of the rows' multipliers.
-    k : int
-        Solutions to keep.
-    limit : float
-        Only solutions that weigh less.
-    tolerance : float
-        Differences of weight that are ties.
-    budget : int
-        Decisions at the most.
+    wanted : Wanted
+        How many, how light, and how long to search.
     check : bool
         Whether solutions may have been found before.
-    store : tuple of arrays
-        See ``new_store``.
-    blocked : int32 array, shape (N,)
-        Room for work.
-    deadline : float
-        When time is over (clock.py).
+    store : Store
+        What is found is added.
 
     Returns
     -------
     steps, store
         Decisions made, ``NOT_COMPLETE`` if the budget or the time did not suffice.
     """
+    cols, names, reduced, slack, duals, row_ptr, row_cols, blocked = priced
+    k, budget, deadline = wanted.k, wanted.budget, wanted.deadline
     num_rows = end - top
     for r in range(top, end):
         if is_over(deadline):
@@ -186,17 +204,15 @@ def enumerate_solutions(
     depth = 0
     steps = 0
     spent[0] = base
-    cut = cut_of(store, k, limit, tolerance)
+    cut = cut_of(store, wanted)
     forward = True
     while True:
         if forward:
-            row, choices = _next_row(
-                reduced, slack, duals, row_ptr, row_cols, top, end, done, blocked, cut - spent[depth]
-            )
+            row, choices = _next_row(priced, top, end, done, cut - spent[depth])
             if row < 0 or choices == 0:
                 if row < 0 and spent[depth] < cut:
                     store = _keep(store, k, spent[depth], chosen, count, check)
-                    cut = cut_of(store, k, limit, tolerance)
+                    cut = cut_of(store, wanted)
                 forward = False
                 depth -= 1
                 continue
@@ -206,7 +222,7 @@ def enumerate_solutions(
         else:
             if depth < 0:
                 return steps, store
-            count -= _decide(cols, row_ptr, row_cols, top, row_at[depth], taken[depth], done, blocked, False)
+            count -= _decide(priced, top, row_at[depth], taken[depth], done, False)
         row = row_at[depth]
         room = cut - spent[depth]
         place = cursor[depth]
@@ -227,7 +243,7 @@ def enumerate_solutions(
             chosen[count] = names[taken[depth]]
             place += 1
         cursor[depth] = place
-        count += _decide(cols, row_ptr, row_cols, top, row, taken[depth], done, blocked, True)
+        count += _decide(priced, top, row, taken[depth], done, True)
         spent[depth + 1] = spent[depth] + cost
         depth += 1
         forward = True
@@ -249,11 +265,9 @@ def _sort_row(reduced: Floats, own: Any) -> None:
 
 
 @njit
-def _next_row(
-    reduced: Floats, slack: Any, duals: Floats, row_ptr: Any, row_cols: Any, top: int, end: int, done: Any,
-    blocked: Any, room: float
-) -> Any:  # fmt: skip
+def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float) -> Any:
     """Return the row with the fewest choices left (-1: all are decided), and how many these are."""
+    _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     row, least = -1, 1 << 60
     for r in range(top, end):
         if done[r - top]:
@@ -273,10 +287,9 @@ def _next_row(
 
 
 @njit
-def _decide(
-    cols: Any, row_ptr: Any, row_cols: Any, top: int, row: int, taken: int, done: Any, blocked: Any, do: bool
-) -> int:
+def _decide(priced: PricedColumns, top: int, row: int, taken: int, done: Any, do: bool) -> int:
     """Take a column, or leave a row alone, or take that back; the number of columns this concerns."""
+    cols, row_ptr, row_cols, blocked = priced.cols, priced.row_ptr, priced.row_cols, priced.blocked
     step = 1 if do else -1
     if taken == _ALONE:
         done[row - top] = do

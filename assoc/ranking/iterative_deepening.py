@@ -13,6 +13,7 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 from assoc.ranking.columns import Complete
 from assoc.ranking.component_ranking import FIRST_BUDGET, ComponentRanking, rank_components
+from assoc.ranking.enumeration import Wanted
 from assoc.ranking.head_start import HeadStart
 from assoc.ranking.merging import merge
 
@@ -155,20 +156,8 @@ class Deepening:
     def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists | None:
         """Rank every component; None where the head start says that more excess is needed anyway."""
         reduced = self._columns.reduced[packing.origin]
-        start, weights, pointer, columns, proven = rank_components(
-            packing.cols,
-            reduced,
-            packing.slack,
-            duals,
-            packing.row_ptr,
-            packing.row_cols,
-            packing.row_start,
-            FIRST_BUDGET,
-            self._k,
-            room,
-            self._tolerance,
-            self._run.deadline(),
-        )
+        wanted = Wanted(self._k, room, self._tolerance, FIRST_BUDGET, self._run.deadline())
+        start, weights, pointer, columns, proven = rank_components(packing.arrays, reduced, duals, wanted)
         lists = _Lists()
         for c in range(packing.num_components):
             own = slice(start[c], start[c + 1])
@@ -197,7 +186,13 @@ class Deepening:
         piece = packing.component(c)
         own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
         ranking = ComponentRanking(
-            piece, own_duals, self._k, limit, self._tolerance, deadline=self._run.deadline()
+            piece,
+            own_duals,
+            self._k,
+            limit,
+            self._tolerance,
+            deadline=self._run.deadline(),
+            memory_allows=self._run.memory_allows,
         )
         # about ten milliseconds of work between two looks at the clock
         turn = max(1, 100_000 // max(piece.num_columns, 1))

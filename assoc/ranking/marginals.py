@@ -19,7 +19,6 @@ from assoc.ranking.clusters import clusters_of, distinct, numbered
 from assoc.ranking.columns import Complete
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
-from assoc.solution import Solution
 from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
@@ -30,6 +29,10 @@ if TYPE_CHECKING:
 
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
+# a share of the weight that sums may lose in any case
+_ROUNDING = 1e-12
+# a column this far above the solutions listed weighs nothing at any of these temperatures but the last, which counts
+_FAR = 4000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +104,7 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
 
     and W(t) / W lies between. Two things are known of the others: their excess E over the dual bound is at
     least d, where the ranking stopped; and Z(a), the sum of exp(-a E) over all solutions, is at most what
-    ``partition.log_partition`` says. For any a in [0, 1], since E >= d,
+    ``partition_function.log_partition`` says. For any a in [0, 1], since E >= d,
 
         sum_{others} exp(-E)  <=  exp(-(1 - a) d) ( Z(a) - sum_{k best} exp(-a E) ).
 
@@ -195,37 +198,57 @@ def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, f
     ranking = rank(problem, k + 1, None, run)
     solutions = ranking.solutions[:k]
     rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
-    best = min(solution.cost for solution in solutions)
-    weights = np.exp(best - np.array([solution.cost for solution in solutions]))
+    cost_of = np.array([solution.cost for solution in solutions])
+    weights = np.exp(cost_of.min() - cost_of)
     total = float(weights.sum())
     own = np.zeros(problem.num_tuples)
     for solution, weight in zip(solutions, weights, strict=True):
         own[solution.indices] += weight
-    others = _others(problem, ranking.columns, solutions, rest, run)
+    others = _others(problem, ranking.columns, cost_of, rest, run)
     share = others / (total + others) if others < np.inf else 1.0
+    # large costs are known to fewer digits than their differences need; below this the sums lose as much
+    rounding = 2.0 * float(np.finfo(float).eps * np.abs(cost_of).max())
+    if rounding > _ROUNDING:
+        share = min(share + 4.0 * rounding, 1.0)
     # what every listed solution has, it has with certainty up to the others; sums lose digits
     return np.minimum(own / total, 1.0), share, len(solutions)
 
 
-def _others(problem: AssignmentProblem, columns: Complete, listed: list[Solution], rest: float, run: Run) -> float:
-    """Bound the weight, relative to that of the best, of all solutions that are not listed and cost ``rest``."""
+def _others(problem: AssignmentProblem, columns: Complete, listed: Floats, rest: float, run: Run) -> float:
+    """Bound the weight, relative to the best's, of all solutions but those listed; the others cost ``rest``."""
     if rest == np.inf:
         return 0.0
     bound = columns.bound + columns.offset
-    excess = np.maximum(np.array([solution.cost for solution in listed]) - bound, 0.0)
-    least = max(rest - bound, 0.0)
+    excess = np.maximum(listed - bound, 0.0)
     smallest = np.inf
     if run.should_stop():
         return smallest
-    sensor_of = np.repeat(np.arange(problem.num_sensors), problem.sizes)
+    rounding = _rounding(problem, columns, float(excess.max()))
+    least = max(rest - bound - rounding, 0.0)
     packing = columns.keep(np.inf)
     for a in _EXPONENTS:
         if run.should_stop():
             break
-        log_all = log_partition(columns, sensor_of, a, deadline=run.deadline(), packing=packing)
+        log_all = log_partition(columns, a, deadline=run.deadline(), packing=packing)
         # all in logarithms: counts of solutions overflow
-        seen = float(np.exp(-a * excess - log_all).sum())
-        left = max(1.0 - seen, 0.0) + 1e-12
         with np.errstate(over="ignore"):
-            smallest = min(smallest, float(np.exp(log_all + np.log(left) - (1.0 - a) * least + excess.min())))
+            seen = float(np.exp(-a * (excess + rounding) - log_all).sum())
+            left = max(1.0 - seen, 0.0) + _ROUNDING
+            log_left = log_all + np.log(left) - (1.0 - a) * least + (float(excess.min()) + 2.0 * rounding)
+            smallest = min(smallest, float(np.exp(log_left)))
     return smallest
+
+
+def _rounding(problem: AssignmentProblem, columns: Complete, excess: float) -> float:
+    """How far the sum of a solution's reduced costs may be from its cost less the bound.
+
+    Weights are differences of costs, and reduced costs are differences of weights: what they lose is a share of the
+    largest of them, however small the differences are. Columns far above the solutions listed do not count.
+    """
+    near = columns.reduced <= excess + _FAR
+    rows = max(columns.slack.size, 1)
+    single = prepare(problem).single_cost
+    costs = problem.costs[columns.origin[near]]
+    largest = np.abs(columns.weights[near]).max(initial=0.0) + np.abs(costs).max(initial=0.0)
+    sums = rows * (largest + excess) + np.abs(columns.duals).sum() + np.abs(single).sum() + abs(columns.offset)
+    return 8.0 * float(np.finfo(float).eps * sums)

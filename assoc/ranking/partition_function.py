@@ -14,12 +14,15 @@ where a column begins in its row of the first sensor in that order, and the firs
 column beginning elsewhere can cover. The product also counts choices that do not fit together, so it is
 sharpened by deciding rows: of the parts so far the one with the largest product is split by the choices for
 one of its rows. With time enough nothing but solutions is left and the sum is exact.
+
+The excess of every solution may be large, where the linear program is far from any: exp(-E) is then 0 in floating
+point, and yet it is all there is. Terms are therefore carried as logarithms wherever their sum would underflow.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +30,42 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.kernels.heap import pop, push
+from assoc.packing.kernels.heap import doubled, pop, push
 from assoc.packing.packing import Packing
 from assoc.ranking.columns import Complete
 
 # column visits for each component: about a tenth of a second in all for a hard one
 WORK = 20_000_000
+# parts below this share of what is known (a logarithm) are not split
+_SMALL = -30.0
+# sums below have lost digits, or all, to underflow
+_TINY = 1e-280
+
+
+class Terms(NamedTuple):
+    """The terms of a component's product and their logarithms.
+
+    Attributes
+    ----------
+    cols, row_ptr, row_cols
+        Of the component (packing.py).
+    log_weights, weights : float arrays, shape (N,)
+        Of the columns: -a times the reduced cost.
+    log_alone, alone : float arrays, shape (R,)
+        Of leaving a row uncovered; -inf: not allowed.
+    """
+
+    cols: NDArray[np.int32]
+    row_ptr: NDArray[np.int64]
+    row_cols: NDArray[np.int32]
+    log_weights: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    log_alone: NDArray[np.float64]
+    alone: NDArray[np.float64]
 
 
 def log_partition(
     columns: Complete,
-    sensor_of: NDArray[np.int64],
     a: float,
     work: int = WORK,
     deadline: float = math.inf,
@@ -49,8 +77,6 @@ def log_partition(
     ----------
     columns : Complete
         The problem.
-    sensor_of : int64 array, shape (R,)
-        Sensor of each measurement.
     a : float
         Inverse temperature >= 0; 0 counts the solutions.
     work : int
@@ -61,63 +87,56 @@ def log_partition(
         ``columns.keep(inf)``, where it is at hand.
     """
     packing = packing or columns.keep(np.inf)
+    log_weights = -a * columns.reduced[packing.origin]
+    log_alone = np.full(columns.slack.size, -np.inf)
+    log_alone[columns.slack] = -a * columns.slack_reduced[columns.slack]
     inside = np.zeros(columns.slack.size, dtype=bool)
     inside[packing.row_origin] = True
     # a row without columns stays uncovered, at its price
-    total = -a * float(columns.slack_reduced[~inside & columns.slack].sum())
+    total = float(log_alone[~inside & columns.slack].sum())
+    log_alone = log_alone[packing.row_origin]
     for c in range(packing.num_components):
-        piece = packing.component(c)
-        origin = packing.origin[packing.col_start[c] : packing.col_start[c + 1]]
-        rows = packing.row_origin[packing.row_start[c] : packing.row_start[c + 1]]
-        total += _component(
-            np.ascontiguousarray(piece.cols),
-            columns.reduced[origin],
-            np.ascontiguousarray(piece.slack),
-            columns.slack_reduced[rows],
-            np.ascontiguousarray(piece.row_ptr),
-            np.ascontiguousarray(piece.row_cols),
-            sensor_of[rows],
-            a,
-            work,
-            deadline,
+        component = packing.component(c)
+        own = log_weights[packing.col_start[c] : packing.col_start[c + 1]]
+        own_alone = log_alone[packing.row_start[c] : packing.row_start[c + 1]]
+        terms = Terms(
+            np.ascontiguousarray(component.cols),
+            np.ascontiguousarray(component.row_ptr),
+            np.ascontiguousarray(component.row_cols),
+            own,
+            np.exp(own),
+            own_alone,
+            np.exp(own_alone),
         )
+        total += _log_sum_of_solutions(terms, work, deadline)
     return total
 
 
 @njit
-def _component(
-    cols: Any, reduced: Floats, slack: Any, slack_reduced: Floats, row_ptr: Any, row_cols: Any, sensor_of: Any,
-    a: float, work: int, deadline: float
-) -> float:  # fmt: skip
+def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     """Bound ln Z(a) of one component by splitting the part of the largest product first."""
-    num_rows = slack.size
-    weights = np.exp(-a * reduced)
-    alone = np.zeros(num_rows)
-    for r in range(num_rows):
-        if slack[r]:
-            alone[r] = math.exp(-a * slack_reduced[r])
-    capacity = 64
-    done = np.zeros((capacity, num_rows), np.bool_)
-    log_spent = np.zeros(capacity)
-    log_bound = np.empty(capacity)
-    key = np.empty(capacity)
-    item = np.empty(capacity, np.int64)
+    cols, row_ptr, row_cols, log_weights, _, log_alone, _ = terms
+    num_rows = log_alone.size
+    done = np.zeros((64, num_rows), np.bool_)
+    log_spent = np.zeros(64)
+    log_bound = np.empty(64)
+    key = np.empty(64)
+    item = np.empty(64, np.int64)
     factor = np.empty(num_rows)
     reach = np.empty(num_rows, np.bool_)
-    log_bound[0] = _product(cols, weights, alone, sensor_of, done[0], factor, reach)
-    push(key, item, 0, -log_bound[0], 0)
-    size, used = 1, 1
-    # exact parts are summed relative to the first bound, which none can exceed
-    top = log_bound[0]
+    top = _log_product(terms, done[0], factor, reach)
     if top == -np.inf:
         return top
-    closed = 0.0
+    log_bound[0] = top
+    push(key, item, 0, -top, 0)
+    size, used = 1, 1
+    # parts that are not split any more: their sum is closed * exp(largest)
+    largest, closed = -np.inf, 0.0
     visits = cols.size * cols.shape[1]
     spent_work = 0
     while size > 0 and spent_work < work and not is_over(deadline):
         node = item[0]
-        # what is left below this share of the whole is not worth the time
-        if log_bound[node] - top < -30.0:
+        if closed > 0.0 and log_bound[node] - largest - math.log(closed) < _SMALL:
             break
         row = -1
         most = -1
@@ -125,14 +144,14 @@ def _component(
             if not done[node, r]:
                 choices = 0
                 for x in range(row_ptr[r], row_ptr[r + 1]):
-                    if _fits(cols, done[node], row_cols[x]):
+                    if _is_open(cols, done[node], row_cols[x]):
                         choices += 1
                 if choices > most:
                     row, most = r, choices
         size -= 1
         pop(key, item, size)
         if row < 0:
-            closed += math.exp(log_spent[node] - top)
+            largest, closed = _added(largest, closed, log_spent[node])
             continue
         before = done[node].copy()
         spent = log_spent[node]
@@ -140,25 +159,21 @@ def _component(
             j = -1
             if x < row_ptr[row]:
                 # to leave the row uncovered
-                if alone[row] == 0.0:
+                if log_alone[row] == -np.inf:
                     continue
-                price = math.log(alone[row])
+                price = log_alone[row]
             else:
                 j = row_cols[x]
-                if weights[j] == 0.0 or not _fits(cols, before, j):
+                if not _is_open(cols, before, j):
                     continue
-                price = -a * reduced[j]
+                price = log_weights[j]
             if is_over(deadline):
                 # the part counts whole, beside those of its choices that are counted already: still a bound
-                closed += math.exp(log_bound[node] - top)
+                largest, closed = _added(largest, closed, log_bound[node])
                 break
-            if used == capacity:
-                done = np.concatenate((done, np.zeros((capacity, num_rows), np.bool_)))
-                log_spent = np.concatenate((log_spent, np.zeros(capacity)))
-                log_bound = np.concatenate((log_bound, np.empty(capacity)))
-                key = np.concatenate((key, np.empty(capacity)))
-                item = np.concatenate((item, np.empty(capacity, np.int64)))
-                capacity *= 2
+            if used == log_spent.size:
+                done, log_spent, log_bound = doubled(done), doubled(log_spent), doubled(log_bound)
+                key, item = doubled(key), doubled(item)
             done[used] = before
             done[used, row] = True
             if j >= 0:
@@ -166,7 +181,7 @@ def _component(
                     if cols[j, s] >= 0:
                         done[used, cols[j, s]] = True
             log_spent[used] = spent + price
-            bound = _product(cols, weights, alone, sensor_of, done[used], factor, reach)
+            bound = _log_product(terms, done[used], factor, reach)
             spent_work += visits
             if bound > -np.inf:
                 log_bound[used] = log_spent[used] + bound
@@ -174,13 +189,28 @@ def _component(
                 size += 1
                 used += 1
     for n in range(size):
-        closed += math.exp(-key[n] - top)
-    # exp and log of many parts lose a few digits
-    return min(top, top + math.log(closed)) + 1e-11 if closed > 0.0 else -np.inf
+        largest, closed = _added(largest, closed, -key[n])
+    if closed == 0.0:
+        return -np.inf
+    result = min(top, largest + math.log(closed))
+    # sums of logarithms lose digits with their size, exp and log of many parts a few more
+    size_of_sums = abs(result) + 50.0 + num_rows * math.log(log_weights.size + 1.0)
+    return result + 1e-11 + 4e-16 * (num_rows + 3) * size_of_sums
 
 
 @njit
-def _fits(cols: Any, done: Any, j: int) -> bool:
+def _added(largest: float, total: float, term: float) -> Any:
+    """Add exp(term) to total * exp(largest); ``largest`` becomes the largest term so far."""
+    if term == -np.inf:
+        return largest, total
+    if term <= largest:
+        return largest, total + math.exp(term - largest)
+    return term, total * math.exp(largest - term) + 1.0
+
+
+@njit
+def _is_open(cols: Any, done: Any, j: int) -> bool:
+    """Whether none of a column's rows is decided."""
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0 and done[cols[j, s]]:
             return False
@@ -188,17 +218,16 @@ def _fits(cols: Any, done: Any, j: int) -> bool:
 
 
 @njit
-def _product(
-    cols: Any, weights: Floats, alone: Floats, sensor_of: Any, done: Any, factor: Floats, reach: Any
-) -> float:  # fmt: skip
+def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
     """Return the least logarithm of the product (module's equation) over the cyclic orders of the sensors."""
+    cols, weights, alone = terms.cols, terms.weights, terms.alone
     num, num_sensors = cols.shape
     best = np.inf
     for first in range(num_sensors):
         factor[:] = 0.0
         reach[:] = False
         for j in range(num):
-            if not _fits(cols, done, j):
+            if not _is_open(cols, done, j):
                 continue
             begun = False
             for t in range(num_sensors):
@@ -214,8 +243,28 @@ def _product(
             if done[r]:
                 continue
             value = factor[r] + (1.0 if reach[r] else alone[r])
-            if value == 0.0:
-                return -np.inf
-            total += math.log(value)
+            if value > _TINY:
+                total += math.log(value)
+            else:
+                total += _log_row(terms, done, r, first)
+                if total == -np.inf:
+                    return total
         best = min(best, total)
     return best
+
+
+@njit
+def _log_row(terms: Terms, done: Any, row: int, first: int) -> float:
+    """Logarithm of a row's sum where it underflows: the columns that begin in the row, and leaving it uncovered."""
+    cols, num_sensors = terms.cols, terms.cols.shape[1]
+    largest, total = _added(-np.inf, 0.0, terms.log_alone[row])
+    for x in range(terms.row_ptr[row], terms.row_ptr[row + 1]):
+        j = terms.row_cols[x]
+        if _is_open(cols, done, j):
+            for t in range(num_sensors):
+                r = cols[j, (first + t) % num_sensors]
+                if r >= 0:
+                    if r == row:
+                        largest, total = _added(largest, total, terms.log_weights[j])
+                    break
+    return largest + math.log(total) if total > 0.0 else -np.inf

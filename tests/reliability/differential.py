@@ -26,9 +26,10 @@ from assoc._system.processes import ordered_map
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
+from assoc.ranking.marginals import marginals
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
 from assoc.solvers.assign import assign
-from tests.reliability.problems import Case, draw, exact_cost, exact_optimum
+from tests.reliability.problems import Case, draw, exact_cost, exact_marginals, exact_optimum
 
 Way = Callable[[AssignmentProblem], list[Solution]]
 
@@ -96,6 +97,8 @@ WAYS: dict[str, Way] = {
     "file": _through_a_file,
     "tensor": _through_a_tensor,
 }
+LISTED = {"marginals 1": 1, "marginals 2": 2}
+"""Ways to probabilities: from how many solutions."""
 PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor")
 """Ways that promise the optimum on problems of this size."""
 
@@ -142,6 +145,34 @@ def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way:
         yield "lists a solution twice"
 
 
+def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], float] | None, k: int) -> Iterator[str]:
+    """What is wrong with the probabilities from k solutions; ``truth`` None: there is no solution."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = marginals(problem, k)
+    except InfeasibleError:
+        if truth is not None:
+            yield "says infeasible"
+        return
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
+        return
+    if truth is None:
+        yield "answers a problem that has no solution"
+        return
+    for row, p, low, high in zip(
+        found.tuples.tolist(), found.probability.tolist(), found.lower.tolist(), found.upper.tolist(), strict=True
+    ):
+        # singletons that are not listed are in the result, not in the problem
+        true = truth.get(tuple(row))
+        if true is not None and not low - 1e-9 <= true <= high + 1e-9:
+            yield f"says [{low:.12g}, {high:.12g}] of {row}, true is {true:.12g}"
+        if not 0.0 <= low <= high <= 1.0 or not low - 1e-9 <= p <= high + 1e-9:
+            yield f"says {p!r} in [{low!r}, {high!r}] of {row}"
+
+
 def _faults_of(problem: AssignmentProblem, optimum: Fraction | None, answer: Solution) -> Iterator[str]:
     if not np.array_equal(problem.tuples[answer.indices], answer.tuples):
         yield "names other tuples than it indexes"
@@ -176,7 +207,17 @@ def judge(case: Case, names: list[str]) -> list[str]:
         optimum: Fraction | None = exact_optimum(case.problem)
     except InfeasibleError:
         optimum = None
-    return [f"{name} {text}" for name in names for text in faults(case.problem, optimum, name, WAYS[name])]
+    truth = None
+    if optimum is not None and not LISTED.keys().isdisjoint(names):
+        truth = exact_marginals(case.problem)
+    lines = []
+    for name in names:
+        if name in LISTED:
+            found = interval_faults(case.problem, truth, LISTED[name])
+        else:
+            found = faults(case.problem, optimum, name, WAYS[name])
+        lines += [f"{name} {text}" for text in found]
+    return lines
 
 
 @dataclass
@@ -208,7 +249,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=int, default=0)
-    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--ways", default=",".join([*WAYS, *LISTED]))
     parser.add_argument("--show", type=int, default=5, help="examples of each kind of fault")
     parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args(arguments)

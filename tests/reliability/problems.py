@@ -6,6 +6,7 @@ random by `draw`, or one after the other by whoever wants them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -57,29 +58,7 @@ def exact_optimum(problem: AssignmentProblem) -> Fraction:
     InfeasibleError
         The problem has no solution.
     """
-    sizes = problem.sizes.tolist()
-    smallest = min(sizes)
-    order = sorted(range(len(sizes)), key=lambda s: not (problem.dummy or sizes[s] == smallest))
-    offset, bits, to_cover = [0] * len(sizes), 0, 0
-    for s in order:
-        offset[s] = bits
-        bits += sizes[s]
-        if problem.dummy or sizes[s] == smallest:
-            to_cover = bits
-    # all costs as whole numbers of the smallest unit among them: sums are exact and quick
-    ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
-    unit = max((denominator for _, denominator in ratios), default=1)
-    covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
-    best: dict[int, int] = {}
-    for row, (numerator, denominator) in zip(problem.tuples.tolist(), ratios, strict=True):
-        mask = sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i)
-        price = numerator * (unit // denominator)
-        if mask not in best or price < best[mask]:
-            best[mask] = price
-    for mask, price in best.items():
-        low = (mask & -mask).bit_length() - 1
-        if low < to_cover:
-            covering[low].append((mask, price))
+    covering, to_cover, unit = _coverings(problem)
     memo: dict[int, int | None] = {}
 
     def rest(covered: int) -> int | None:
@@ -100,6 +79,96 @@ def exact_optimum(problem: AssignmentProblem) -> Fraction:
     if answer is None:
         raise InfeasibleError("no solution")
     return Fraction(answer, unit)
+
+
+def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
+    """Probability of each tuple where a solution weighs exp(-cost), from exact differences of costs.
+
+    Raises
+    ------
+    InfeasibleError
+        The problem has no solution.
+    """
+    covering, to_cover, unit = _coverings(problem)
+    # for each set of covered measurements: the least cost of the rest, the weight of all rests relative to that
+    memo: dict[int, tuple[int, float] | None] = {}
+
+    def ways(covered: int) -> list[tuple[int, int, int, float]]:
+        low = (~covered & -~covered).bit_length() - 1
+        found = []
+        for mask, price in covering[low] if low < to_cover else []:
+            more = None if mask & covered else rest(covered | mask)
+            if more is not None:
+                found.append((mask, price + more[0], covered | mask, more[1]))
+        return found
+
+    def rest(covered: int) -> tuple[int, float] | None:
+        if (~covered & -~covered).bit_length() - 1 >= to_cover:
+            return 0, 1.0
+        if covered not in memo:
+            found = ways(covered)
+            least = min((cost for _, cost, _, _ in found), default=0)
+            weight = math.fsum(_weight(least - cost, unit) * own for _, cost, _, own in found)
+            memo[covered] = (least, weight) if found else None
+        return memo[covered]
+
+    if rest(0) is None:
+        raise InfeasibleError("no solution")
+    reached = {0: 1.0}
+    probability: dict[int, float] = {}
+    # a set comes after all sets that it contains
+    for covered in sorted({0, *memo}):
+        here = memo.get(covered)
+        if here is None or covered not in reached:
+            continue
+        for mask, cost, after, own in ways(covered):
+            share = reached[covered] * _weight(here[0] - cost, unit) * own / here[1]
+            probability[mask] = probability.get(mask, 0.0) + share
+            reached[after] = reached.get(after, 0.0) + share
+    offsets = _offsets(problem)[0]
+    result = {}
+    for row in problem.tuples.tolist():
+        mask = sum(1 << (offsets[s] + i - 1) for s, i in enumerate(row) if i)
+        result[tuple(row)] = probability.get(mask, 0.0)
+    return result
+
+
+def _weight(exponent: int, unit: int) -> float:
+    return math.exp(max(exponent / unit, -1e4))
+
+
+def _offsets(problem: AssignmentProblem) -> tuple[list[int], int]:
+    """Each sensor's first bit, sensors whose measurements must be covered first; how many bits must be covered."""
+    sizes = problem.sizes.tolist()
+    smallest = min(sizes)
+    order = sorted(range(len(sizes)), key=lambda s: not (problem.dummy or sizes[s] == smallest))
+    offset, bits, to_cover = [0] * len(sizes), 0, 0
+    for s in order:
+        offset[s] = bits
+        bits += sizes[s]
+        if problem.dummy or sizes[s] == smallest:
+            to_cover = bits
+    return offset, to_cover
+
+
+def _coverings(problem: AssignmentProblem) -> tuple[list[list[tuple[int, int]]], int, int]:
+    """For each measurement that must be covered the tuples that begin in it, as bits and cost; cost unit last."""
+    offset, to_cover = _offsets(problem)
+    # all costs as whole numbers of the smallest unit among them: sums are exact and quick
+    ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
+    unit = max((denominator for _, denominator in ratios), default=1)
+    covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
+    best: dict[int, int] = {}
+    for row, (numerator, denominator) in zip(problem.tuples.tolist(), ratios, strict=True):
+        mask = sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i)
+        price = numerator * (unit // denominator)
+        if mask not in best or price < best[mask]:
+            best[mask] = price
+    for mask, price in best.items():
+        low = (mask & -mask).bit_length() - 1
+        if low < to_cover:
+            covering[low].append((mask, price))
+    return covering, to_cover, unit
 
 
 def exact_cost(problem: AssignmentProblem, indices: NDArray[np.intp]) -> Fraction:
@@ -196,6 +265,15 @@ def _chain(rng: np.random.Generator) -> Structure:
     return _real(np.unique(np.concatenate([tuples, extra]), axis=0)), sizes, True
 
 
+def _odd_cycle(rng: np.random.Generator) -> Structure:
+    """Draw a cycle of pairs through an odd number of sensors: the linear program takes half of each."""
+    length = int(rng.choice([3, 5, 7]))
+    tuples = np.zeros((length, length), np.int64)
+    for i in range(length):
+        tuples[i, [i, (i + 1) % length]] = 1
+    return tuples, np.ones(length, np.int64), True
+
+
 def _axial_square(rng: np.random.Generator) -> Structure:
     sensors = int(rng.integers(2, 6))
     sizes = np.full(sensors, int(rng.integers(1, {2: 7, 3: 5, 4: 4, 5: 3}[sensors])), np.int64)
@@ -227,6 +305,7 @@ STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "empty sensors": _empty_sensors,
     "disconnected": _disconnected,
     "chain": _chain,
+    "odd cycle": _odd_cycle,
     "axial square": _axial_square,
     "axial rectangular": _axial_rectangular,
     "axial sparse": _axial_sparse,
@@ -299,6 +378,15 @@ def _dear_singletons(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Flo
     return np.where(single, costs * float(rng.choice([-1e9, 1e6, 1e12])), costs)
 
 
+def _large_gap(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Equal costs so large that the gap of the linear program dwarfs the differences that matter."""
+    return -(10.0 ** rng.uniform(2.0, 8.0)) + rng.choice([0.0, 1.0]) * rng.normal(0.0, 1.0, len(tuples))
+
+
+def _eighteen_decades(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return 10.0 ** rng.uniform(-9.0, 9.0, len(tuples))
+
+
 def _forbidden(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
     return np.where(rng.random(len(tuples)) < 0.4, np.inf, rng.normal(-2.0, 4.0, len(tuples)))
 
@@ -325,6 +413,8 @@ TEMPERS: dict[str, Temper] = {
     "prices 1e12": _prices(1e12),
     "whole": _whole_at_the_border,
     "dear singletons": _dear_singletons,
+    "large gap": _large_gap,
+    "18 decades": _eighteen_decades,
     "forbidden": _forbidden,
     "zeros": _zeros_of_both_signs,
 }

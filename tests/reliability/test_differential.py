@@ -5,10 +5,10 @@ import pytest
 
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from tests.reliability.differential import WAYS, faults, judge
+from tests.reliability.differential import LISTED, WAYS, faults, judge
 from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, exact_optimum, make
 
-QUICK = [name for name in WAYS if not name.startswith("milp")]
+QUICK = [name for name in (*WAYS, *LISTED) if not name.startswith("milp")]
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -22,7 +22,14 @@ def test_every_structure(structure):
 def test_every_temper(temper):
     for number, structure in enumerate(("duplicates", "axial rectangular")):
         problem = make(np.random.default_rng([42, number]), structure, temper)
-        assert judge(Case(problem, structure, temper, number), list(WAYS)) == []
+        assert judge(Case(problem, structure, temper, number), [*WAYS, *LISTED]) == []
+
+
+@pytest.mark.parametrize(("structure", "temper"), [("odd cycle", "large gap"), ("axial square", "18 decades")])
+def test_intervals_hold_where_the_bound_is_far_from_the_optimum(structure, temper):
+    for number in range(30):
+        problem = make(np.random.default_rng([44, number]), structure, temper)
+        assert judge(Case(problem, structure, temper, number), list(LISTED)) == []
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from assoc.metrics.identity import identity
 from assoc.metrics.ospa import ospa
 from assoc.metrics.trajectories import Trajectories
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
@@ -208,13 +208,14 @@ def test_branch_and_bound_gives_nodes_up(little: Callable[[float], None]) -> Non
     """Without memory for more nodes the search ends with a valid bound, and does not say that it has proved more."""
     problem = axial(14, seed=1)
     packing = prepare(problem).packing
-    search = Search(packing, dual_bound(packing), math.inf, 1e-9)
-    search._open.first = search._open.first[:3]  # so that it would soon have to grow
+    search = BranchAndBound(packing, dual_bound(packing), math.inf, 1e-9)
+    arrays = search._open.arrays
+    search._open.arrays = arrays._replace(first=arrays.first[:3])  # so that it would soon have to grow
     optimum = assign(problem, "exact").cost
     little(0.0)
     while not search.done:
         search.run(100)
-    assert search.out_of_memory and search._open.first.size == 3
+    assert search.out_of_memory and search._open.arrays.first.size == 3
     assert search.lower_bound <= optimum + 1e-9 and search.weight >= optimum - 1e-9
 
 

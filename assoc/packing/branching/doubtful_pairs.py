@@ -13,21 +13,59 @@ Transport (1981), 269-280.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
-from assoc.packing.branching.nodes import hard_sweeps
+from assoc.packing.branching.nodes import Node, hard_sweeps, is_dropped, row_total, scale_row
+from assoc.packing.packing import PackingArrays
+
+
+class Doubts(NamedTuple):
+    """The pairs of rows that are most in doubt, the most doubtful first, and room for finding them."""
+
+    pairs: NDArray[np.int32]
+    # how much the two seem to belong together, from 0 to 1, and how doubtful that is
+    values: NDArray[np.float64]
+    doubts: NDArray[np.float64]
+    together: NDArray[np.float64]
+    partners: NDArray[np.int32]
+
+
+class Child(NamedTuple):
+    """Room for the child of a node whose bound is estimated."""
+
+    slack: NDArray[np.bool_]
+    duals: NDArray[np.float64]
+    reduced: NDArray[np.float64]
 
 
 @njit
-def doubtful_pairs(
-    cols: Any, active: Any, slack: Any, row_ptr: Any, row_cols: Any, primal: Floats, together: Floats, partners: Any,
-    pairs: Any, doubts: Floats, values: Floats
-) -> int:  # fmt: skip
-    """Fill ``pairs`` with those of which it is least clear whether they belong together; how many there are."""
+def new_doubts(count: int, num_rows: int) -> Doubts:
+    """Room for so many pairs."""
+    return Doubts(
+        np.zeros((count, 2), np.int32),
+        np.empty(count),
+        np.empty(count),
+        np.zeros(num_rows),
+        np.empty(num_rows, np.int32),
+    )
+
+
+@njit
+def new_child(node: Node) -> Child:
+    """Room for a child of any node that fits in ``node``."""
+    return Child(np.empty(node.slack.size, np.bool_), np.empty(node.slack.size), np.empty(node.reduced.size))
+
+
+@njit
+def doubtful_pairs(cols: Any, node: Node, found: Doubts) -> int:
+    """Find the pairs of which it is least clear whether they belong together; how many there are."""
+    active, slack, primal = node.active, node.slack, node.primal
+    row_ptr, row_cols = node.row_ptr, node.row_cols
+    pairs, values, doubts, together, partners = found
     num_sensors = cols.shape[1]
     doubts[:] = -1.0
     counts = np.zeros(slack.size, np.int64)
@@ -70,54 +108,40 @@ def doubtful_pairs(
 
 @njit
 def child_bound(
-    cols: Any, active: Any, num: int, slack: Any, row_ptr: Any, row_cols: Any, parent_duals: Floats,
-    parent_reduced: Floats, duals: Floats, reduced: Floats, primal: Floats, slack_primal: Floats,
-    one: int, two: int, joined: bool, temperature: float
-) -> float:  # fmt: skip
+    packing: PackingArrays, node: Node, num: int, child: Child, one: int, two: int, joined: bool, temperature: float
+) -> float:
     """Estimate the bound of a child by a few passes; ``inf`` when it has no solution."""
-    num_sensors = cols.shape[1]
-    duals[:] = parent_duals
+    cols, active, row_ptr = packing.cols, node.active, node.row_ptr
+    slack, duals, reduced = child
+    slack[:] = node.slack
+    duals[:] = node.duals
     for a in range(num):
-        uses = 0
-        for s in range(num_sensors):
-            r = cols[active[a], s]
-            if r == one or r == two:
-                uses += 1
-        dropped = uses == 1 if joined else uses == 2
-        reduced[a] = np.inf if dropped else parent_reduced[a]
+        reduced[a] = np.inf if is_dropped(cols, active[a], one, two, joined) else node.reduced[a]
     if joined:
         slack[one] = False
         slack[two] = False
     for a in range(num):
-        primal[a] = math.exp(-reduced[a] / temperature)
+        node.primal[a] = math.exp(-reduced[a] / temperature)
     for r in range(slack.size):
-        slack_primal[r] = math.exp(duals[r] / temperature) if slack[r] else 0.0
-    possible = True
+        node.slack_primal[r] = math.exp(duals[r] / temperature) if slack[r] else 0.0
     for _ in range(6):
         for r in range(slack.size):
             if row_ptr[r] == row_ptr[r + 1]:
                 continue
-            total = slack_primal[r]
-            for k in range(row_ptr[r], row_ptr[r + 1]):
-                total += primal[row_cols[k]]
+            total = row_total(node, r)
             if not 1e-200 < total < 1e200:
                 continue
-            step = math.log(total)
-            factor = 1.0 / total
-            duals[r] -= temperature * step
-            slack_primal[r] *= factor
-            for k in range(row_ptr[r], row_ptr[r + 1]):
-                primal[row_cols[k]] *= factor
+            duals[r] -= temperature * math.log(total)
+            scale_row(node, r, 1.0 / total)
     for a in range(num):
         if reduced[a] < np.inf:
-            value = parent_reduced[a]
-            for s in range(num_sensors):
+            value = node.reduced[a]
+            for s in range(cols.shape[1]):
                 r = cols[active[a], s]
                 if r >= 0:
-                    value += parent_duals[r] - duals[r]
+                    value += node.duals[r] - duals[r]
             reduced[a] = value
-    possible = hard_sweeps(slack, row_ptr, row_cols, duals, reduced, 1)
-    if not possible:
+    if not hard_sweeps(node, slack, duals, reduced, 1):
         return np.inf
     bound = 0.0
     for r in range(slack.size):

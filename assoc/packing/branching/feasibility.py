@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from assoc.errors import InfeasibleError, LimitExceededError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
@@ -19,7 +19,7 @@ def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
     chosen = []
     for c in range(packing.num_components):
         part = packing.component(c)
-        search = Search(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline())
+        search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline(), run.memory_allows)
         while search.columns is None and not search.done and not run.should_stop():
             search.run(20)
         if search.columns is None:

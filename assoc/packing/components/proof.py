@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import give_covers, split_components
 from assoc.packing.neighbourhoods.cover import Cover
@@ -24,7 +24,9 @@ def bound_of_component(component: Component, run: Run) -> float:
         return component.weight if component.packing.granularity else min(component.bound, component.weight)
     if run.should_stop():
         return component.bound
-    search = Search(component.packing, component.duals, component.weight, component.tolerance, run.deadline())
+    search = BranchAndBound(
+        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+    )
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)
     return min(max(component.bound, search.lower_bound), component.weight)

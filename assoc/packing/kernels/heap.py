@@ -11,9 +11,9 @@ from assoc._system.compiled import njit
 
 @njit
 def doubled(array: Any) -> Any:
-    """Return a copy with twice the room."""
-    larger = np.empty(2 * array.size, array.dtype)
-    larger[: array.size] = array
+    """Return a copy with twice the room along the first axis."""
+    larger = np.empty((2 * array.shape[0], *array.shape[1:]), array.dtype)
+    larger[: array.shape[0]] = array
     return larger
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc.packing.bounds.priced import Priced
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.neighbourhoods.cover import chosen_columns, own_all, weight_of
 from assoc.packing.packing import assemble
 
@@ -75,7 +75,7 @@ class LargeNeighbourhood:
         )
         old = chosen_columns(packing.cols, np.where(free, owner, -1))
         before = float(packing.weights[old].sum())
-        search = Search(smaller, priced.duals[smaller.row_origin], before, priced.tolerance, deadline)
+        search = BranchAndBound(smaller, priced.duals[smaller.row_origin], before, priced.tolerance, deadline)
         search.run(_NODES)
         if not search.done:
             self.share = max(self.share - 0.02, _LEAST)

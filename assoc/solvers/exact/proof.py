@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Component
 from assoc.packing.components.search import complete_greedily
 from assoc.packing.components.splitting import split_component
@@ -33,7 +33,7 @@ _SHORT = 50
 @dataclass(slots=True)
 class _Task:
     component: Component
-    search: Search | None = None
+    search: BranchAndBound | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
     turns: int = 0
@@ -123,8 +123,10 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branching(component: Component, run: Run) -> Search:
-    return Search(component.packing, component.duals, component.weight, component.tolerance, run.deadline())
+def _branching(component: Component, run: Run) -> BranchAndBound:
+    return BranchAndBound(
+        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+    )
 
 
 def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import Search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solution import OPTIMALITY_TOLERANCE
@@ -47,7 +47,7 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
     # a gap that another cause has left open, or that rounding alone would leave, is not closed so
     if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
         return outcome
-    search = Search(packing, dual_bound(packing, run=run), weight, wanted, run.deadline())
+    search = BranchAndBound(packing, dual_bound(packing, run=run), weight, wanted, run.deadline(), run.memory_allows)
     most = max(50, _VISITS // packing.num_columns)
     while not search.done and search.nodes < most and not run.should_stop():
         search.run(max(1, 20_000 // packing.num_columns))
