@@ -17,7 +17,7 @@ from assoc.sweeps.store import LOG, MANIFEST, REPORT
 
 if TYPE_CHECKING:
     from assoc.sweeps.setting import Setting
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
     from assoc.sweeps.space import Space
     from assoc.sweeps.study import Study
     from assoc.sweeps.tuning import Report
@@ -91,7 +91,7 @@ class Options:
         return designed(list(self.spaces.items()), random, seed)
 
     @cached_property
-    def sources(self) -> tuple[Source, ...]:
+    def sources(self) -> tuple[StudySource, ...]:
         """The scenes and problems."""
         from assoc.sweeps.sources import load_sources
 

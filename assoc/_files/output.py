@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import secrets
 import stat
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from assoc._system import temporary
 from assoc.errors import InvalidInputError
@@ -122,6 +123,11 @@ def write_text(path: FilePath, text: str) -> None:
     """
     content = text.encode("utf-8", "backslashreplace")
     write_atomically(path, lambda file: file.write(content))
+
+
+def write_json(path: FilePath, content: Mapping[str, Any]) -> None:
+    """Write plain data as JSON, whole or not at all; see `write_atomically`."""
+    write_text(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def _status(path: FilePath) -> os.stat_result | None:

@@ -12,7 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.sweeps.backends.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import Manifest, RunKey, Store
 from assoc.sweeps.worker import Job, Result
 
@@ -52,7 +52,7 @@ class Study:
 
     Parameters
     ----------
-    sources : sequence of Source
+    sources : sequence of StudySource
         Scenes and problems. Each scan is a run of its own.
     settings : sequence of Setting
     repeats : int, or range
@@ -72,7 +72,7 @@ class Study:
         No settings or no sources, or numbers out of range.
     """
 
-    sources: Sequence[Source]
+    sources: Sequence[StudySource]
     settings: Sequence[Setting]
     repeats: int | range = 1
     seed: int = 0

@@ -15,7 +15,7 @@ from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import COLUMNS
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Job:
 
     Parameters
     ----------
-    sources : tuple of Source
+    sources : tuple of StudySource
     seed : int
         Of the study.
     time_limit : float or None
@@ -74,7 +74,7 @@ class Job:
         Digest of its solvers, which the worker's must have, too.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[StudySource, ...]
     seed: int
     time_limit: float | None
     gating: Mapping[str, Any]
@@ -111,14 +111,13 @@ class Job:
         from assoc.costs import build_problem
         from assoc.packing.prepare import prepare
         from assoc.problem import AssignmentProblem
-        from assoc.scene.scan import true_tuples
 
         content = self.sources[source].content
         if isinstance(content, AssignmentProblem):
             prepare(content)
             return content, None
-        one = content.scan(scan)
-        problem, truth = build_problem(content, one, **self.gating), true_tuples(one)
+        measured = content.scan(scan)
+        problem, truth = build_problem(content, measured, **self.gating), measured.true_tuples()
         # runs share the problem: the first one must not pay for its preparation in its time
         prepare(problem)
         return problem, None if truth is None else {*map(tuple, truth.tolist())}

@@ -130,14 +130,14 @@ def run_study(folder: str, seed: int, scans: int, seeds: int, jobs: int) -> pd.D
     from assoc._cli.progress import Bar
     from assoc.simulation import simulate
     from assoc.sweeps import Setting, Study, load
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     settings = [
         Setting("aco", {"mode": mode, "ants": ANTS, "alpha": alpha, "beta": beta, "rho": rho})
         for mode in MODES
         for alpha, beta, rho in PAPER
     ]
-    scene = Source(simulate("three-radar", seed, scans=scans), "three-radar")
+    scene = StudySource(simulate("three-radar", seed, scans=scans), "three-radar")
     with Bar(sys.stderr) as bar:
         Study([scene], settings, seeds, seed).run(folder, jobs=jobs, progress=bar)
     frame = load(folder)

@@ -185,10 +185,10 @@ def test_a_study_goes_on_when_the_disk_has_room_again(disk, monkeypatch):
     from assoc.simulation import simulate
     from assoc.sweeps import Study, grid
     from assoc.sweeps.backends import local
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.02)
-    scene = Source(simulate("three-radar", 2, scans=5), "scene")
+    scene = StudySource(simulate("three-radar", 2, scans=5), "scene")
     study = Study([scene], grid("greedy"), 60)
     (disk / "filler").write_bytes(bytes(200 * 1024 - 5 * 4096))
     with pytest.raises(InvalidInputError, match="No space left on device.*the same command goes on from there"):

@@ -45,9 +45,9 @@ def slow(scene_of_module):
 @pytest.fixture(scope="module")
 def scene_of_module():
     from assoc.simulation import simulate
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
-    return Source(simulate("three-radar", 2, scans=5), "scene")
+    return StudySource(simulate("three-radar", 2, scans=5), "scene")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.sources import Source, named
+from assoc.sweeps.sources import StudySource, named
 from assoc.sweeps.store import LOG, MANIFEST, Store, _line, damaged_lines, run_keys
 
 
@@ -146,7 +146,7 @@ def test_a_run_is_kept_once(study, whole):
 
 
 def test_another_study_is_refused(study, whole, scene, tmp_path):
-    other = Source(Scene(scene.sensors, scene.times + 1.0, scene.measurements, region=scene.region), "other")
+    other = StudySource(Scene(scene.sensors, scene.times + 1.0, scene.measurements, region=scene.region), "other")
     for changed, message in [
         (replace(study, sources=[other], scans=None), "other scenes or problems: other is not among"),
         (replace(study, sources=[*study.sources, other], scans=None), "other is not among"),
@@ -177,7 +177,7 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
 
 def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
     scene.save(tmp_path / "b.npz")
-    again = Source(Scene.load(tmp_path / "b.npz"), "b.npz")
+    again = StudySource(Scene.load(tmp_path / "b.npz"), "b.npz")
     assert replace(study, sources=[again], scans=None).run(whole).new == 0
     with pytest.raises(InvalidInputError, match="is the same as"):
         named([scene, again.content], ["a.npz", "b.npz"])
@@ -192,7 +192,7 @@ def test_one_sweep_at_a_time(study, whole):
 def test_problems_and_problems_without_a_solution(tmp_path):
     easy = AssignmentProblem([[1, 1], [1, 2]], [-3.0, -1.0], [1, 2])
     none = AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False)
-    study = Study([Source(easy, "easy"), Source(none, "none")], [*grid("greedy"), *grid("milp")], 1)
+    study = Study([StudySource(easy, "easy"), StudySource(none, "none")], [*grid("greedy"), *grid("milp")], 1)
     study.run(tmp_path / "s")
     frame = load(tmp_path / "s").set_index(["scene", "solver"])
     assert frame.loc[("easy", "milp"), "cost"] == -3.0 and frame.loc[("easy", "milp"), "optimal"]
