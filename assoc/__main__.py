@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assoc._cli.program import run, steady_streams
+from assoc._cli.program import prepare_streams, run_program
 
 _PROGRAMS = {
     "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
@@ -14,7 +14,7 @@ _PROGRAMS = {
 
 def main() -> int:
     """Print the programs and what each is for."""
-    return run(_list, "assoc")
+    return run_program(_list, "assoc")
 
 
 def _list() -> None:
@@ -25,5 +25,5 @@ def _list() -> None:
 
 
 if __name__ == "__main__":
-    steady_streams()
+    prepare_streams()
     raise SystemExit(main())

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from assoc._cli.inputs import check_distinct, check_output
-from assoc._cli.options import given
-from assoc._cli.program import Parser, begin, run
-from assoc._cli.values import whole_number
+from assoc._cli.inputs import check_outputs
+from assoc._cli.options import add_common_options, common_values, parameter_values
+from assoc._cli.program import Parser, prepare_process, run_program
 from assoc._parameters import Option, options
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -32,7 +31,7 @@ _PLOTS = ("rotating-radar",)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _simulate(words), "assoc.simulate")
+    return run_program(lambda: _simulate(words), "assoc.simulate")
 
 
 def _simulate(words: list[str]) -> None:
@@ -45,12 +44,10 @@ def _simulate(words: list[str]) -> None:
 
     choices = options(simulation.parameters(scenario))
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
-    seed = whole_number(parsed["seed"], "--seed", 0)
-    values = given(choices, parsed)
-    outputs = [path for path in (parsed["output"], parsed.get("truth")) if path is not None]
-    check_distinct(outputs, [value for value in values.values() if isinstance(value, str)])
-    for path in outputs:
-        check_output(path)
+    seed = common_values(parsed).get("seed", 0)
+    values = parameter_values(choices, parsed)
+    inputs = [value for value in values.values() if isinstance(value, str)]
+    check_outputs([parsed["output"], parsed.get("truth")], inputs)
     if scenario in _PLOTS:
         _write_plots(scenario, seed, parsed, values)
         return
@@ -99,7 +96,7 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
     if scenario in _PLOTS:
         text = "also write where the aircraft were whenever the antenna pointed at them (CSV)"
         parser.add_argument("--truth", metavar="FILE", help=text)
-    parser.add_argument("--seed", default="0", metavar="N", help="seed of the random generator (default 0)")
+    add_common_options(parser, ["seed"])
     group = parser.add_argument_group("scenario")
     for option in choices:
         option.add_to(parser if option.positional else group)
@@ -107,5 +104,5 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
 
 
 if __name__ == "__main__":
-    begin("assoc.simulate")
+    prepare_process("assoc.simulate")
     raise SystemExit(main())

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.program import INTERRUPTED, Parser, run, steady_streams
-from assoc._cli.signals import ending_signals
-from assoc._system import temporary
+from assoc._cli.options import add_common_options
+from assoc._cli.program import Parser, prepare_streams, run_program
+from assoc._cli.signals import Interruption
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from assoc.sweeps.study import Counts, Study
 
 _SHOWN = 60
+_INTERRUPTION = Interruption("assoc.sweep")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _sweep(words), "assoc.sweep")
+    return run_program(lambda: _sweep(words), "assoc.sweep")
 
 
 def _sweep(words: list[str]) -> None:
@@ -36,11 +37,11 @@ def _sweep(words: list[str]) -> None:
     if "summary" in given:
         _summary(given)
         return
-    from assoc._cli.sweep_options import check_outputs, read
+    from assoc._cli.sweep_options import check_study_outputs, read_options
 
-    options = read(given)
-    inputs = [*options.values["files"], *([options.config] if options.config else [])]
-    check_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
+    options = read_options(given)
+    inputs = [*options.values["files"], options.config]
+    check_study_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
     if options.tune is not None:
         _tune(options, given)
         return
@@ -76,11 +77,9 @@ def _parser() -> Parser:
     add("--random", metavar="N", help="draw N settings from the values and ranges of --grid")
     add("--config", metavar="FILE", help="TOML file of these options; the design in tables [solver]")
     add("--repeats", metavar="N", help="runs of each setting on each scan, each with its own seed (default 1)")
-    add("--seed", metavar="N", help="all other seeds derive from it (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each run")
-    add("--scans", metavar="A:B", help="scans A to B-1 of each scene, counted from 0; A alone is one scan")
-    add("--gate-probability", metavar="P", help="share of true tuples that a gate lets through, in (0, 1]")
-    add("--max-tuples", metavar="N", help="refuse scans with more candidate tuples than this")
+    add_common_options(parser, ["seed", "time_limit"])
+    add("--scans", metavar="A:B", help="only scans A to B-1 of each scene, counted from 0; A alone is one scan")
+    add_common_options(parser, ["gate_probability", "max_tuples"])
     add("-o", "--output", metavar="FOLDER", help="the study's folder")
     add("--jobs", metavar="N", help="processes on this machine; 'all' takes every core (default 1)")
     add("--scheduler", metavar="ADDRESS", help="do the work on a dask cluster: tcp://host:port")
@@ -100,9 +99,9 @@ def _summary(given: dict[str, Any]) -> None:
             "--summary: runs nothing and goes only with --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
-    from assoc._cli.sweep_options import check_outputs
+    from assoc._cli.sweep_options import check_study_outputs
 
-    check_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
+    check_study_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
     _report(given["summary"], given, None)
 
 
@@ -126,9 +125,9 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
 
         write_text(given["csv"], table.to_csv(index=False, lineterminator="\n"))
     if "plot" in given:
-        from assoc.plotting.study_figures import draw
+        from assoc.plotting.study_figures import draw_study
 
-        for path in draw(folder, frame):
+        for path in draw_study(folder, frame):
             print(f"drawn: {printable(str(path))}")
     if "report" in given:
         from assoc.plotting.report import write_sweep_report
@@ -149,85 +148,23 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 @contextmanager
 def _watched(folder: str) -> Iterator[Any]:
     """Show progress on a terminal, and say on Ctrl-C how to go on."""
-    from assoc._cli.progress import Bar
+    from assoc._cli.progress import ProgressBar
 
-    last: list[Counts] = []
-    with Bar(sys.stderr) as bar:
+    def message(kept: str) -> str:
+        return f"{kept} are kept in {printable(folder)}; the same command goes on from there"
+
+    with ProgressBar("runs", "runs") as bar:
 
         def progress(counts: Counts) -> None:
-            last[:] = [counts]
-            _state["message"] = _farewell(folder, last)
+            _INTERRUPTION.message = message(f"{counts.done} of {counts.total} runs")
             bar(counts)
 
-        _state["message"] = _farewell(folder, last)
-        try:
+        _INTERRUPTION.message = message("finished runs")
+        with _INTERRUPTION.reported(bar.close):
             yield progress
-        except BaseException as error:
-            # a library may meet the interrupt with an error of its own
-            if not (isinstance(error, KeyboardInterrupt) or _state["code"]):
-                raise
-            bar.close()
-            print(_goodbye(), file=sys.stderr)
-            sys.stderr.flush()
-            raise SystemExit(_state["code"] or INTERRUPTED) from None
-
-
-def _farewell(folder: str, last: list[Counts]) -> str:
-    kept = f"{last[0].done} of {last[0].total} runs are" if last else "finished runs are"
-    return f"{kept} kept in {printable(folder)}; the same command goes on from there"
-
-
-_state: dict[str, Any] = {"message": "", "word": "interrupted", "code": 0}
-
-
-def _goodbye() -> str:
-    return "; ".join(filter(None, [f"assoc.sweep: {_state['word']}", _state["message"]]))
-
-
-def _stop_on_signals() -> None:
-    """Turn Ctrl-C and its kin into an orderly end, also while a library solves without Python.
-
-    Worker processes do not see them.
-    """
-    import _thread
-    import signal
-    import threading
-    import time
-
-    ending = ending_signals()
-    if not ending:
-        return
-    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
-
-    def interrupt(number: int, frame: object) -> None:
-        if not _state["code"]:
-            # a library let the signal through to this thread
-            _state.update(word=ending[number], code=128 + number)
-        raise KeyboardInterrupt
-
-    def unraisable(problem: Any) -> None:
-        # compilers call Python in places that swallow what it raises
-        if _state["code"] and problem.exc_type is KeyboardInterrupt:
-            _thread.interrupt_main()
-        else:
-            sys.__unraisablehook__(problem)
-
-    sys.unraisablehook = unraisable
-    for one in ending:
-        signal.signal(one, interrupt)
-
-    def watch() -> None:
-        # once: a second one would come in the middle of cleaning up
-        number = signal.sigwait(ending)
-        _state.update(word=ending[number], code=128 + number)
-        _thread.interrupt_main()
-        time.sleep(5.0)
-        temporary.end(128 + number, f"{_goodbye()}\n")
-
-    threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 if __name__ == "__main__":
-    steady_streams()
-    _stop_on_signals()
+    prepare_streams()
+    _INTERRUPTION.interrupt_on_signals()
     raise SystemExit(main())

@@ -9,12 +9,13 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output
-from assoc._cli.options import given
-from assoc._cli.program import Parser, begin, each, run
+from assoc._cli.inputs import check_outputs
+from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
+from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.progress import with_progress
 from assoc._cli.values import number, seconds, whole_number
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
@@ -59,11 +60,11 @@ further options (docs/tracking.md):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _track(words), "assoc.track")
+    return run_program(lambda: _track(words), "assoc.track")
 
 
 def _track(words: list[str]) -> None:
-    solver = _named(words, "--solver") or "exact"
+    solver = read_first("assoc.track", words, ["solver"])["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
         _parser([]).parse_args(words)
@@ -76,18 +77,15 @@ def _track(words: list[str]) -> None:
         one.kind = float
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
-    outputs = [path for path in (parsed["output"], parsed["report"]) if path]
-    check_distinct(outputs, [file])
-    for path in outputs:
-        check_output(path)
+    check_outputs([parsed["output"], parsed["report"]], [file])
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
         "solver": solver,
-        "solver_parameters": given(own, parsed),
-        "life_cycle": LifeCycle(**given(cycle, parsed)),
-        "initiation": Initiation(**given(start, parsed)),
-        **_common(parsed),
+        "solver_parameters": parameter_values(own, parsed),
+        "life_cycle": LifeCycle(**parameter_values(cycle, parsed)),
+        "initiation": Initiation(**parameter_values(start, parsed)),
+        **common_values(parsed),
     }
     started = time.perf_counter()
     if _is_npz(file):
@@ -106,18 +104,11 @@ def _track(words: list[str]) -> None:
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
-    each(
+    write_all(
         lambda: table.to_csv(parsed["output"]),
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed),
     )
-
-
-def _named(words: list[str], flag: str) -> str | None:
-    first = Parser(prog="assoc.track", add_help=False, allow_abbrev=False)
-    first.add_argument(flag, dest="value")
-    value = first.parse_known_args(words)[0].value
-    return None if value is None else str(value)
 
 
 def _field(owner: Any, name: str) -> Any:
@@ -148,9 +139,7 @@ def _parser(further: Sequence[Option]) -> Parser:
         help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: scenes imm-cv, plots ekf)",
     )
     add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm: m/s^2 (default 30, imm-cv 50)")
-    add("--seed", metavar="N", help="seed of the solver (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each scan's assignment problem (default: none)")
-    add("--gate-probability", metavar="P", help="share of true measurements that a gate lets through (default 0.999)")
+    add_common_options(parser, ["seed", "time_limit", "gate_probability"])
     add("--all", action="store_true", help="write tentative tracks, too")
     add("--depth", metavar="N", help="mht: scans until a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: branches of a track tree (default 30)")
@@ -167,17 +156,6 @@ def _parser(further: Sequence[Option]) -> Parser:
     for option in further:
         option.add_to(parser)
     return parser
-
-
-def _common(parsed: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    if parsed["seed"] is not None:
-        found["seed"] = whole_number(parsed["seed"], "--seed", 0)
-    if parsed["time_limit"] is not None:
-        found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
-    if parsed["gate_probability"] is not None:
-        found["gate_probability"] = number(parsed["gate_probability"], "--gate-probability")
-    return found
 
 
 def _is_npz(file: str) -> bool:
@@ -203,7 +181,7 @@ def _make(
     for option, takers in _OWN.items():
         if parsed[option] is None:
             continue
-        flag = "--" + option.replace("_", "-")
+        flag = flag_of(option)
         if name not in takers:
             raise InvalidInputError(f"{flag}: is for --tracker {' or '.join(takers)}, not for {name}")
         extra[option] = whole_number(parsed[option], flag, 1)
@@ -223,10 +201,10 @@ def _of_scene(
     parsed["filter"] = parsed["filter"] or "imm-cv"
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
-            raise InvalidInputError(f"--{flag.replace('_', '-')}: describes the radar of plots, a scene knows its own")
+            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots, a scene knows its own")
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
-    numbers = _with_progress(range(scene.num_scans), scene.num_scans)
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
     table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     return scene.num_scans, tracker, table, scene
 
@@ -250,7 +228,7 @@ def _of_plots(
     radar: dict[str, Any] = {}
     for flag, (argument, unit) in _RADAR.items():
         if parsed[flag] is not None:
-            radar[argument] = unit * number(parsed[flag], "--" + flag.replace("_", "-"))
+            radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
     if window == "none":
@@ -260,21 +238,10 @@ def _of_plots(
     print(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     table = TrackTable()
-    for _ in step_windows(tracker, _with_progress(windows, len(windows))):
+    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
         tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
         table.add(tracks, tracker.filter.motion.position)
     return len(windows), tracker, table, None
-
-
-def _with_progress(items: Sequence[Any], count: int) -> Iterator[Any]:
-    """Show a progress bar on stderr if that is a terminal."""
-    if not sys.stderr.isatty():
-        yield from items
-        return
-    from rich.console import Console
-    from rich.progress import track
-
-    yield from track(items, "tracking", total=count, console=Console(stderr=True), transient=True)
 
 
 def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float) -> None:
@@ -295,5 +262,5 @@ def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene:
 
 
 if __name__ == "__main__":
-    begin("assoc.track")
+    prepare_process("assoc.track")
     raise SystemExit(main())

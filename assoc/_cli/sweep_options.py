@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output, read_toml
-from assoc._cli.values import check_kind, number, scan_range, seconds, whole_number
+from assoc._cli.inputs import check_outputs, read_toml
+from assoc._cli.options import COMMON_OPTIONS, flag_of
+from assoc._cli.values import check_kind, scan_range, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from
@@ -138,7 +139,7 @@ class Options:
         }
 
 
-def read(given: Mapping[str, Any]) -> Options:
+def read_options(given: Mapping[str, Any]) -> Options:
     """Check the options of the command line and of the file that ``config`` names; the former come first.
 
     Raises
@@ -173,16 +174,11 @@ def read(given: Mapping[str, Any]) -> Options:
 
 
 def _of_text(name: str, value: Any) -> Any:
-    flag = "--" + name.replace("_", "-")
-    if name in _WHOLE:
-        return whole_number(value, flag, _WHOLE[name])
-    if name == "time_limit":
-        return seconds(value, flag)
-    if name == "gate_probability":
-        return number(value, flag)
-    if name == "jobs":
-        return os.cpu_count() or 1 if value == "all" else whole_number(value, flag, 1)
-    return value
+    if name == "jobs" and value == "all":
+        return os.cpu_count() or 1
+    if name in COMMON_OPTIONS:
+        return COMMON_OPTIONS[name].parse(value, flag_of(name))
+    return whole_number(value, flag_of(name), _WHOLE[name]) if name in _WHOLE else value
 
 
 def _of_file(file: str, key: str, value: Any) -> Any:
@@ -208,11 +204,9 @@ def _of_file(file: str, key: str, value: Any) -> Any:
     return float(value) if key in _NUMBERS else value
 
 
-def check_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
+def check_study_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
     """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
-    outputs = [file for file in files if file is not None]
-    check_distinct(outputs, [*inputs, *(os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT))])
-    for file in outputs:
-        check_output(file, folder)
+    study = [os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT)]
+    check_outputs(files, inputs, reserved=study, new_folder=folder)

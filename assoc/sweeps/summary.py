@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
 """What is averaged; "correct" is the share of the true tuples that were found."""
 
+FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
+"""What measures are multiplied by where people read them: per cent, milliseconds."""
+
 
 def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
     """Average the runs of each setting.
@@ -133,7 +136,7 @@ def _cells(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
         line += [str(row[name]) for name in infeasible]
         for name in measures:
-            factor = {"optimal": 100.0, "correct": 100.0, "time": 1e3}.get(name, 1.0)
+            factor = FACTORS.get(name, 1.0)
             line.append(_number(factor * row[name], name))
             line.append(_interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
         cells.append(line)

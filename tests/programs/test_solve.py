@@ -174,7 +174,7 @@ def test_kbest_ranks_every_scan(run, scene_file, tmp_path):
     "words, message",
     [
         (["--kbest", "0"], "--kbest: expected a whole number >= 1, got '0'"),
-        (["--kbest", "2", "--solver", "aco"], "--kbest: ranks by itself and takes no --solver"),
+        (["--kbest", "2", "--solver", "aco"], "--kbest: has its own algorithm; leave out --solver"),
     ],
 )
 def test_kbest_refuses(run, scene_file, words, message):

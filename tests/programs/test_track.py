@@ -122,7 +122,7 @@ BAD = {
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
     "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, none"),
-    "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite what is read"),
+    "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
     "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }
 
