@@ -16,12 +16,12 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 _PURPOSE = {
-    "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
-    "crowd": "many targets at random in a box",
-    "bearing-only": "bearing sensors whose lines of sight cross where nobody is",
+    "three-radar": "three targets, three radars, 100 scans (as in the ant colony paper)",
+    "crowd": "many targets at random positions in a box",
+    "bearing-only": "bearing sensors only, with many ghosts (false intersections of bearings)",
     "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
-    "from-tracks": "recorded trajectories (CSV) seen by simulated radars",
-    "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or a pair that is hard to keep apart",
+    "from-tracks": "recorded trajectories (CSV), measured by simulated radars",
+    "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or two close aircraft",
 }
 
 _PLOTS = ("rotating-radar",)
@@ -74,7 +74,7 @@ def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[
 
 
 def _list_parser() -> Parser:
-    lines = [f"  {name:<14} {purpose}" for name, purpose in _PURPOSE.items()]
+    lines = [f"  {name:<15} {purpose}" for name, purpose in _PURPOSE.items()]
     parser = Parser(
         prog="assoc.simulate",
         usage="python -m assoc.simulate SCENARIO -o scene.npz [options]",
@@ -91,10 +91,10 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
     parser = Parser(
         prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".", allow_abbrev=False
     )
-    content = "plots (.csv)" if scenario in _PLOTS else "the scene file to write (.npz)"
+    content = "file for the plots (.csv)" if scenario in _PLOTS else "file for the scene (.npz)"
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)
     if scenario in _PLOTS:
-        text = "also write where the aircraft were whenever the antenna pointed at them (CSV)"
+        text = "also write the aircraft's true positions each time the antenna points at them (.csv)"
         parser.add_argument("--truth", metavar="FILE", help=text)
     add_common_options(parser, ["seed"])
     group = parser.add_argument_group("scenario")

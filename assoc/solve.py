@@ -85,8 +85,8 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     parser = Parser(
         prog="assoc.solve",
         usage="python -m assoc.solve FILE.npz [FILE.npz ...] --solver NAME [options]",
-        description="Associate the measurements of scenes (or solve assignment problems)\n"
-        "and say how far from optimal each answer can be at most.",
+        description="Associate the measurements of scenes, or solve assignment problems,\n"
+        "and report how far each answer can be from the optimum.",
         epilog=None if explicit else _other_solvers(solver),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -112,7 +112,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
 def _other_solvers(solver: str) -> str:
     from assoc.solvers import registry
 
-    lines = ["solvers and their parameters (--solver NAME --help describes them):"]
+    lines = ["solvers and their parameters (described by --solver NAME --help):"]
     for name in registry.names():
         flags = " ".join(option.flag for option in options(registry.parameters(name)))
         lines.append(f"  {name:<12} {flags or '(none)'}")

@@ -59,35 +59,35 @@ def _parser() -> Parser:
         usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
         "       python -m assoc.sweep --config STUDY.toml\n"
         "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE] [--report FILE]",
-        description="Run a design of solver parameters over scenes and problems, with repeats, and keep every\n"
-        "result as it comes. The same command again runs only what is missing.",
+        description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
+        "The same command again runs only what is missing.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument
     add("files", nargs="*", metavar="FILE", help="scene.npz or problem.npz")
-    add("--solver", nargs="+", metavar="NAME", help="one solver or several")
+    add("--solver", nargs="+", metavar="NAME", help="one or more solvers (default aco)")
     add(
         "--grid",
         nargs="+",
         metavar="NAME=V1,V2",
-        help="values of parameters, every combination is run; SOLVER.NAME=... for one solver of several; "
-        "with --random also ranges LOW:HIGH or LOW:HIGH:log",
+        help="parameter values; every combination is run. SOLVER.NAME=... is for one of several solvers; "
+        "--random and --tune also take ranges LOW:HIGH or LOW:HIGH:log",
     )
-    add("--random", metavar="N", help="draw N settings from the values and ranges of --grid")
-    add("--config", metavar="FILE", help="TOML file of these options; the design in tables [solver]")
+    add("--random", metavar="N", help="run N random settings from the values and ranges of --grid")
+    add("--config", metavar="FILE", help="read these options from a TOML file; parameter values in tables [solver]")
     add("--repeats", metavar="N", help="runs of each setting on each scan, each with its own seed (default 1)")
     add_common_options(parser, ["seed", "time_limit"])
     add("--scans", metavar="A:B", help="only scans A to B-1 of each scene, counted from 0; A alone is one scan")
     add_common_options(parser, ["gate_probability", "max_tuples"])
-    add("-o", "--output", metavar="FOLDER", help="the study's folder")
-    add("--jobs", metavar="N", help="processes on this machine; 'all' takes every core (default 1)")
-    add("--scheduler", metavar="ADDRESS", help="do the work on a dask cluster: tcp://host:port")
-    add("--tune", metavar="N", help="search the ranges of --grid for good parameters in N trials")
-    add("--target", metavar="NAME", help="of --tune: gap (mean gap) or time (time to optimum); default gap")
-    add("--summary", metavar="FOLDER", help="print the table of a study and run nothing")
+    add("-o", "--output", metavar="FOLDER", help="folder of the study")
+    add("--jobs", metavar="N", help="number of processes, or 'all' for one per core (default 1)")
+    add("--scheduler", metavar="ADDRESS", help="run on a dask cluster: tcp://host:port")
+    add("--tune", metavar="N", help="search for good parameters in the ranges of --grid, with N trials")
+    add("--target", metavar="NAME", help="what --tune minimises: gap (mean gap, default) or time (time to optimum)")
+    add("--summary", metavar="FOLDER", help="print the table of a study; run nothing")
     add("--csv", metavar="FILE", help="write the table as CSV")
-    add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (assoc[report])")
+    add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (needs assoc[report])")
     add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
     return parser
 
@@ -119,7 +119,7 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     print()
     damaged = damaged_lines(folder)
     if damaged and study is None:
-        print(f"{damaged} unfinished lines of the log are passed over; the same sweep again does their runs")
+        print(f"{damaged} damaged lines of the log are ignored; the same sweep again repeats their runs")
     if "csv" in given:
         from assoc._files.output import write_text
 

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from assoc.tracking import Tracker, TrackTable
 
 TRACKERS = {
-    "multi-sensor": "each scan one assignment over tracks and all sensors (default for scenes)",
-    "static": "the sensors of a scan fused first, then assigned to tracks",
-    "mht": "track-oriented multiple hypotheses (default for plots)",
-    "mht-hypothesis": "hypothesis-oriented multiple hypotheses (Reid, Murty)",
-    "nearest-neighbour": "each measurement to the nearest track",
+    "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
+    "static": "associates the sensors of a scan first, then assigns the results to tracks",
+    "mht": "track-oriented multiple hypothesis tracking (default for plots)",
+    "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
+    "nearest-neighbour": "assigns each measurement to the nearest track",
 }
 WINDOWS = ("ctw", "ctw-time", "none")
 # option -> the trackers that take it
@@ -51,10 +51,10 @@ _RADAR = {
 GOSPA_CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
-  life of a track    --confirmation --false-probability --missed-probability --m --n
+  track life cycle   --confirmation --false-probability --missed-probability --m --n
                      --deletion --deletion-time --deletion-count --deletion-drop
-  new tracks         --speed --rest --birth-rate --widest
-  and the parameters of the solver, which python -m assoc.solve --solver NAME --help describes"""
+  track initiation   --speed --rest --birth-rate --widest
+  solver parameters  described by: python -m assoc.solve --solver NAME --help"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -90,7 +90,7 @@ def _track(words: list[str]) -> None:
     started = time.perf_counter()
     if _is_npz(file):
         if parsed["window"] is not None:
-            raise InvalidInputError("--window: groups the plots of a CSV file, a scene has scans already")
+            raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
         count, tracker, table, scene = _of_scene(file, parsed, settings)
     else:
         count, tracker, table, scene = _of_plots(file, parsed, settings)
@@ -122,37 +122,40 @@ def _parser(further: Sequence[Option]) -> Parser:
     parser = Parser(
         prog="assoc.track",
         usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
-        description="Make tracks of the measurements of a scene (.npz), or of radar plots (.csv).",
+        description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", required=True, metavar="FILE", help="the tracks to write (.csv)")
-    add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (assoc[report])")
-    add("--tracker", metavar="NAME", help="one of the trackers below")
-    add("--solver", metavar="NAME", help="solver of the assignment problems (default exact)")
+    add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv)")
+    add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
+    add("--tracker", metavar="NAME", help="name of the tracker, see below")
+    add("--solver", metavar="NAME", help="name of the solver (default exact)")
     add(
         "--filter",
         metavar="NAME",
-        help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: scenes imm-cv, plots ekf)",
+        help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
     )
-    add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm: m/s^2 (default 30, imm-cv 50)")
+    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
-    add("--all", action="store_true", help="write tentative tracks, too")
-    add("--depth", metavar="N", help="mht: scans until a decision is final (default 3)")
-    add("--max-branches", metavar="N", help="mht: branches of a track tree (default 30)")
-    add("--max-hypotheses", metavar="N", help="mht-hypothesis: hypotheses that are kept (default 20)")
-    plots = parser.add_argument_group("plots")
+    add("--all", action="store_true", help="also write tentative tracks")
+    add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
+    add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
+    add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    plots = parser.add_argument_group("options for plots")
     plots.add_argument(
-        "--window", metavar="NAME", help="ctw: by the antenna's turn (default); ctw-time: by its time; none: one by one"
+        "--window",
+        metavar="NAME",
+        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; none, one by one",
     )
-    plots.add_argument("--rotation", metavar="S", help="seconds of a turn (default: estimated)")
-    plots.add_argument("--detection-probability", metavar="P", help="of the radar (default 0.8)")
-    plots.add_argument("--range-noise", metavar="M", help="standard deviation, metres (default: from the plots' steps)")
-    plots.add_argument("--bearing-noise", metavar="DEG", help="standard deviation, degrees (default: likewise)")
-    plots.add_argument("--false-alarms", metavar="X", help="false plots in a rotation (default 2.5)")
+    plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
+    add = plots.add_argument
+    add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
+    add("--range-noise", metavar="M", help="standard deviation of range, metres (default: from the plots' steps)")
+    add("--bearing-noise", metavar="DEG", help="standard deviation of bearing, degrees (default: likewise)")
+    add("--false-alarms", metavar="X", help="mean number of false plots in a rotation (default 2.5)")
     for option in further:
         option.add_to(parser)
     return parser
@@ -183,7 +186,7 @@ def _make(
             continue
         flag = flag_of(option)
         if name not in takers:
-            raise InvalidInputError(f"{flag}: is for --tracker {' or '.join(takers)}, not for {name}")
+            raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
         extra[option] = whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
@@ -201,7 +204,7 @@ def _of_scene(
     parsed["filter"] = parsed["filter"] or "imm-cv"
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
-            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots, a scene knows its own")
+            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")

@@ -110,7 +110,7 @@ class Options:
         from assoc.sweeps.tuning import tune
 
         if self.tables or len(self.solvers) != 1 or "random" in self.values:
-            raise InvalidInputError("--tune: searches one --solver in the ranges of --grid, without --random or tables")
+            raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without --random or tables")
         solver = self.solvers[0]
         return tune(
             self.output,
@@ -157,17 +157,17 @@ def read_options(given: Mapping[str, Any]) -> Options:
     if tables:
         for name in ("solver", "grid"):
             if name in values:
-                raise InvalidInputError(f"--{name}: the design is in the tables of {config}; give one of the two")
+                raise InvalidInputError(f"--{name}: {config} has tables of parameters already; give one of the two")
     if not values.get("files"):
         raise InvalidInputError("no scene.npz or problem.npz is given")
     if "output" not in values:
-        raise InvalidInputError("--output: missing, expected the folder that keeps the study")
+        raise InvalidInputError("--output: missing, expected the folder of the study")
     if "scheduler" in values and "jobs" in values:
-        raise InvalidInputError("--jobs: the cluster has its own workers; give --jobs or --scheduler")
+        raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
     if values.get("target", "gap") not in ("gap", "time"):
         raise InvalidInputError(f"--target: expected gap or time, got {values['target']!r}")
     if "target" in values and "tune" not in values:
-        raise InvalidInputError("--target: goes only with --tune")
+        raise InvalidInputError("--target: can be given only with --tune")
     if not 0 < values.get("gate_probability", 1.0) <= 1:
         raise InvalidInputError(f"--gate-probability: expected a number in (0, 1], got {values['gate_probability']}")
     return Options(values, tables, config)

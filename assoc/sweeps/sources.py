@@ -65,10 +65,10 @@ def load_sources(files: Sequence[str]) -> tuple[StudySource, ...]:
     InvalidInputError
         A file is neither, or the same content is given twice.
     """
-    return named([load_source(file) for file in files], files)
+    return named_sources([load_source(file) for file in files], files)
 
 
-def named(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
+def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
     """Sources under the names of their files: the last part of the path where that tells them apart.
 
     Raises

@@ -202,7 +202,7 @@ class Store:
         entries: list[Mapping[str, Any]] = [
             {"setting_key": key, "solver": one.solver, "parameters": dict(one.parameters)} for key, one in new.items()
         ]
-        data = memoryview(b"".join(_line(entry) for entry in [*entries, batch]))
+        data = memoryview(b"".join(log_line(entry) for entry in [*entries, batch]))
         path = self.folder / LOG
         before = os.fstat(self._log.fileno()).st_size
         try:
@@ -281,7 +281,7 @@ def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
         with open(path, "rb") as file:
             for line in file:
                 if line != b"\n":
-                    yield _read_line(line)
+                    yield _read_log_line(line)
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -291,12 +291,13 @@ def damaged_lines(folder: str | os.PathLike[str]) -> int:
     return sum(entry is None for entry in read_log(folder))
 
 
-def _line(entry: Mapping[str, Any]) -> bytes:
+def log_line(entry: Mapping[str, Any]) -> bytes:
+    """Return a line of the log: the checksum of an entry, and the entry as JSON."""
     body = json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(body), body)
 
 
-def _read_line(line: bytes) -> dict[str, Any] | None:
+def _read_log_line(line: bytes) -> dict[str, Any] | None:
     body = line[9:-1]
     if line[-1:] != b"\n" or line[:9] != b"%08x " % zlib.crc32(body):
         return None

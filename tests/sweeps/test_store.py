@@ -13,8 +13,8 @@ from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.sources import StudySource, named
-from assoc.sweeps.store import LOG, MANIFEST, Store, _line, damaged_lines, run_keys
+from assoc.sweeps.sources import StudySource, named_sources
+from assoc.sweeps.store import LOG, MANIFEST, Store, damaged_lines, log_line, run_keys
 
 
 def same(one, other):
@@ -104,7 +104,7 @@ def test_a_line_with_a_right_checksum_and_wrong_content_is_passed_over(whole, co
     at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
     entry = json.loads(lines[at][9:])
     entry[column][-1] = value
-    lines[at] = _line(entry)
+    lines[at] = log_line(entry)
     (whole / LOG).write_bytes(b"".join(lines))
     assert damaged_lines(whole) == 1
     assert len(load(whole)) == 40 - len(entry["scan"]) and len(load_traces(whole)) > 0
@@ -180,7 +180,7 @@ def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
     again = StudySource(Scene.load(tmp_path / "b.npz"), "b.npz")
     assert replace(study, sources=[again], scans=None).run(whole).new == 0
     with pytest.raises(InvalidInputError, match="is the same as"):
-        named([scene, again.content], ["a.npz", "b.npz"])
+        named_sources([scene, again.content], ["a.npz", "b.npz"])
 
 
 def test_one_sweep_at_a_time(study, whole):

@@ -49,7 +49,7 @@ def _quiet() -> None:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-class Cluster:
+class DaskWorkers:
     """The workers of a scheduler, at work on one job.
 
     What all runs share is sent to every worker once. Workers may come and go: what a lost one had in hand
@@ -152,11 +152,11 @@ def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator
     Raises
     ------
     InvalidInputError
-        See `connect` and `Cluster.run`.
+        See `connect` and `DaskWorkers.run`.
     """
     client = connect(address)
     try:
-        yield from Cluster(client, job).run(batches)
+        yield from DaskWorkers(client, job).run(batches)
     except OSError:  # timeouts and closed connections among them
         raise InvalidInputError(_LOST) from None
     finally:

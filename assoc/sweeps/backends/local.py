@@ -47,7 +47,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
         try:
             with signals_as_they_are(), _interrupts_ignored():
                 # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
-                results = parallel(delayed(_run)(str(path), digest, os.getpid(), batch) for batch in batches)
+                results = parallel(delayed(run_in_process)(str(path), digest, os.getpid(), batch) for batch in batches)
             yield from results
         except BrokenProcessPool:
             raise InvalidInputError(
@@ -72,7 +72,7 @@ def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
             path.write_bytes(content)
         except OSError as error:
             raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        yield path, _digest(content)
+        yield path, content_digest(content)
     finally:
         temporary.remove(str(path))
 
@@ -101,17 +101,19 @@ def stop_workers() -> None:
 _job: tuple[str, Job] | None = None
 
 
-def _run(path: str, digest: str, parent: int, batch: Batch) -> Result:
+def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
+    """Do a batch in a worker process, of the job in the file ``path``, which the process reads once."""
     global _job
     if _job is None or _job[0] != path:
         end_with(parent, path)
         content = Path(path).read_bytes()
         # others may be allowed to write in the study's folder, and a pickle can do anything
-        if _digest(content) != digest:
+        if content_digest(content) != digest:
             raise InvalidInputError(f"{path}: was changed by someone else")
         _job = path, pickle.loads(content)
     return run_batch(_job[1], batch)
 
 
-def _digest(content: bytes) -> str:
+def content_digest(content: bytes) -> str:
+    """Return the digest by which a worker knows the job file of its own sweep."""
     return hashlib.sha256(content).hexdigest()
