@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from assoc.association.source import Source
 
 DEFAULT_SOLVER = "exact"
+_SHOWN = 20
 _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
 
 
@@ -69,7 +70,7 @@ def _solve(words: list[str]) -> None:
         lambda: _write_json(parsed["json"], association, names),
         lambda: _write_csv(parsed["csv"], association, names),
         lambda: _write_report(parsed["report"], association, of_items, names, words),
-        lambda: _print(association, names, elapsed),
+        lambda: _print(association, names, elapsed, every=parsed["all"]),
     )
 
 
@@ -97,6 +98,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add_common_options(parser, ["seed", "time_limit", "jobs"])
     add("--scans", metavar="A:B", help="only scans A to B-1, counted from 0; A alone is one scan")
     add_common_options(parser, ["kbest"])
+    add("--all", action="store_true", help=f"print all scans on a terminal, not only the first {_SHOWN}")
     add("--json", metavar="FILE", help="write the result as JSON")
     add("--csv", metavar="FILE", help="write the table as CSV")
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
@@ -205,10 +207,17 @@ def _write_report(
         write_association_report(path, association, sources, names, words=words)
 
 
-def _print(association: Association, names: list[str], elapsed: float) -> None:
+def _print(association: Association, names: list[str], elapsed: float, *, every: bool) -> None:
     from assoc._cli.table import print_table
+    from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
-    print_table(association.scans, names)
+    # a pipe gets all scans and columns: programs read it
+    brief = sys.stdout.isatty()
+    shown = len(names) if every or not brief else _SHOWN
+    headers, cells = rows(association.scans[:shown], names[:shown], brief=brief)
+    print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
+    if len(names) > shown:
+        print(f"... and {len(names) - shown} more scans (--all shows them)")
     print()
     print(association.summary())
     print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")

@@ -107,15 +107,20 @@ def _summary(given: dict[str, Any]) -> None:
 
 def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
+    from assoc._cli.table import print_table
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
-    from assoc.sweeps.summary import print_summary, summarize
+    from assoc.sweeps.summary import INTERVAL, summarize, summary_rows
 
     frame = load(folder)
     if study is not None:
         frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
     table = summarize(frame)
-    print_summary(table, _SHOWN if study is not None else None)
+    headers, rows = summary_rows(table, brief=sys.stdout.isatty())
+    shown = len(rows) if study is None else _SHOWN
+    print_table(headers, rows[:shown], keys=headers.index("runs"), joined=[INTERVAL])
+    if len(rows) > shown:
+        print(f"... and {len(rows) - shown} more settings (--summary shows them)")
     print()
     damaged = damaged_lines(folder)
     if damaged and study is None:
