@@ -1,4 +1,7 @@
-"""``python -m assoc.simulate``: simulate a scene or a recording of plots and write it to a file."""
+"""``python -m assoc.simulate``: simulate a scene or a recording of plots and write it to a file.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
 
 from __future__ import annotations
 

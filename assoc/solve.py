@@ -1,7 +1,7 @@
 """``python -m assoc.solve``: associate the measurements of scenes, or solve assignment problems, from files.
 
 This is a program: the package must not import it, or ``python -m assoc.solve`` would warn and
-``assoc.solve`` would change its meaning with the order of imports.
+``assoc.solve`` would change its meaning with the order of imports. Imports inside functions keep --help quick.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from assoc._cli.inputs import check_outputs, read_toml
 from assoc._cli.options import add_common_options, common_values, parameter_values, read_first
 from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
+from assoc._cli.table import print_table
 from assoc._cli.values import check_kind, scan_range
 from assoc._files.output import write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
+from assoc.solvers import registry
 
 if TYPE_CHECKING:
     from assoc.association.association import Association
@@ -40,8 +42,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _solve(words: list[str]) -> None:
     solver, explicit, config = _solver(words)
-    from assoc.solvers import registry  # loads numpy, which is slow
-
     choices = options(registry.parameters(solver))
     parsed = vars(_parser(solver, choices, explicit).parse_args(words))
     settings = {**{key: config[key] for key in _SETTINGS if key in config}, **common_values(parsed)}
@@ -56,7 +56,7 @@ def _solve(words: list[str]) -> None:
     if parsed["report"]:
         check_extra("plotly", "report")
 
-    from assoc.association.source import load_source  # --help needs no scenes
+    from assoc.association.source import load_source
 
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
@@ -112,8 +112,6 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
 
 
 def _other_solvers(solver: str) -> str:
-    from assoc.solvers import registry
-
     lines = ["solvers and their parameters (described by --solver NAME --help):"]
     for name in registry.names():
         flags = " ".join(option.flag for option in options(registry.parameters(name)))
@@ -122,8 +120,6 @@ def _other_solvers(solver: str) -> str:
 
 
 def _read_config(path: str) -> dict[str, Any]:
-    from assoc.solvers import registry
-
     config = read_toml(path)
     for key, value in config.items():
         if isinstance(value, dict):
@@ -208,7 +204,6 @@ def _write_report(
 
 
 def _print(association: Association, names: list[str], elapsed: float, *, every: bool) -> None:
-    from assoc._cli.table import print_table
     from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
     # a pipe gets all scans and columns: programs read it

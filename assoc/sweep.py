@@ -1,4 +1,7 @@
-"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster."""
+"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.options import add_common_options
 from assoc._cli.program import Parser, prepare_streams, run_program
+from assoc._cli.progress import ProgressBar
 from assoc._cli.signals import Interruption
+from assoc._cli.table import print_table
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -107,7 +112,6 @@ def _summary(given: dict[str, Any]) -> None:
 
 def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
-    from assoc._cli.table import print_table
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
     from assoc.sweeps.summary import INTERVAL, summarize, summary_rows
@@ -153,8 +157,6 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 @contextmanager
 def _watched(folder: str) -> Iterator[Any]:
     """Show progress on a terminal, and say on Ctrl-C how to go on."""
-    from assoc._cli.progress import ProgressBar
-
     def message(kept: str) -> str:
         return f"{kept} are kept in {printable(folder)}; the same command goes on from there"
 

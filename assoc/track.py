@@ -1,6 +1,6 @@
 """``python -m assoc.track``: tracks from a scene, or from the radar plots of a CSV file.
 
-This is a program: the package must not import it.
+This is a program: the package must not import it. Imports inside functions keep --help quick.
 """
 
 from __future__ import annotations

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.program import Parser
 from assoc._cli.values import number, seconds, whole_number
-from assoc._parameters import Option
+
+if TYPE_CHECKING:
+    from assoc._parameters import Option
 
 
 class CommonOption(NamedTuple):

@@ -7,6 +7,7 @@ exit code is the shell's own: 128 and the number of the signal.
 
 from __future__ import annotations
 
+import _thread
 import multiprocessing
 import signal
 import sys
@@ -14,7 +15,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from assoc._system import temporary
@@ -44,7 +44,6 @@ def exit_on_signals(name: str) -> None:
     _wait_for_signals(ending, handler=leave, waiter=leave)
 
 
-@dataclass
 class Interruption:
     """Whether and how a signal ended a program, and what the program then says.
 
@@ -63,10 +62,11 @@ class Interruption:
         Exit code; 0 before there was a signal.
     """
 
-    name: str
-    message: str = ""
-    word: str = "interrupted"
-    code: int = 0
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.message = ""
+        self.word = "interrupted"
+        self.code = 0
 
     def line(self) -> str:
         """Return the program's last line."""
@@ -77,8 +77,6 @@ class Interruption:
 
         Worker processes do not see them. A program that is not done with cleaning up after five seconds is ended.
         """
-        import _thread
-
         ending = ending_signals()
         if not ending:
             return

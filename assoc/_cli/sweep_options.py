@@ -1,4 +1,7 @@
-"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file."""
+"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file.
+
+Imports inside functions keep wrong options quick to tell: scenes and studies need numpy and more.
+"""
 
 from __future__ import annotations
 

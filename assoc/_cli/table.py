@@ -102,7 +102,7 @@ def _drawn(
     for _ in range(max(map(len, chosen))):
         yield next(lines)
     utf = (sys.stdout.encoding or "").lower().startswith("utf")
-    yield ("\N{BOX DRAWINGS LIGHT HORIZONTAL}" if utf else "-") * _width(columns, words, rows)
+    yield ("─" if utf else "-") * _width(columns, words, rows)
     yield from lines
 
 

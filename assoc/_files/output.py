@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 import secrets
 import stat
@@ -127,6 +126,8 @@ def write_text(path: FilePath, text: str) -> None:
 
 def write_json(path: FilePath, content: Mapping[str, Any]) -> None:
     """Write plain data as JSON, whole or not at all; see `write_atomically`."""
+    import json  # not needed for --help
+
     write_text(path, json.dumps(content, allow_nan=False) + "\n")
 
 
