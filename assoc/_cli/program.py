@@ -47,7 +47,7 @@ def run_program(program: Callable[[], None], name: str) -> int:
         sys.stdout = None
         return DONE
     except OSError as error:
-        # what the rooms do not expect: a full disk behind stdout, say
+        # not handled elsewhere: a full disk behind stdout, for example
         print(f"{name}: error: {one_line(error.strerror or error)}", file=sys.stderr)
         sys.stdout = None
         return BAD_INPUT

@@ -37,7 +37,7 @@ _KNOWN = (*_LISTS, *_TEXTS, *_WHOLE, *_NUMBERS, "jobs")
 
 @dataclass(frozen=True)
 class Options:
-    """What a sweep was asked to do, checked.
+    """The options of a sweep, checked.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Options:
         """Return the study."""
         from assoc.sweeps.study import Study
 
-        settings = self.settings  # a wrong design is told before scenes are read
+        settings = self.settings  # a wrong design is reported before scenes are read
         return Study(sources=self.sources, settings=settings, repeats=self.values.get("repeats", 1), **self._common())
 
     def tuning(self, progress: Callable[[Any], object]) -> Report:

@@ -53,7 +53,7 @@ def fitted_lines(
     """Yield the lines of a table that is at most ``width`` wide, if its cells are; see `print_table`."""
     every = range(len(headers))
     words = [header.split(" ") for header in headers]
-    # the last word of "95 %" alone would say little
+    # short headers stay on one line
     words = [[header] if len(header) < 6 else split for header, split in zip(headers, words, strict=True)]
     high = [_width(every[i : i + 1], words, rows) for i in every]
     if _width(every, [[header] for header in headers], rows) <= width:

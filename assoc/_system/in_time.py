@@ -1,4 +1,4 @@
-"""Work in a thread that is left behind when time is over: for libraries that look at no clock, or seldom."""
+"""Work in a thread that is abandoned when time is over: for libraries that have no time limit, or check it seldom."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Answer = TypeVar("Answer")
 def in_time(work: Callable[[], Answer], seconds: float, name: str) -> Answer | None:
     """Return what the work returns, or None when it is not back in that time; what it raises is raised.
 
-    The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself.
+    The work must let other threads run and must be safe to abandon: it continues until it ends by itself.
     """
     answers: list[Answer] = []
     errors: list[BaseException] = []

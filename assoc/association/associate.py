@@ -22,7 +22,7 @@ def associate(
     gating: Mapping[str, Any] | None = None,
     **parameters: Any,
 ) -> Association:
-    """Find out for every scan which measurements are one target, and which are false alarms.
+    """Find for every scan which measurements come from the same target, and which are false alarms.
 
     Parameters
     ----------

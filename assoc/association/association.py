@@ -1,4 +1,4 @@
-"""From solutions back to the world: what is a target, where it is, and what is a false alarm."""
+"""The result of an association: targets, their positions, false alarms, cost and gap."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def draw_cells(
     xs: Array, ys: Array, values: Floats, limits: tuple[float, float], *, ax: Any, texts: Array | None = None
 ) -> Any:
     """Draw values (rows: ``ys``) with their numbers, or with given texts, into axes; returns the image."""
-    # cividis grows lighter evenly, also to colour-blind eyes and on grey paper
+    # the lightness of cividis grows evenly, also for colour-blind readers and in greyscale
     image = ax.imshow(values, origin="lower", aspect="auto", cmap="cividis", vmin=limits[0], vmax=limits[1])
     ax.set_xticks(range(len(xs)), [short_text(x) for x in xs])
     ax.set_yticks(range(len(ys)), [short_text(y) for y in ys])

@@ -62,7 +62,7 @@ def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None
 
 
 def new_figure() -> Any:
-    """Return an empty figure that belongs to nobody's screen: no pyplot in a program.
+    """Return an empty figure that needs no screen and no pyplot.
 
     Raises
     ------

@@ -213,7 +213,7 @@ def default_region(sensors: Sequence[Sensor]) -> Array:
             boxes.append(sensor.field_of_view[:2])
     places = np.array([sensor.position for sensor in sensors])
     if not boxes:
-        # bearings alone say nothing of distance: take the surroundings of the sensors, at least 100 km
+        # bearings contain no distance: take the surroundings of the sensors, at least 100 km
         reach = max(100_000.0, float(np.ptp(places[:, :2], axis=0).max()))
         boxes.append(np.stack([places[:, :2].min(axis=0) - reach, places[:, :2].max(axis=0) + reach], axis=1))
     floor = float(places[:, 2].min())

@@ -1,4 +1,4 @@
-"""What a study runs on, and a digest of it: the same content is the same source whatever its file is called."""
+"""What a study runs on, and a digest of it: the same content is the same source, whatever the name of its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study: settings, sources and repeats; what is done is kept, and only what is missing is run."""
+"""A study: settings, sources and repeats; results are kept, and only missing runs are run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Progress = Callable[["Counts"], object]
 
 @dataclass
 class Counts:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Study:
-    """A design on its sources.
+    """Settings to run on scenes and problems.
 
     Parameters
     ----------
@@ -106,9 +106,9 @@ class Study:
         return len(self.settings) * len(self.repeats) * sum(map(len, self.scans))
 
     def all_runs(self) -> Iterator[RunNumbers]:
-        """All runs, as (setting, source, repeat, scan): first all settings once, so that a part tells something."""
+        """All runs, as (setting, source, repeat, scan): all settings once before the next repeat."""
         assert self.scans is not None and isinstance(self.repeats, range)
-        # loops, not itertools.product, which would first write down all repeats, however many they are
+        # loops, because itertools.product would first make a list of all repeats, however many there are
         for repeat in self.repeats:
             for source, scans in enumerate(self.scans):
                 for setting in range(len(self.settings)):
@@ -117,7 +117,7 @@ class Study:
 
     def missing(self, store: Store) -> Iterator[RunNumbers]:
         """Those runs that the store does not have."""
-        # a copy: what is appended while we go on is not asked for again anyway
+        # a copy: runs that are added meanwhile are not asked for again
         done = frozenset(store.done)
         return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
 

@@ -92,7 +92,7 @@ def measured(runs: pd.DataFrame, measure: str) -> Floats:
     if measure == "optimal":
         return np.where(runs["cost"].isna(), np.nan, values)
     if measure == "gap":
-        # what rounding leaves of a closed gap says nothing
+        # a gap of the size of rounding errors is 0
         values = np.where(values <= 1e-9 * np.maximum(1.0, runs["cost"].abs()), 0.0 * values, values)
     return np.where(np.isfinite(values), values, np.nan)
 

@@ -1,4 +1,4 @@
-"""A search for good parameters, and an honest report: on seeds and scans that the search never saw."""
+"""A search for good parameters, and a report on seeds and scans that were held out of the search."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
         study.run(whole)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
-    with pytest.raises(InvalidInputError, match="holds other files and no study"):
+    with pytest.raises(InvalidInputError, match="contains other files and no study"):
         study.run(tmp_path / "full")
 
 
@@ -184,7 +184,7 @@ def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
 
 
 def test_one_sweep_at_a_time(study, whole):
-    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is at work"):
+    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is running"):
         study.run(whole)
     assert study.run(whole).new == 0
 

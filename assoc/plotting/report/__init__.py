@@ -1,4 +1,4 @@
-"""Reports: one HTML file that works without a network, to look at and to send on."""
+"""Reports: one HTML file that works without a network."""
 
 from __future__ import annotations
 

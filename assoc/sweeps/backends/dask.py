@@ -42,7 +42,7 @@ def connect(address: str) -> Any:
 
 
 def _quiet() -> None:
-    """Keep distributed from writing its own account of lost connections to stderr: ours is one line."""
+    """Keep distributed from logging lost connections to stderr: our message is one line."""
     import logging
 
     for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "tornado"):
@@ -50,7 +50,7 @@ def _quiet() -> None:
 
 
 class DaskWorkers:
-    """The workers of a scheduler, at work on one job.
+    """The workers of a scheduler, for one job.
 
     What all runs share is sent to every worker once. Workers may come and go: what a lost one had in hand
     is done again by another, with the same result, because seeds belong to runs.
@@ -114,7 +114,7 @@ class DaskWorkers:
         except AssocError:
             raise
         except (FutureCancelledError, KilledWorker) as error:
-            # the workers that held the job are gone, or they died of the batch
+            # the workers that held the job are lost, or the batch killed them
             if attempt == _ATTEMPTS:
                 raise InvalidInputError(
                     f"--scheduler: {attempt} attempts at a batch ended with the loss of workers "

@@ -61,7 +61,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
 @contextmanager
 def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
     """A file of the job, and its digest, in the study's folder, which only one sweep at a time has open."""
-    # what a sweep that was killed together with its workers could not take away
+    # left by a sweep that was killed together with its workers
     for stale in folder.glob(_JOB + "*"):
         stale.unlink(missing_ok=True)
     path = folder / f"{_JOB}{uuid.uuid4().hex}"
@@ -90,7 +90,7 @@ def _interrupts_ignored() -> Iterator[None]:
 
 
 def stop_workers() -> None:
-    """End the worker processes now, whatever they are at."""
+    """End the worker processes now, whatever they are doing."""
     from joblib.externals.loky import reusable_executor
 
     executor = reusable_executor._executor
@@ -107,7 +107,7 @@ def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
     if _job is None or _job[0] != path:
         end_with(parent, path)
         content = Path(path).read_bytes()
-        # others may be allowed to write in the study's folder, and a pickle can do anything
+        # other users may be able to write to the study's folder, and a pickle can run any code
         if content_digest(content) != digest:
             raise InvalidInputError(f"{path}: was changed by someone else")
         _job = path, pickle.loads(content)
