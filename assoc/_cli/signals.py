@@ -38,7 +38,7 @@ def exit_on_signals(name: str) -> None:
     def leave(number: int, frame: object = None) -> None:
         for child in multiprocessing.active_children():
             child.kill()
-        temporary.end(128 + number, f"{name}: {ending[number]}\n")
+        temporary.end_process(128 + number, f"{name}: {ending[number]}\n")
 
     # the handler is for signals that a library lets through
     _wait_for_signals(ending, handler=leave, waiter=leave)
@@ -98,7 +98,7 @@ class Interruption:
             self.word, self.code = ending[number], 128 + number
             _thread.interrupt_main()
             time.sleep(_CLEAN_UP_SECONDS)
-            temporary.end(self.code, f"{self.line()}\n")
+            temporary.end_process(self.code, f"{self.line()}\n")
 
         sys.unraisablehook = unraisable
         # the waiter takes one signal: a second one would come in the middle of cleaning up

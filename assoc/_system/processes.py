@@ -133,7 +133,7 @@ def signals_as_they_are() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
-def end_with(parent: int, *paths: str) -> None:
+def end_with_parent(parent: int, *paths: str) -> None:
     """End this worker process soon after its parent, also where that was killed and could not say so.
 
     Parameters
@@ -164,7 +164,7 @@ def _start(path: str, parent: int) -> None:
     if hasattr(signal, "pthread_sigmask"):
         # programs wait for it in a thread, and their processes inherit that it is blocked
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    end_with(parent, path)
+    end_with_parent(parent, path)
     with open(path, "rb") as file:
         _task = pickle.load(file)
 

@@ -34,7 +34,7 @@ def remove(path: str) -> None:
     forget(path)
 
 
-def end(code: int, message: str = "") -> None:
+def end_process(code: int, message: str = "") -> None:
     """End the process now: remove unfinished files, let no other thread make more, and wait for nothing else."""
     # a thread that holds the lock may hang in a file system that does not answer
     lock.acquire(timeout=2.0)

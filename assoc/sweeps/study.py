@@ -169,9 +169,9 @@ class Study:
         jobs: int = 1,
         scheduler: str | None = None,
         progress: Progress | None = None,
-        take: Callable[[Result], object] | None = None,
+        on_result: Callable[[Result], object] | None = None,
     ) -> Counts:
-        """Do as `run` does, in a store that is open; ``take`` is called with each result that is kept."""
+        """Do as `run` does, in a store that is open; ``on_result`` is called with each result that is kept."""
         from assoc.sweeps.backends import dask, local
 
         missing = sum(1 for _ in self.missing(store))
@@ -195,8 +195,8 @@ class Study:
                 counts.new += store.append(result.batch.settings, result.columns)
                 counts.solving += sum(time or 0.0 for time in result.columns["time"])
                 batches.learn(result)
-                if take is not None:
-                    take(result)
+                if on_result is not None:
+                    on_result(result)
                 if progress is not None:
                     progress(counts)
         finally:

@@ -148,7 +148,7 @@ def tune(
                 if progress is not None:
                     progress(total)
 
-            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, take=memory.take)
+            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, on_result=memory.add)
             return part
 
         length = sum(map(len, training)) * repeats
@@ -262,7 +262,7 @@ class _Memory:
             if entry is not None and "setting_key" not in entry:
                 self._add(entry)
 
-    def take(self, result: Result) -> None:
+    def add(self, result: Result) -> None:
         self._add(result.columns)
 
     def _add(self, columns: Mapping[str, list[Any]]) -> None:

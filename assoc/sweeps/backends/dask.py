@@ -91,7 +91,7 @@ class DaskWorkers:
             except queue.Empty:
                 self._check_scheduler()
                 continue
-            yield from self._take(future)
+            yield from self._results_of(future)
 
     def _room(self) -> int:
         return _BATCHES_PER_THREAD * max(1, sum(self._client.nthreads().values()))
@@ -104,7 +104,7 @@ class DaskWorkers:
         self._running[future] = batch, attempt
         future.add_done_callback(self._finished.put)
 
-    def _take(self, future: Any) -> Iterator[Result]:
+    def _results_of(self, future: Any) -> Iterator[Result]:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 

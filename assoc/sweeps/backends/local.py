@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from assoc._system import temporary
-from assoc._system.processes import end_with, require_processes, signals_as_they_are
+from assoc._system.processes import end_with_parent, require_processes, signals_as_they_are
 from assoc.errors import InvalidInputError
 from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
@@ -105,7 +105,7 @@ def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
     """Do a batch in a worker process, of the job in the file ``path``, which the process reads once."""
     global _job
     if _job is None or _job[0] != path:
-        end_with(parent, path)
+        end_with_parent(parent, path)
         content = Path(path).read_bytes()
         # other users may be able to write to the study's folder, and a pickle can run any code
         if content_digest(content) != digest:
