@@ -101,7 +101,7 @@ def _summary(given: dict[str, Any]) -> None:
     strange = sorted({*given} - {"summary", "csv", "plot", "report", "words", "files"})
     if strange or given["files"]:
         raise InvalidInputError(
-            "--summary: runs nothing and goes only with --plot, --csv and --report, "
+            "--summary: runs nothing and can be combined only with --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
     from assoc._cli.sweep_options import check_study_outputs
@@ -157,6 +157,7 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 @contextmanager
 def _watched(folder: str) -> Iterator[Any]:
     """Show progress on a terminal, and say on Ctrl-C how to go on."""
+
     def message(kept: str) -> str:
         return f"{kept} are kept in {printable(folder)}; the same command goes on from there"
 
