@@ -5,9 +5,9 @@ The public names below are loaded on first use, so that ``import assoc`` stays q
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from assoc._system.lazy import lazy_names
 from assoc._version import __version__
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
@@ -45,32 +45,21 @@ __all__ = [
     "warm_up",
 ]
 
-_HOME = {
-    "AssignmentProblem": "assoc.problem",
-    "Association": "assoc.association",
-    "Scene": "assoc.scene",
-    "Solution": "assoc.solution",
-    "assign": "assoc.solvers.assign",
-    "associate": "assoc.association",
-    "build_problem": "assoc.costs",
-    "kbest": "assoc.ranking.kbest",
-    "marginals": "assoc.ranking.marginals",
-    "warm_up": "assoc.solvers.warm_up",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home on first use (PEP 562)."""
-    if name in _HOME:
-        value = getattr(importlib.import_module(_HOME[name]), name)
-    elif name in ("plotting", "solvers", "sweeps"):
-        value = importlib.import_module(f"assoc.{name}")
-    else:
-        raise AttributeError(f"module 'assoc' has no attribute {name!r}")
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    """The public names, loaded or not."""
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "AssignmentProblem": "problem",
+        "Association": "association",
+        "Scene": "scene",
+        "Solution": "solution",
+        "assign": "solvers.assign",
+        "associate": "association",
+        "build_problem": "costs",
+        "kbest": "ranking.kbest",
+        "marginals": "ranking.marginals",
+        "plotting": "plotting",
+        "solvers": "solvers",
+        "sweeps": "sweeps",
+        "warm_up": "solvers.warm_up",
+    },
+)

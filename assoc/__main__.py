@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from assoc._cli.program import run, steady_streams
+from assoc._cli.program import prepare_streams, run_program
 
 _PROGRAMS = {
     "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
     "assoc.solve": "associate its measurements: python -m assoc.solve scene.npz --solver aco",
     "assoc.track": "make tracks of scenes or of radar plots: python -m assoc.track scene.npz -o tracks.csv",
-    "assoc.sweep": "study solver parameters: python -m assoc.sweep scene.npz --solver aco --grid alpha=1,2,3 -o study/",
+    "assoc.sweep": "compare parameters: python -m assoc.sweep scene.npz --solver aco --grid alpha=1,2,3 -o study/",
 }
 
 
 def main() -> int:
     """Print the programs and what each is for."""
-    return run(_list, "assoc")
+    return run_program(_list, "assoc")
 
 
 def _list() -> None:
@@ -25,5 +25,5 @@ def _list() -> None:
 
 
 if __name__ == "__main__":
-    steady_streams()
+    prepare_streams()
     raise SystemExit(main())

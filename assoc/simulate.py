@@ -1,4 +1,7 @@
-"""``python -m assoc.simulate``: simulate a scene or a recording of plots and write it to a file."""
+"""``python -m assoc.simulate``: simulate a scene or a recording of plots and write it to a file.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +11,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from assoc._cli.inputs import check_distinct, check_output
-from assoc._cli.options import given
-from assoc._cli.program import Parser, begin, run
-from assoc._cli.values import whole_number
+from assoc._cli.inputs import check_outputs
+from assoc._cli.options import add_common_options, common_values, parameter_values
+from assoc._cli.program import Parser, prepare_process, run_program
 from assoc._parameters import Option, options
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 _PURPOSE = {
-    "three-radar": "three targets, three radars, 100 scans (the ant colony paper's scene)",
-    "crowd": "many targets at random in a box",
-    "bearing-only": "bearing sensors whose lines of sight cross where nobody is",
+    "three-radar": "three targets, three radars, 100 scans (as in the ant colony paper)",
+    "crowd": "many targets at random positions in a box",
+    "bearing-only": "bearing sensors only, with many ghosts (false intersections of bearings)",
     "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
-    "from-tracks": "recorded trajectories (CSV) seen by simulated radars",
-    "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or a pair that is hard to keep apart",
+    "from-tracks": "recorded trajectories (CSV), measured by simulated radars",
+    "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or two close aircraft",
 }
 
 _PLOTS = ("rotating-radar",)
@@ -32,7 +34,7 @@ _PLOTS = ("rotating-radar",)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _simulate(words), "assoc.simulate")
+    return run_program(lambda: _simulate(words), "assoc.simulate")
 
 
 def _simulate(words: list[str]) -> None:
@@ -45,12 +47,10 @@ def _simulate(words: list[str]) -> None:
 
     choices = options(simulation.parameters(scenario))
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
-    seed = whole_number(parsed["seed"], "--seed", 0)
-    values = given(choices, parsed)
-    outputs = [path for path in (parsed["output"], parsed.get("truth")) if path is not None]
-    check_distinct(outputs, [value for value in values.values() if isinstance(value, str)])
-    for path in outputs:
-        check_output(path)
+    seed = common_values(parsed).get("seed", 0)
+    values = parameter_values(choices, parsed)
+    inputs = [value for value in values.values() if isinstance(value, str)]
+    check_outputs([parsed["output"], parsed.get("truth")], inputs)
     if scenario in _PLOTS:
         _write_plots(scenario, seed, parsed, values)
         return
@@ -77,7 +77,7 @@ def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[
 
 
 def _list_parser() -> Parser:
-    lines = [f"  {name:<14} {purpose}" for name, purpose in _PURPOSE.items()]
+    lines = [f"  {name:<15} {purpose}" for name, purpose in _PURPOSE.items()]
     parser = Parser(
         prog="assoc.simulate",
         usage="python -m assoc.simulate SCENARIO -o scene.npz [options]",
@@ -94,12 +94,12 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
     parser = Parser(
         prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".", allow_abbrev=False
     )
-    content = "plots (.csv)" if scenario in _PLOTS else "the scene file to write (.npz)"
+    content = "file for the plots (.csv)" if scenario in _PLOTS else "file for the scene (.npz)"
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)
     if scenario in _PLOTS:
-        text = "also write where the aircraft were whenever the antenna pointed at them (CSV)"
+        text = "also write the aircraft's true positions each time the antenna points at them (.csv)"
         parser.add_argument("--truth", metavar="FILE", help=text)
-    parser.add_argument("--seed", default="0", metavar="N", help="seed of the random generator (default 0)")
+    add_common_options(parser, ["seed"])
     group = parser.add_argument_group("scenario")
     for option in choices:
         option.add_to(parser if option.positional else group)
@@ -107,5 +107,5 @@ def _parser(scenario: str, choices: list[Option]) -> Parser:
 
 
 if __name__ == "__main__":
-    begin("assoc.simulate")
+    prepare_process("assoc.simulate")
     raise SystemExit(main())

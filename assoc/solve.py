@@ -1,7 +1,7 @@
 """``python -m assoc.solve``: associate the measurements of scenes, or solve assignment problems, from files.
 
 This is a program: the package must not import it, or ``python -m assoc.solve`` would warn and
-``assoc.solve`` would change its meaning with the order of imports.
+``assoc.solve`` would change its meaning with the order of imports. Imports inside functions keep --help quick.
 """
 
 from __future__ import annotations
@@ -9,77 +9,76 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output, read_toml
-from assoc._cli.options import given
-from assoc._cli.program import Parser, begin, each, run
-from assoc._cli.values import check_kind, number, scan_range, seconds, whole_number
+from assoc._cli.inputs import check_outputs, read_toml
+from assoc._cli.options import add_common_options, common_values, parameter_values, read_first
+from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.progress import with_progress
+from assoc._cli.table import print_table
+from assoc._cli.values import check_kind, scan_range
+from assoc._files.output import write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
-from assoc.association.source import load_source
 from assoc.errors import InvalidInputError
+from assoc.solvers import registry
 
 if TYPE_CHECKING:
     from assoc.association.association import Association
     from assoc.association.plan import Plan
-    from assoc.association.scan import ScanAssociation
-    from assoc.problem import AssignmentProblem
-    from assoc.scene.scene import Scene
+    from assoc.association.source import Source
 
 DEFAULT_SOLVER = "exact"
+_SHOWN = 20
 _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _solve(words), "assoc.solve")
+    return run_program(lambda: _solve(words), "assoc.solve")
 
 
 def _solve(words: list[str]) -> None:
     solver, explicit, config = _solver(words)
-    from assoc.solvers import registry
-
     choices = options(registry.parameters(solver))
     parsed = vars(_parser(solver, choices, explicit).parse_args(words))
-    settings = {**{key: config[key] for key in _SETTINGS if key in config}, **_common(parsed)}
-    parameters = {**_section(config, solver, choices), **given(choices, parsed)}
+    settings = {**{key: config[key] for key in _SETTINGS if key in config}, **common_values(parsed)}
+    if parsed["scans"] is not None:
+        settings["scans"] = parsed["scans"]
+    parameters = {**_section(config, solver, choices), **parameter_values(choices, parsed)}
     registry.make_parameters(solver, parameters)
     if "kbest" in settings and (explicit or parameters):
-        raise InvalidInputError("--kbest: ranks by itself and takes no --solver and no parameters of solvers")
+        raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
     files = parsed["files"]
-    outputs = [path for path in (parsed["json"], parsed["csv"], parsed["report"]) if path]
-    check_distinct(outputs, [*files, *([parsed["config"]] if parsed["config"] else [])])
-    for path in outputs:
-        check_output(path)
+    check_outputs([parsed["json"], parsed["csv"], parsed["report"]], [*files, parsed["config"]])
     if parsed["report"]:
         check_extra("plotly", "report")
+
+    from assoc.association.source import load_source
 
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
     plan, items = _plan(sources, files, solver, settings, parameters)
-    association = plan.gather(_with_progress(plan.run(items, settings.get("jobs", 1)), len(items)))
+    scans = plan.run(items, settings.get("jobs", 1))
+    association = plan.gather(with_progress(scans, len(items), "associating"))
     elapsed = time.perf_counter() - started
     names = [files[number] for number, _ in items]
     of_items = [sources[number] for number, _ in items]
-    each(
+    write_all(
         lambda: _write_json(parsed["json"], association, names),
         lambda: _write_csv(parsed["csv"], association, names),
         lambda: _write_report(parsed["report"], association, of_items, names, words),
-        lambda: _print(association, names, elapsed),
+        lambda: _print(association, names, elapsed, every=parsed["all"]),
     )
 
 
 def _solver(words: list[str]) -> tuple[str, bool, dict[str, Any]]:
     """Which solver, whether it was named, and the configuration file: they decide what options there are."""
-    first = Parser(prog="assoc.solve", add_help=False, allow_abbrev=False)
-    first.add_argument("--solver")
-    first.add_argument("--config")
-    known = first.parse_known_args(words)[0]
-    config = _read_config(known.config) if known.config is not None else {}
-    name = known.solver if known.solver is not None else config.get("solver")
+    first = read_first("assoc.solve", words, ["solver", "config"])
+    config = _read_config(first["config"]) if first["config"] is not None else {}
+    name = first["solver"] if first["solver"] is not None else config.get("solver")
     return (DEFAULT_SOLVER, False, config) if name is None else (name, True, config)
 
 
@@ -87,8 +86,8 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     parser = Parser(
         prog="assoc.solve",
         usage="python -m assoc.solve FILE.npz [FILE.npz ...] --solver NAME [options]",
-        description="Associate the measurements of scenes (or solve assignment problems)\n"
-        "and say how far from optimal each answer can be at most.",
+        description="Associate the measurements of scenes, or solve assignment problems,\n"
+        "and report how far each answer can be from the optimum.",
         epilog=None if explicit else _other_solvers(solver),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -96,21 +95,15 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add = parser.add_argument
     add("files", nargs="+", metavar="FILE", help="scene.npz or problem.npz")
     add("--solver", metavar="NAME", help=f"name of the solver (default {DEFAULT_SOLVER})")
-    add("--seed", metavar="N", help="the same seed gives the same answer, whatever --jobs (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each scan; then the best solution found is taken")
-    add("--jobs", metavar="N", help="number of processes (default 1)")
-    add("--scans", metavar="A:B", help="scans A to B-1, counted from 0; A alone is one scan")
-    add("--kbest", metavar="K", help="the K best associations of each scan, truly ranked")
+    add_common_options(parser, ["seed", "time_limit", "jobs"])
+    add("--scans", metavar="A:B", help="only scans A to B-1, counted from 0; A alone is one scan")
+    add_common_options(parser, ["kbest"])
+    add("--all", action="store_true", help=f"print all scans on a terminal, not only the first {_SHOWN}")
     add("--json", metavar="FILE", help="write the result as JSON")
     add("--csv", metavar="FILE", help="write the table as CSV")
-    add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (assoc[report])")
-    add(
-        "--config",
-        metavar="FILE",
-        help="TOML file of these options; parameters in a table [solver]",
-    )
-    add("--gate-probability", metavar="P", help="share of true tuples that a gate lets through, in (0, 1]")
-    add("--max-tuples", metavar="N", help="refuse scans with more candidate tuples than this")
+    add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
+    add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
+    add_common_options(parser, ["gate_probability", "max_tuples"])
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
         for option in choices:
@@ -119,38 +112,14 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
 
 
 def _other_solvers(solver: str) -> str:
-    from assoc.solvers import registry
-
-    lines = ["solvers and their parameters (--solver NAME --help describes them):"]
+    lines = ["solvers and their parameters (described by --solver NAME --help):"]
     for name in registry.names():
         flags = " ".join(option.flag for option in options(registry.parameters(name)))
         lines.append(f"  {name:<12} {flags or '(none)'}")
     return "\n".join(lines)
 
 
-def _common(parsed: dict[str, Any]) -> dict[str, Any]:
-    """Settings given on the command line, in their types."""
-    found: dict[str, Any] = {}
-    if parsed["seed"] is not None:
-        found["seed"] = whole_number(parsed["seed"], "--seed", 0)
-    if parsed["time_limit"] is not None:
-        found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
-    if parsed["jobs"] is not None:
-        found["jobs"] = whole_number(parsed["jobs"], "--jobs", 1)
-    if parsed["scans"] is not None:
-        found["scans"] = parsed["scans"]
-    if parsed["gate_probability"] is not None:
-        found["gate_probability"] = number(parsed["gate_probability"], "--gate-probability")
-    if parsed["kbest"] is not None:
-        found["kbest"] = whole_number(parsed["kbest"], "--kbest", 1)
-    if parsed["max_tuples"] is not None:
-        found["max_tuples"] = whole_number(parsed["max_tuples"], "--max-tuples", 1)
-    return found
-
-
 def _read_config(path: str) -> dict[str, Any]:
-    from assoc.solvers import registry
-
     config = read_toml(path)
     for key, value in config.items():
         if isinstance(value, dict):
@@ -176,7 +145,7 @@ def _section(config: dict[str, Any], solver: str, choices: list[Option]) -> dict
 
 
 def _plan(
-    sources: list[Scene | AssignmentProblem],
+    sources: list[Source],
     files: list[str],
     solver: str,
     settings: dict[str, Any],
@@ -204,22 +173,7 @@ def _plan(
     return plan, items
 
 
-def _with_progress(scans: Iterator[ScanAssociation], count: int) -> Iterator[ScanAssociation]:
-    """Show a progress bar on stderr if that is a terminal."""
-    if not sys.stderr.isatty():
-        yield from scans
-        return
-    from rich.console import Console
-    from rich.progress import track
-
-    yield from track(
-        scans, description="associating", total=count, console=Console(stderr=True), transient=True
-    )
-
-
 def _write_json(path: str | None, association: Association, names: list[str]) -> None:
-    from assoc.association.association import write_json
-
     if path is None:
         return
     content = association.to_dict()
@@ -230,7 +184,6 @@ def _write_json(path: str | None, association: Association, names: list[str]) ->
 
 
 def _write_csv(path: str | None, association: Association, names: list[str]) -> None:
-    from assoc._files.output import write_text
     from assoc.association.table import to_csv
 
     if path is not None:
@@ -240,7 +193,7 @@ def _write_csv(path: str | None, association: Association, names: list[str]) -> 
 def _write_report(
     path: str | None,
     association: Association,
-    sources: list[Scene | AssignmentProblem],
+    sources: list[Source],
     names: list[str],
     words: list[str],
 ) -> None:
@@ -250,15 +203,21 @@ def _write_report(
         write_association_report(path, association, sources, names, words=words)
 
 
-def _print(association: Association, names: list[str], elapsed: float) -> None:
-    from assoc._cli.table import print_table
+def _print(association: Association, names: list[str], elapsed: float, *, every: bool) -> None:
+    from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
-    print_table(association.scans, names)
+    # a pipe gets all scans and columns: programs read it
+    brief = sys.stdout.isatty()
+    shown = len(names) if every or not brief else _SHOWN
+    headers, cells = rows(association.scans[:shown], names[:shown], brief=brief)
+    print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
+    if len(names) > shown:
+        print(f"... and {len(names) - shown} more scans (--all shows them)")
     print()
     print(association.summary())
     print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")
 
 
 if __name__ == "__main__":
-    begin("assoc.solve")
+    prepare_process("assoc.solve")
     raise SystemExit(main())

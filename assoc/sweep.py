@@ -1,4 +1,7 @@
-"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster."""
+"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.program import INTERRUPTED, Parser, run, steady_streams
-from assoc._cli.signals import ending_signals
-from assoc._system import temporary
+from assoc._cli.options import add_common_options
+from assoc._cli.program import Parser, prepare_streams, run_program
+from assoc._cli.progress import ProgressBar
+from assoc._cli.signals import Interruption
+from assoc._cli.table import print_table
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -19,12 +24,13 @@ if TYPE_CHECKING:
     from assoc.sweeps.study import Counts, Study
 
 _SHOWN = 60
+_INTERRUPTION = Interruption("assoc.sweep")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _sweep(words), "assoc.sweep")
+    return run_program(lambda: _sweep(words), "assoc.sweep")
 
 
 def _sweep(words: list[str]) -> None:
@@ -36,11 +42,11 @@ def _sweep(words: list[str]) -> None:
     if "summary" in given:
         _summary(given)
         return
-    from assoc._cli.sweep_options import check_outputs, read
+    from assoc._cli.sweep_options import check_study_outputs, read_options
 
-    options = read(given)
-    inputs = [*options.values["files"], *([options.config] if options.config else [])]
-    check_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
+    options = read_options(given)
+    inputs = [*options.values["files"], options.config]
+    check_study_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
     if options.tune is not None:
         _tune(options, given)
         return
@@ -58,37 +64,35 @@ def _parser() -> Parser:
         usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
         "       python -m assoc.sweep --config STUDY.toml\n"
         "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE] [--report FILE]",
-        description="Run a design of solver parameters over scenes and problems, with repeats, and keep every\n"
-        "result as it comes. The same command again runs only what is missing.",
+        description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
+        "The same command again runs only what is missing.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument
     add("files", nargs="*", metavar="FILE", help="scene.npz or problem.npz")
-    add("--solver", nargs="+", metavar="NAME", help="one solver or several")
+    add("--solver", nargs="+", metavar="NAME", help="one or more solvers (default aco)")
     add(
         "--grid",
         nargs="+",
         metavar="NAME=V1,V2",
-        help="values of parameters, every combination is run; SOLVER.NAME=... for one solver of several; "
-        "with --random also ranges LOW:HIGH or LOW:HIGH:log",
+        help="parameter values; every combination is run. SOLVER.NAME=... is for one of several solvers; "
+        "--random and --tune also take ranges LOW:HIGH or LOW:HIGH:log",
     )
-    add("--random", metavar="N", help="draw N settings from the values and ranges of --grid")
-    add("--config", metavar="FILE", help="TOML file of these options; the design in tables [solver]")
+    add("--random", metavar="N", help="run N random settings from the values and ranges of --grid")
+    add("--config", metavar="FILE", help="read these options from a TOML file; parameter values in tables [solver]")
     add("--repeats", metavar="N", help="runs of each setting on each scan, each with its own seed (default 1)")
-    add("--seed", metavar="N", help="all other seeds derive from it (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each run")
-    add("--scans", metavar="A:B", help="scans A to B-1 of each scene, counted from 0; A alone is one scan")
-    add("--gate-probability", metavar="P", help="share of true tuples that a gate lets through, in (0, 1]")
-    add("--max-tuples", metavar="N", help="refuse scans with more candidate tuples than this")
-    add("-o", "--output", metavar="FOLDER", help="the study's folder")
-    add("--jobs", metavar="N", help="processes on this machine; 'all' takes every core (default 1)")
-    add("--scheduler", metavar="ADDRESS", help="do the work on a dask cluster: tcp://host:port")
-    add("--tune", metavar="N", help="search the ranges of --grid for good parameters in N trials")
-    add("--target", metavar="NAME", help="of --tune: gap (mean gap) or time (time to optimum); default gap")
-    add("--summary", metavar="FOLDER", help="print the table of a study and run nothing")
+    add_common_options(parser, ["seed", "time_limit"])
+    add("--scans", metavar="A:B", help="only scans A to B-1 of each scene, counted from 0; A alone is one scan")
+    add_common_options(parser, ["gate_probability", "max_tuples"])
+    add("-o", "--output", metavar="FOLDER", help="folder of the study")
+    add("--jobs", metavar="N", help="number of processes, or 'all' for one per core (default 1)")
+    add("--scheduler", metavar="ADDRESS", help="run on a dask cluster: tcp://host:port")
+    add("--tune", metavar="N", help="search for good parameters in the ranges of --grid, with N trials")
+    add("--target", metavar="NAME", help="what --tune minimises: gap (mean gap, default) or time (time to optimum)")
+    add("--summary", metavar="FOLDER", help="print the table of a study; run nothing")
     add("--csv", metavar="FILE", help="write the table as CSV")
-    add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (assoc[report])")
+    add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (needs assoc[report])")
     add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
     return parser
 
@@ -97,12 +101,12 @@ def _summary(given: dict[str, Any]) -> None:
     strange = sorted({*given} - {"summary", "csv", "plot", "report", "words", "files"})
     if strange or given["files"]:
         raise InvalidInputError(
-            "--summary: runs nothing and goes only with --plot, --csv and --report, "
+            "--summary: runs nothing and can be combined only with --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
-    from assoc._cli.sweep_options import check_outputs
+    from assoc._cli.sweep_options import check_study_outputs
 
-    check_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
+    check_study_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
     _report(given["summary"], given, None)
 
 
@@ -110,25 +114,29 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
-    from assoc.sweeps.summary import print_summary, summarize
+    from assoc.sweeps.summary import INTERVAL, summarize, summary_rows
 
     frame = load(folder)
     if study is not None:
         frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
     table = summarize(frame)
-    print_summary(table, _SHOWN if study is not None else None)
+    headers, rows = summary_rows(table, brief=sys.stdout.isatty())
+    shown = len(rows) if study is None else _SHOWN
+    print_table(headers, rows[:shown], keys=headers.index("runs"), joined=[INTERVAL])
+    if len(rows) > shown:
+        print(f"... and {len(rows) - shown} more settings (--summary shows them)")
     print()
     damaged = damaged_lines(folder)
     if damaged and study is None:
-        print(f"{damaged} unfinished lines of the log are passed over; the same sweep again does their runs")
+        print(f"{damaged} damaged lines of the log are ignored; the same sweep again repeats their runs")
     if "csv" in given:
         from assoc._files.output import write_text
 
         write_text(given["csv"], table.to_csv(index=False, lineterminator="\n"))
     if "plot" in given:
-        from assoc.plotting.study_figures import draw
+        from assoc.plotting.study_figures import draw_study
 
-        for path in draw(folder, frame):
+        for path in draw_study(folder, frame):
             print(f"drawn: {printable(str(path))}")
     if "report" in given:
         from assoc.plotting.report import write_sweep_report
@@ -149,85 +157,22 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 @contextmanager
 def _watched(folder: str) -> Iterator[Any]:
     """Show progress on a terminal, and say on Ctrl-C how to go on."""
-    from assoc._cli.progress import Bar
 
-    last: list[Counts] = []
-    with Bar(sys.stderr) as bar:
+    def message(kept: str) -> str:
+        return f"{kept} are kept in {printable(folder)}; the same command goes on from there"
+
+    with ProgressBar("runs", "runs") as bar:
 
         def progress(counts: Counts) -> None:
-            last[:] = [counts]
-            _state["message"] = _farewell(folder, last)
+            _INTERRUPTION.message = message(f"{counts.done} of {counts.total} runs")
             bar(counts)
 
-        _state["message"] = _farewell(folder, last)
-        try:
+        _INTERRUPTION.message = message("finished runs")
+        with _INTERRUPTION.reported(bar.close):
             yield progress
-        except BaseException as error:
-            # a library may meet the interrupt with an error of its own
-            if not (isinstance(error, KeyboardInterrupt) or _state["code"]):
-                raise
-            bar.close()
-            print(_goodbye(), file=sys.stderr)
-            sys.stderr.flush()
-            raise SystemExit(_state["code"] or INTERRUPTED) from None
-
-
-def _farewell(folder: str, last: list[Counts]) -> str:
-    kept = f"{last[0].done} of {last[0].total} runs are" if last else "finished runs are"
-    return f"{kept} kept in {printable(folder)}; the same command goes on from there"
-
-
-_state: dict[str, Any] = {"message": "", "word": "interrupted", "code": 0}
-
-
-def _goodbye() -> str:
-    return "; ".join(filter(None, [f"assoc.sweep: {_state['word']}", _state["message"]]))
-
-
-def _stop_on_signals() -> None:
-    """Turn Ctrl-C and its kin into an orderly end, also while a library solves without Python.
-
-    Worker processes do not see them.
-    """
-    import _thread
-    import signal
-    import threading
-    import time
-
-    ending = ending_signals()
-    if not ending:
-        return
-    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
-
-    def interrupt(number: int, frame: object) -> None:
-        if not _state["code"]:
-            # a library let the signal through to this thread
-            _state.update(word=ending[number], code=128 + number)
-        raise KeyboardInterrupt
-
-    def unraisable(problem: Any) -> None:
-        # compilers call Python in places that swallow what it raises
-        if _state["code"] and problem.exc_type is KeyboardInterrupt:
-            _thread.interrupt_main()
-        else:
-            sys.__unraisablehook__(problem)
-
-    sys.unraisablehook = unraisable
-    for one in ending:
-        signal.signal(one, interrupt)
-
-    def watch() -> None:
-        # once: a second one would come in the middle of cleaning up
-        number = signal.sigwait(ending)
-        _state.update(word=ending[number], code=128 + number)
-        _thread.interrupt_main()
-        time.sleep(5.0)
-        temporary.end(128 + number, f"{_goodbye()}\n")
-
-    threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 if __name__ == "__main__":
-    steady_streams()
-    _stop_on_signals()
+    prepare_streams()
+    _INTERRUPTION.interrupt_on_signals()
     raise SystemExit(main())

@@ -1,6 +1,6 @@
 """``python -m assoc.track``: tracks from a scene, or from the radar plots of a CSV file.
 
-This is a program: the package must not import it.
+This is a program: the package must not import it. Imports inside functions keep --help quick.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output
-from assoc._cli.options import given
-from assoc._cli.program import Parser, begin, each, run
+from assoc._cli.inputs import check_outputs
+from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
+from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.progress import with_progress
 from assoc._cli.values import number, seconds, whole_number
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
@@ -27,11 +28,11 @@ if TYPE_CHECKING:
     from assoc.tracking import Tracker, TrackTable
 
 TRACKERS = {
-    "multi-sensor": "each scan one assignment over tracks and all sensors (default for scenes)",
-    "static": "the sensors of a scan fused first, then assigned to tracks",
-    "mht": "track-oriented multiple hypotheses (default for plots)",
-    "mht-hypothesis": "hypothesis-oriented multiple hypotheses (Reid, Murty)",
-    "nearest-neighbour": "each measurement to the nearest track",
+    "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
+    "static": "associates the sensors of a scan first, then assigns the results to tracks",
+    "mht": "track-oriented multiple hypothesis tracking (default for plots)",
+    "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
+    "nearest-neighbour": "assigns each measurement to the nearest track",
 }
 WINDOWS = ("ctw", "ctw-time", "none")
 # option -> the trackers that take it
@@ -50,20 +51,20 @@ _RADAR = {
 GOSPA_CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
-  life of a track    --confirmation --false-probability --missed-probability --m --n
+  track life cycle   --confirmation --false-probability --missed-probability --m --n
                      --deletion --deletion-time --deletion-count --deletion-drop
-  new tracks         --speed --rest --birth-rate --widest
-  and the parameters of the solver, which python -m assoc.solve --solver NAME --help describes"""
+  track initiation   --speed --rest --birth-rate --widest
+  solver parameters  described by: python -m assoc.solve --solver NAME --help"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run(lambda: _track(words), "assoc.track")
+    return run_program(lambda: _track(words), "assoc.track")
 
 
 def _track(words: list[str]) -> None:
-    solver = _named(words, "--solver") or "exact"
+    solver = read_first("assoc.track", words, ["solver"])["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
         _parser([]).parse_args(words)
@@ -76,23 +77,20 @@ def _track(words: list[str]) -> None:
         one.kind = float
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
-    outputs = [path for path in (parsed["output"], parsed["report"]) if path]
-    check_distinct(outputs, [file])
-    for path in outputs:
-        check_output(path)
+    check_outputs([parsed["output"], parsed["report"]], [file])
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
         "solver": solver,
-        "solver_parameters": given(own, parsed),
-        "life_cycle": LifeCycle(**given(cycle, parsed)),
-        "initiation": Initiation(**given(start, parsed)),
-        **_common(parsed),
+        "solver_parameters": parameter_values(own, parsed),
+        "life_cycle": LifeCycle(**parameter_values(cycle, parsed)),
+        "initiation": Initiation(**parameter_values(start, parsed)),
+        **common_values(parsed),
     }
     started = time.perf_counter()
     if _is_npz(file):
         if parsed["window"] is not None:
-            raise InvalidInputError("--window: groups the plots of a CSV file, a scene has scans already")
+            raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
         count, tracker, table, scene = _of_scene(file, parsed, settings)
     else:
         count, tracker, table, scene = _of_plots(file, parsed, settings)
@@ -106,18 +104,11 @@ def _track(words: list[str]) -> None:
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
-    each(
+    write_all(
         lambda: table.to_csv(parsed["output"]),
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed),
     )
-
-
-def _named(words: list[str], flag: str) -> str | None:
-    first = Parser(prog="assoc.track", add_help=False, allow_abbrev=False)
-    first.add_argument(flag, dest="value")
-    value = first.parse_known_args(words)[0].value
-    return None if value is None else str(value)
 
 
 def _field(owner: Any, name: str) -> Any:
@@ -131,53 +122,43 @@ def _parser(further: Sequence[Option]) -> Parser:
     parser = Parser(
         prog="assoc.track",
         usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
-        description="Make tracks of the measurements of a scene (.npz), or of radar plots (.csv).",
+        description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", required=True, metavar="FILE", help="the tracks to write (.csv)")
-    add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (assoc[report])")
-    add("--tracker", metavar="NAME", help="one of the trackers below")
-    add("--solver", metavar="NAME", help="solver of the assignment problems (default exact)")
+    add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv)")
+    add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
+    add("--tracker", metavar="NAME", help="name of the tracker, see below")
+    add("--solver", metavar="NAME", help="name of the solver (default exact)")
     add(
         "--filter",
         metavar="NAME",
-        help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: scenes imm-cv, plots ekf)",
+        help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
     )
-    add("--process-noise", metavar="X", help="how targets manoeuvre, m/s^1.5; imm: m/s^2 (default 30, imm-cv 50)")
-    add("--seed", metavar="N", help="seed of the solver (default 0)")
-    add("--time-limit", metavar="S", help="seconds for each scan's assignment problem (default: none)")
-    add("--gate-probability", metavar="P", help="share of true measurements that a gate lets through (default 0.999)")
-    add("--all", action="store_true", help="write tentative tracks, too")
-    add("--depth", metavar="N", help="mht: scans until a decision is final (default 3)")
-    add("--max-branches", metavar="N", help="mht: branches of a track tree (default 30)")
-    add("--max-hypotheses", metavar="N", help="mht-hypothesis: hypotheses that are kept (default 20)")
-    plots = parser.add_argument_group("plots")
+    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
+    add_common_options(parser, ["seed", "time_limit", "gate_probability"])
+    add("--all", action="store_true", help="also write tentative tracks")
+    add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
+    add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
+    add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    plots = parser.add_argument_group("options for plots")
     plots.add_argument(
-        "--window", metavar="NAME", help="ctw: by the antenna's turn (default); ctw-time: by its time; none: one by one"
+        "--window",
+        metavar="NAME",
+        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; none, one by one",
     )
-    plots.add_argument("--rotation", metavar="S", help="seconds of a turn (default: estimated)")
-    plots.add_argument("--detection-probability", metavar="P", help="of the radar (default 0.8)")
-    plots.add_argument("--range-noise", metavar="M", help="standard deviation, metres (default: from the plots' steps)")
-    plots.add_argument("--bearing-noise", metavar="DEG", help="standard deviation, degrees (default: likewise)")
-    plots.add_argument("--false-alarms", metavar="X", help="false plots in a rotation (default 2.5)")
+    plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
+    add = plots.add_argument
+    add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
+    add("--range-noise", metavar="M", help="standard deviation of range, metres (default: from the plots' steps)")
+    add("--bearing-noise", metavar="DEG", help="standard deviation of bearing, degrees (default: likewise)")
+    add("--false-alarms", metavar="X", help="mean number of false plots in a rotation (default 2.5)")
     for option in further:
         option.add_to(parser)
     return parser
-
-
-def _common(parsed: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    if parsed["seed"] is not None:
-        found["seed"] = whole_number(parsed["seed"], "--seed", 0)
-    if parsed["time_limit"] is not None:
-        found["time_limit"] = seconds(parsed["time_limit"], "--time-limit")
-    if parsed["gate_probability"] is not None:
-        found["gate_probability"] = number(parsed["gate_probability"], "--gate-probability")
-    return found
 
 
 def _is_npz(file: str) -> bool:
@@ -203,9 +184,9 @@ def _make(
     for option, takers in _OWN.items():
         if parsed[option] is None:
             continue
-        flag = "--" + option.replace("_", "-")
+        flag = flag_of(option)
         if name not in takers:
-            raise InvalidInputError(f"{flag}: is for --tracker {' or '.join(takers)}, not for {name}")
+            raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
         extra[option] = whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
@@ -223,10 +204,10 @@ def _of_scene(
     parsed["filter"] = parsed["filter"] or "imm-cv"
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
-            raise InvalidInputError(f"--{flag.replace('_', '-')}: describes the radar of plots, a scene knows its own")
+            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
-    numbers = _with_progress(range(scene.num_scans), scene.num_scans)
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
     table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     return scene.num_scans, tracker, table, scene
 
@@ -250,7 +231,7 @@ def _of_plots(
     radar: dict[str, Any] = {}
     for flag, (argument, unit) in _RADAR.items():
         if parsed[flag] is not None:
-            radar[argument] = unit * number(parsed[flag], "--" + flag.replace("_", "-"))
+            radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
     if window == "none":
@@ -260,21 +241,10 @@ def _of_plots(
     print(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     table = TrackTable()
-    for _ in step_windows(tracker, _with_progress(windows, len(windows))):
+    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
         tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
         table.add(tracks, tracker.filter.motion.position)
     return len(windows), tracker, table, None
-
-
-def _with_progress(items: Sequence[Any], count: int) -> Iterator[Any]:
-    """Show a progress bar on stderr if that is a terminal."""
-    if not sys.stderr.isatty():
-        yield from items
-        return
-    from rich.console import Console
-    from rich.progress import track
-
-    yield from track(items, "tracking", total=count, console=Console(stderr=True), transient=True)
 
 
 def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float) -> None:
@@ -295,5 +265,5 @@ def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene:
 
 
 if __name__ == "__main__":
-    begin("assoc.track")
+    prepare_process("assoc.track")
     raise SystemExit(main())

@@ -112,9 +112,9 @@ def heat_map(figure: Any) -> None:
     """Draw a small study of the ants of the paper, with intervals."""
     from assoc.plotting import plot_heat_map
     from assoc.sweeps import Study, grid, load
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
-    source = Source(simulate("three-radar", 0, scans=10), "three-radar")
+    source = StudySource(simulate("three-radar", 0, scans=10), "three-radar")
     settings = grid("aco", {"mode": ["paper"], "alpha": [1.0, 2.0, 3.0], "rho": [0.3, 0.5, 0.7, 0.9]})
     with tempfile.TemporaryDirectory() as folder:
         study = Study([source], settings, repeats=5)

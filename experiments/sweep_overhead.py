@@ -27,7 +27,7 @@ import numpy as np
 
 from assoc.simulation import simulate
 from assoc.sweeps import Setting, Study
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.study import Counts
 from experiments.common.claims import Claim
 from experiments.common.command import main
@@ -39,7 +39,7 @@ KINDS = {"greedy": Setting("greedy", {}), "ant colony": Setting("aco", {"mode": 
 
 def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
     """Measure the overhead of each backend."""
-    scene = Source(simulate("three-radar", int(rng.integers(2**31)), scans=20 if quick else 100), "three-radar")
+    scene = StudySource(simulate("three-radar", int(rng.integers(2**31)), scans=20 if quick else 100), "three-radar")
     repeats = {"greedy": 12 if quick else 30, "ant colony": 3 if quick else 6}
     claims, table = [], {}
     for kind, setting in KINDS.items():

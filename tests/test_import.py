@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 
@@ -32,9 +33,9 @@ def test_programs_and_registry_load_no_compiler(module):
 
 
 def test_public_names_resolve():
-    for name in assoc.__all__:
-        assert getattr(assoc, name) is not None
-    assert set(assoc.__all__) <= set(dir(assoc))
+    for package in (assoc, assoc.plotting, importlib.import_module("assoc.plotting.report"), assoc.sweeps):
+        assert {*package.__all__} <= {*dir(package)}
+        assert all(getattr(package, name) is not None for name in package.__all__)
     with pytest.raises(AttributeError, match="no attribute 'solve_everything'"):
         assoc.solve_everything  # noqa: B018
 

@@ -1,4 +1,4 @@
-"""What the programs read: scenes and problems, ranges of scans, TOML files, and the types of their values."""
+"""What the programs read and write: TOML files, and outputs that can be written."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_toml(path: str) -> dict[str, Any]:
     InvalidInputError
         It cannot be read, or is no TOML.
     """
-    import tomllib
+    import tomllib  # only with --config
 
     try:
         with open(path, "rb") as file:
@@ -31,29 +31,43 @@ def read_toml(path: str) -> dict[str, Any]:
     return {key.replace("-", "_"): value for key, value in content.items()}
 
 
-def check_output(path: str, folder_to_come: str | None = None) -> None:
-    """Refuse before the work a file that could not be written after it.
+def check_outputs(
+    outputs: Sequence[str | None],
+    inputs: Sequence[str | None],
+    *,
+    reserved: Sequence[str] = (),
+    new_folder: str | None = None,
+) -> None:
+    """Refuse before the work outputs that could not be written after it.
+
+    Parameters
+    ----------
+    outputs, inputs : sequences of str or None
+        Files that are written and read; None for options that were not given.
+    reserved : sequence of str
+        Other files that must not be overwritten.
+    new_folder : str, optional
+        A folder that the program will make.
 
     Raises
     ------
     InvalidInputError
-        It is a folder, or would be in one that takes no files, or does not exist and is not ``folder_to_come``.
+        An output would overwrite an input or another output, is a folder, or its folder does not exist or takes
+        no files.
     """
-    check_writable(path, folder_to_come=folder_to_come)
-
-
-def check_distinct(outputs: Sequence[str], inputs: Sequence[str]) -> None:
-    """Refuse outputs that would overwrite what is read, or each other."""
-    taken = {_place(path) for path in inputs}
+    taken = {_real_path(path) for path in (*inputs, *reserved) if path}
     for path in outputs:
-        if is_stream(path):
+        if not path or is_stream(path):
             continue
-        if _place(path) in taken:
-            raise InvalidInputError(f"{path}: is given twice, or would overwrite what is read")
-        taken.add(_place(path))
+        if _real_path(path) in taken:
+            raise InvalidInputError(f"{path}: is given twice, or would overwrite an input file")
+        taken.add(_real_path(path))
+    for path in outputs:
+        if path:
+            check_writable(path, folder_to_come=new_folder)
 
 
-def _place(path: str) -> str:
+def _real_path(path: str) -> str:
     try:
         return os.path.realpath(path)
     except ValueError:  # a NUL, which TOML can hold: reading or writing will say so

@@ -1,18 +1,78 @@
-"""Options of the command line, made from parameter dataclasses."""
+"""Options of the command line: those that several programs have, and those made from parameter dataclasses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import argparse
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from assoc._parameters import Option
+from assoc._cli.program import Parser
+from assoc._cli.values import number, seconds, whole_number
+
+if TYPE_CHECKING:
+    from assoc._parameters import Option
 
 
-def given(choices: Sequence[Option], arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of those options that were given, in their types."""
+class CommonOption(NamedTuple):
+    """An option that several programs have: what stands for its value in the help, how it is read, its help."""
+
+    metavar: str
+    parse: Callable[[str, str], Any]
+    help: str
+
+
+COMMON_OPTIONS = {
+    "seed": CommonOption("N", partial(whole_number, least=0), "seed of the random numbers (default 0)"),
+    "time_limit": CommonOption(
+        "S", seconds, "seconds for the solver on each scan; it then returns the best solution found (default: none)"
+    ),
+    "gate_probability": CommonOption(
+        "P", number, "probability that a gate contains a target's true measurement (default 0.999)"
+    ),
+    "max_tuples": CommonOption(
+        "N", partial(whole_number, least=1), "stop if a scan has more candidate tuples than this"
+    ),
+    "jobs": CommonOption("N", partial(whole_number, least=1), "number of processes (default 1)"),
+    "kbest": CommonOption("K", partial(whole_number, least=1), "the K best associations of each scan, in order"),
+}
+"""By name; the flag has dashes for underscores."""
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of an option."""
+    return "--" + name.replace("_", "-")
+
+
+def add_common_options(parser: argparse._ActionsContainer, names: Iterable[str]) -> None:
+    """Add options of `COMMON_OPTIONS` to a parser."""
+    for name in names:
+        option = COMMON_OPTIONS[name]
+        parser.add_argument(flag_of(name), metavar=option.metavar, help=option.help)
+
+
+def common_values(parsed: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the common options that were given, in their types."""
+    return {
+        name: option.parse(parsed[name], flag_of(name))
+        for name, option in COMMON_OPTIONS.items()
+        if parsed.get(name) is not None
+    }
+
+
+def parameter_values(choices: Sequence[Option], parsed: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of those parameters that were given, in their types."""
     found = {}
     for option in choices:
-        if option.name in arguments:
-            value = arguments[option.name]
+        if option.name in parsed:
+            value = parsed[option.name]
             found[option.name] = value if option.kind is bool else option.parse(value)
     return found
+
+
+def read_first(program: str, words: Sequence[str], names: Iterable[str]) -> dict[str, str | None]:
+    """Read some options before all others: those that decide which others there are."""
+    parser = Parser(prog=program, add_help=False, allow_abbrev=False)
+    for name in names:
+        parser.add_argument(flag_of(name))
+    return vars(parser.parse_known_args(words)[0])

@@ -1,4 +1,4 @@
-"""What the programs share: options made from parameter dataclasses, one-line errors, exit codes."""
+"""How the programs start and end: their streams and signals, one-line errors, exit codes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-from assoc._cli.signals import leave_on_signals
+from assoc._cli.signals import exit_on_signals
 from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
@@ -18,14 +18,14 @@ DONE, BAD_INPUT, NOTHING_FEASIBLE, INTERRUPTED = 0, 2, 3, 130
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that complains in one line."""
+    """An argument parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
         """Print one line to stderr and leave with exit code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see --help)\n")
 
 
-def run(program: Callable[[], None], name: str) -> int:
+def run_program(program: Callable[[], None], name: str) -> int:
     """Run a program and turn what it raises into one line on stderr and an exit code."""
     try:
         program()
@@ -47,39 +47,39 @@ def run(program: Callable[[], None], name: str) -> int:
         sys.stdout = None
         return DONE
     except OSError as error:
-        # what the rooms do not expect: a full disk behind stdout, say
+        # not handled elsewhere: a full disk behind stdout, for example
         print(f"{name}: error: {one_line(error.strerror or error)}", file=sys.stderr)
         sys.stdout = None
         return BAD_INPUT
     return DONE
 
 
-def each(*outputs: Callable[[], None]) -> None:
-    """Do every one of several outputs, also if one cannot be written: what was worked out must not be lost with it.
+def write_all(*writers: Callable[[], None]) -> None:
+    """Write several outputs, the others also if one cannot be written: no result must be lost with it.
 
     Raises
     ------
     InvalidInputError
         The first that was raised.
     """
-    complaints = []
-    for output in outputs:
+    errors = []
+    for write in writers:
         try:
-            output()
+            write()
         except InvalidInputError as error:
-            complaints.append(error)
-    if complaints:
-        raise complaints[0]
+            errors.append(error)
+    if errors:
+        raise errors[0]
 
 
-def begin(name: str) -> None:
+def prepare_process(name: str) -> None:
     """Make a process ready to run a program: its streams, and what happens on signals."""
-    steady_streams()
-    leave_on_signals(name)
+    prepare_streams()
+    exit_on_signals(name)
 
 
-def steady_streams() -> None:
-    """Give stdout and stderr somewhere to go where they are closed, and a way to print any name of a file."""
+def prepare_streams() -> None:
+    """Open stdout and stderr where they are closed, and let them print any name of a file."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)

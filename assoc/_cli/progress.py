@@ -1,27 +1,35 @@
-"""A progress bar with the rate and the time left, on a terminal only."""
+"""The progress bar of the programs, with the rate and the time left; on a terminal only."""
 
 from __future__ import annotations
 
+import sys
 import time
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from assoc.sweeps.study import Counts
 
+Item = TypeVar("Item")
 
-class Bar:
-    """Shows `Counts` as they come.
+
+class ProgressBar:
+    """Shows on stderr how much is done; nothing if that is not a terminal.
 
     Parameters
     ----------
-    stream : text file
-        Where; nothing is shown if it is not a terminal.
+    label : str
+        What the program is doing.
+    unit : str
+        What it counts, in the plural.
     """
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, label: str, unit: str) -> None:
+        self._unit = unit
         self._progress: Any = None
         self._started = time.perf_counter()
-        if stream.isatty():
+        if sys.stderr.isatty():
+            # needed on a terminal alone, and slow to load
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -32,25 +40,29 @@ class Bar:
                 TextColumn("{task.fields[rate]}"),
                 TimeRemainingColumn(compact=True),
                 TextColumn("left"),
-                console=Console(file=stream),
+                console=Console(file=sys.stderr),
                 transient=True,
             )
-            self._task = self._progress.add_task("runs", total=None, rate="")
+            self._task = self._progress.add_task(label, total=None, rate="")
 
-    def __call__(self, counts: Counts) -> None:
-        """Show where the study is."""
+    def show(self, done: int, total: int, new: int) -> None:
+        """Show that ``done`` of ``total`` are done, ``new`` of them since the bar began."""
         if self._progress is None:
             return
-        rate = counts.new / max(time.perf_counter() - self._started, 1e-9)
-        text = f"{rate:.3g} runs/s" if counts.new else ""
-        self._progress.update(self._task, total=counts.total, completed=counts.done, rate=text)
+        rate = new / max(time.perf_counter() - self._started, 1e-9)
+        text = f"{rate:.3g} {self._unit}/s" if new else ""
+        self._progress.update(self._task, total=total, completed=done, rate=text)
+
+    def __call__(self, counts: Counts) -> None:
+        """Show where a study is."""
+        self.show(counts.done, counts.total, counts.new)
 
     def close(self) -> None:
         """Take the bar away."""
         if self._progress is not None:
             self._progress.stop()
 
-    def __enter__(self) -> Bar:
+    def __enter__(self) -> ProgressBar:
         self._started = time.perf_counter()
         if self._progress is not None:
             self._progress.start()
@@ -58,3 +70,13 @@ class Bar:
 
     def __exit__(self, *exception: object) -> None:
         self.close()
+
+
+def with_progress(items: Iterable[Item], total: int, label: str, unit: str = "scans") -> Iterator[Item]:
+    """Yield the items, and show a progress bar while they are worked on."""
+    with ProgressBar(label, unit) as bar:
+        bar.show(0, total, 0)
+        for done, item in enumerate(items):
+            bar.show(done, total, done)
+            yield item
+        bar.show(total, total, total)

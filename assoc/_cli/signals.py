@@ -1,12 +1,25 @@
-"""How programs end on Ctrl-C and its kin."""
+"""How programs end on Ctrl-C, a termination signal or a lost terminal: at once, or in order.
+
+In both ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
+that solves returns, which can take minutes, and some MIP solvers put a handler of their own in its place. The
+exit code is the shell's own: 128 and the number of the signal.
+"""
 
 from __future__ import annotations
 
+import _thread
 import multiprocessing
 import signal
+import sys
 import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 from assoc._system import temporary
+
+_CLEAN_UP_SECONDS = 5.0
 
 
 def ending_signals() -> dict[int, str]:
@@ -18,28 +31,107 @@ def ending_signals() -> dict[int, str]:
     return {number: text for number, text in numbers.items() if signal.getsignal(number) is not signal.SIG_IGN}
 
 
-def leave_on_signals(name: str) -> None:
-    """Let Ctrl-C and its kin end the program at once, with one line, also while a library solves without Python.
-
-    A Python handler would run only when the library returns, which can take minutes, and some MIP solvers
-    put a handler of their own in its place. So the signals are blocked, and a thread waits for them. The exit
-    code is the shell's own: 128 and the number of the signal.
-    """
+def exit_on_signals(name: str) -> None:
+    """Let signals end the program at once, with one line, also while a library solves without Python."""
     ending = ending_signals()
-    if not ending:
-        return
-    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
 
     def leave(number: int, frame: object = None) -> None:
         for child in multiprocessing.active_children():
             child.kill()
-        temporary.end(128 + number, f"{name}: {ending[number]}\n")
+        temporary.end_process(128 + number, f"{name}: {ending[number]}\n")
 
-    def watch() -> None:
-        leave(signal.sigwait(ending))
+    # the handler is for signals that a library lets through
+    _wait_for_signals(ending, handler=leave, waiter=leave)
 
+
+class Interruption:
+    """Whether and how a signal ended a program, and what the program then says.
+
+    Parameters
+    ----------
+    name : str
+        Of the program.
+
+    Attributes
+    ----------
+    message : str
+        What the user should know: what is kept, how to go on.
+    word : str
+        What is said of the signal.
+    code : int
+        Exit code; 0 before there was a signal.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.message = ""
+        self.word = "interrupted"
+        self.code = 0
+
+    def line(self) -> str:
+        """Return the program's last line."""
+        return "; ".join(filter(None, [f"{self.name}: {self.word}", self.message]))
+
+    def interrupt_on_signals(self) -> None:
+        """Turn signals into one KeyboardInterrupt, also while a library solves without Python.
+
+        Worker processes do not see them. A program that is not done with cleaning up after five seconds is ended.
+        """
+        ending = ending_signals()
+        if not ending:
+            return
+
+        def interrupt(number: int, frame: object) -> None:
+            if not self.code:
+                # a library let the signal through to this thread
+                self.word, self.code = ending[number], 128 + number
+            raise KeyboardInterrupt
+
+        def unraisable(problem: Any) -> None:
+            # compilers call Python in places that swallow what it raises
+            if self.code and problem.exc_type is KeyboardInterrupt:
+                _thread.interrupt_main()
+            else:
+                sys.__unraisablehook__(problem)
+
+        def end(number: int) -> None:
+            self.word, self.code = ending[number], 128 + number
+            _thread.interrupt_main()
+            time.sleep(_CLEAN_UP_SECONDS)
+            temporary.end_process(self.code, f"{self.line()}\n")
+
+        sys.unraisablehook = unraisable
+        # the waiter takes one signal: a second one would come in the middle of cleaning up
+        _wait_for_signals(ending, handler=interrupt, waiter=end)
+
+    @contextmanager
+    def reported(self, clean_up: Callable[[], object]) -> Iterator[None]:
+        """End the program with its last line if a signal interrupts the block.
+
+        Parameters
+        ----------
+        clean_up : callable
+            Called before the line is printed.
+        """
+        try:
+            yield
+        except BaseException as error:
+            # a library may meet the interrupt with an error of its own
+            if not (isinstance(error, KeyboardInterrupt) or self.code):
+                raise
+            clean_up()
+            print(self.line(), file=sys.stderr)
+            sys.stderr.flush()
+            raise SystemExit(self.code or 128 + signal.SIGINT) from None
+
+
+def _wait_for_signals(
+    ending: dict[int, str], handler: Callable[[int, object], object], waiter: Callable[[int], object]
+) -> None:
+    """Block the signals, and let a thread call ``waiter`` with the first that comes."""
+    if not ending:
+        return
+    signal.pthread_sigmask(signal.SIG_BLOCK, ending)
     for number in ending:
-        # where a library lets one through
-        signal.signal(number, leave)
-
-    threading.Thread(target=watch, name="signals", daemon=True).start()
+        signal.signal(number, handler)
+    threading.Thread(target=lambda: waiter(signal.sigwait(ending)), name="signals", daemon=True).start()

@@ -1,4 +1,7 @@
-"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file."""
+"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file.
+
+Imports inside functions keep wrong options quick to tell: scenes and studies need numpy and more.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_distinct, check_output, read_toml
-from assoc._cli.values import check_kind, number, scan_range, seconds, whole_number
+from assoc._cli.inputs import check_outputs, read_toml
+from assoc._cli.options import COMMON_OPTIONS, flag_of
+from assoc._cli.values import check_kind, scan_range, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from
@@ -17,7 +21,7 @@ from assoc.sweeps.store import LOG, MANIFEST, REPORT
 
 if TYPE_CHECKING:
     from assoc.sweeps.setting import Setting
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
     from assoc.sweeps.space import Space
     from assoc.sweeps.study import Study
     from assoc.sweeps.tuning import Report
@@ -33,7 +37,7 @@ _KNOWN = (*_LISTS, *_TEXTS, *_WHOLE, *_NUMBERS, "jobs")
 
 @dataclass(frozen=True)
 class Options:
-    """What a sweep was asked to do, checked.
+    """The options of a sweep, checked.
 
     Attributes
     ----------
@@ -91,7 +95,7 @@ class Options:
         return designed(list(self.spaces.items()), random, seed)
 
     @cached_property
-    def sources(self) -> tuple[Source, ...]:
+    def sources(self) -> tuple[StudySource, ...]:
         """The scenes and problems."""
         from assoc.sweeps.sources import load_sources
 
@@ -101,7 +105,7 @@ class Options:
         """Return the study."""
         from assoc.sweeps.study import Study
 
-        settings = self.settings  # a wrong design is told before scenes are read
+        settings = self.settings  # a wrong design is reported before scenes are read
         return Study(sources=self.sources, settings=settings, repeats=self.values.get("repeats", 1), **self._common())
 
     def tuning(self, progress: Callable[[Any], object]) -> Report:
@@ -109,7 +113,7 @@ class Options:
         from assoc.sweeps.tuning import tune
 
         if self.tables or len(self.solvers) != 1 or "random" in self.values:
-            raise InvalidInputError("--tune: searches one --solver in the ranges of --grid, without --random or tables")
+            raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without --random or tables")
         solver = self.solvers[0]
         return tune(
             self.output,
@@ -138,7 +142,7 @@ class Options:
         }
 
 
-def read(given: Mapping[str, Any]) -> Options:
+def read_options(given: Mapping[str, Any]) -> Options:
     """Check the options of the command line and of the file that ``config`` names; the former come first.
 
     Raises
@@ -156,33 +160,28 @@ def read(given: Mapping[str, Any]) -> Options:
     if tables:
         for name in ("solver", "grid"):
             if name in values:
-                raise InvalidInputError(f"--{name}: the design is in the tables of {config}; give one of the two")
+                raise InvalidInputError(f"--{name}: {config} has tables of parameters already; give one of the two")
     if not values.get("files"):
         raise InvalidInputError("no scene.npz or problem.npz is given")
     if "output" not in values:
-        raise InvalidInputError("--output: missing, expected the folder that keeps the study")
+        raise InvalidInputError("--output: missing, expected the folder of the study")
     if "scheduler" in values and "jobs" in values:
-        raise InvalidInputError("--jobs: the cluster has its own workers; give --jobs or --scheduler")
+        raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
     if values.get("target", "gap") not in ("gap", "time"):
         raise InvalidInputError(f"--target: expected gap or time, got {values['target']!r}")
     if "target" in values and "tune" not in values:
-        raise InvalidInputError("--target: goes only with --tune")
+        raise InvalidInputError("--target: can be given only with --tune")
     if not 0 < values.get("gate_probability", 1.0) <= 1:
         raise InvalidInputError(f"--gate-probability: expected a number in (0, 1], got {values['gate_probability']}")
     return Options(values, tables, config)
 
 
 def _of_text(name: str, value: Any) -> Any:
-    flag = "--" + name.replace("_", "-")
-    if name in _WHOLE:
-        return whole_number(value, flag, _WHOLE[name])
-    if name == "time_limit":
-        return seconds(value, flag)
-    if name == "gate_probability":
-        return number(value, flag)
-    if name == "jobs":
-        return os.cpu_count() or 1 if value == "all" else whole_number(value, flag, 1)
-    return value
+    if name == "jobs" and value == "all":
+        return os.cpu_count() or 1
+    if name in COMMON_OPTIONS:
+        return COMMON_OPTIONS[name].parse(value, flag_of(name))
+    return whole_number(value, flag_of(name), _WHOLE[name]) if name in _WHOLE else value
 
 
 def _of_file(file: str, key: str, value: Any) -> Any:
@@ -208,11 +207,9 @@ def _of_file(file: str, key: str, value: Any) -> Any:
     return float(value) if key in _NUMBERS else value
 
 
-def check_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
+def check_study_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
     """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
-    outputs = [file for file in files if file is not None]
-    check_distinct(outputs, [*inputs, *(os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT))])
-    for file in outputs:
-        check_output(file, folder)
+    study = [os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT)]
+    check_outputs(files, inputs, reserved=study, new_folder=folder)

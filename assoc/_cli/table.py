@@ -1,33 +1,132 @@
-"""The table of an association: one row a scan, for people (text, rich) and for other programs (CSV)."""
+"""Tables of text: plain columns into a pipe; on a terminal as wide as that is, and no cell is ever cut."""
 
 from __future__ import annotations
 
+import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from assoc.association.scan import ScanAssociation
-from assoc.association.table import LEFT_ALIGNED, rows
+_BETWEEN = "  "
 
 
-def print_table(scans: Sequence[ScanAssociation], files: Sequence[str]) -> None:
-    """Print the table to stdout: drawn on a terminal, plain columns elsewhere."""
-    headers, cells = rows(scans, files)
+def print_table(
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    keys: int = 1,
+    left: Sequence[str] = (),
+    joined: Sequence[str] = (),
+) -> None:
+    """Print a table to stdout.
+
+    A table that is too wide for a terminal gets headers of several lines. If that is not enough its columns are
+    put below one another in several tables, or each row is printed as a list.
+
+    Parameters
+    ----------
+    headers : sequence of str
+    rows : sequence of sequences of str
+    keys : int, default 1
+        Number of first columns that say which row it is; every one of several tables begins with them.
+    left : sequence of str
+        Headers of the columns that are aligned to the left.
+    joined : sequence of str
+        Headers of the columns that stay with the column before them.
+    """
     if sys.stdout.isatty():
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
+        lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
+    else:
+        lines = _aligned([[header] for header in headers], rows, left, headers)
+    for line in lines:
+        print(line)
 
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        for header in headers:
-            table.add_column(header, justify="left" if header in LEFT_ALIGNED else "right", no_wrap=header != "file")
-        for row in cells:
-            table.add_row(*row)
-        Console().print(table)
+
+def fitted_lines(
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    width: int,
+    *,
+    keys: int = 1,
+    left: Sequence[str] = (),
+    joined: Sequence[str] = (),
+) -> Iterator[str]:
+    """Yield the lines of a table that is at most ``width`` wide, if its cells are; see `print_table`."""
+    every = range(len(headers))
+    words = [header.split(" ") for header in headers]
+    # short headers stay on one line
+    words = [[header] if len(header) < 6 else split for header, split in zip(headers, words, strict=True)]
+    high = [_width(every[i : i + 1], words, rows) for i in every]
+    if _width(every, [[header] for header in headers], rows) <= width:
+        yield from _drawn(every, [[header] for header in headers], headers, rows, left)
         return
-    widths = [max(len(row[i]) for row in [headers, *cells]) for i in range(len(headers))]
-    for row in [headers, *cells]:
+    units: list[list[int]] = []
+    for i in every[keys:]:
+        if headers[i] in joined and units:
+            units[-1].append(i)
+        else:
+            units.append([i])
+    fixed = sum(high[:keys]) + len(_BETWEEN) * keys
+    needed = [sum(high[i] for i in unit) + len(_BETWEEN) * (len(unit) - 1) for unit in units]
+    if units and fixed + max(needed) > width:
+        yield from _listed(headers, rows)
+        return
+    blocks: list[list[int]] = []
+    used = width
+    for unit, wide in zip(units, needed, strict=True):
+        if not blocks or used + len(_BETWEEN) + wide > width:
+            blocks.append([*every[:keys]])
+            used = fixed - len(_BETWEEN)
+        blocks[-1] += unit
+        used += len(_BETWEEN) + wide
+    for number, block in enumerate(blocks or [[*every]]):
+        if number:
+            yield ""
+        yield from _drawn(block, words, headers, rows, left)
+
+
+def _width(columns: Iterable[int], words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> int:
+    widths = [max(map(len, [*words[i], *(row[i] for row in rows)])) for i in columns]
+    return sum(widths) + len(_BETWEEN) * (len(widths) - 1)
+
+
+def _drawn(
+    columns: Sequence[int],
+    words: Sequence[Sequence[str]],
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    left: Sequence[str],
+) -> Iterator[str]:
+    """Some columns of a table, with a line below their headers."""
+    chosen = [words[i] for i in columns]
+    lines = _aligned(chosen, [[row[i] for i in columns] for row in rows], left, [headers[i] for i in columns])
+    for _ in range(max(map(len, chosen))):
+        yield next(lines)
+    utf = (sys.stdout.encoding or "").lower().startswith("utf")
+    yield ("─" if utf else "-") * _width(columns, words, rows)
+    yield from lines
+
+
+def _aligned(
+    words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[str], headers: Sequence[str]
+) -> Iterator[str]:
+    """Lines of headers, each of one or several words below one another, and of rows, in columns."""
+    high = max(map(len, words))
+    over = [[*[""] * (high - len(split)), *split] for split in words]
+    table = [*zip(*over, strict=True), *rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
         texts = [
-            text.ljust(width) if header in LEFT_ALIGNED else text.rjust(width)
+            text.ljust(width) if header in left else text.rjust(width)
             for header, text, width in zip(headers, row, widths, strict=True)
         ]
-        print("  ".join(texts).rstrip())
+        yield _BETWEEN.join(texts).rstrip()
+
+
+def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Each row as a list of headers and cells."""
+    wide = max(map(len, headers))
+    for number, row in enumerate(rows):
+        if number:
+            yield ""
+        for header, cell in zip(headers, row, strict=True):
+            yield f"{header.ljust(wide)}{_BETWEEN}{cell}"

@@ -21,7 +21,7 @@ SIZE_LIMIT = 4 * 1024**3
 """The most bytes that the arrays of one npz file may hold together."""
 
 _HEADER_LIMIT = 10_000
-# deflate cannot expand by more than about 1032; a member that claims more is a lie or a trap
+# deflate cannot expand by more than about 1032; a member that claims more is damaged or an attack
 _LARGEST_EXPANSION = 1_100
 # arrays of scenes and problems compress by 3 to 10, and only small ones of equal numbers by much more
 _USUAL_EXPANSION, _SMALL = 100, 128 * 1024**2
@@ -150,22 +150,22 @@ def _read(
         raise InvalidInputError(f"{file}: its arrays take {total} bytes, the limit is {SIZE_LIMIT}")
     packed = sum(members[name].compress_size for name in wanted)
     if total > _SMALL and total > _USUAL_EXPANSION * packed:
-        raise InvalidInputError(f"{file}: its arrays claim to unpack from {packed} to {total} bytes, which none do")
+        raise InvalidInputError(f"{file}: its arrays claim to unpack from {packed} to {total} bytes, too many")
     return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
 
 
 def format_of(path: str | os.PathLike[str]) -> str | None:
-    """Return the format that an npz file claims; None if that cannot be read, which loading will explain."""
+    """Return the format that an npz file claims; None if that cannot be read; loading then raises the error."""
     file = Path(path)
     try:
         with zipfile.ZipFile(file) as archive:
             return str(_member(file, archive, archive.getinfo("format.npy"), Field("str", 0))[()])
-    except Exception:  # whatever a damaged file raises here, loading says it better
+    except Exception:  # whatever a damaged file raises here, loading gives the better message
         return None
 
 
 def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field) -> Array:
-    """One array, its header checked before memory is taken for it."""
+    """One array; its header is checked before memory is allocated."""
     name = info.filename.removesuffix(".npy")
     if info.file_size > SIZE_LIMIT or info.file_size > _LARGEST_EXPANSION * info.compress_size + 1000:
         raise InvalidInputError(
@@ -193,7 +193,7 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
                 f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values"
             )
         if dtype.itemsize == 0:
-            # numpy makes room for one character each, which no check of sizes against the file would see
+            # numpy allocates one character each, which a check against the size of the file cannot see
             raise InvalidInputError(f"{file}: the field {name!r} holds texts without room for a character")
         if len(shape) != spec.ndim:
             raise InvalidInputError(

@@ -7,10 +7,10 @@ import os
 import secrets
 import stat
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from assoc._system import temporary
 from assoc.errors import InvalidInputError
@@ -19,7 +19,7 @@ FilePath = str | os.PathLike[str]
 
 
 def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) -> None:
-    """Refuse a path at which no file can be written; before the work, and not only after it.
+    """Refuse, before the work, a path at which no file can be written.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) ->
             if not is_stream(path):
                 raise InvalidInputError(f"{path}: is neither a file nor a pipe or terminal")
             return
-        # a name that leads elsewhere is kept, and the file written where it leads
+        # a symbolic link is kept, and its target is written
         parent = Path(os.path.realpath(path)).parent
         if not parent.is_dir():
             if folder_to_come is not None and parent == Path(os.path.realpath(folder_to_come)):
@@ -103,7 +103,7 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
     except BaseException as error:
         if name:
             temporary.remove(name)
-        # an archive that cannot be closed on a full disk complains of that, and has the disk's complaint as context
+        # on a full disk closing the archive fails, too; the disk's error is its context
         cause: BaseException | None = error
         while cause is not None and not isinstance(cause, OSError):
             cause = cause.__context__
@@ -122,6 +122,13 @@ def write_text(path: FilePath, text: str) -> None:
     """
     content = text.encode("utf-8", "backslashreplace")
     write_atomically(path, lambda file: file.write(content))
+
+
+def write_json(path: FilePath, content: Mapping[str, Any]) -> None:
+    """Write plain data as JSON, whole or not at all; see `write_atomically`."""
+    import json  # not needed for --help
+
+    write_text(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def _status(path: FilePath) -> os.stat_result | None:
@@ -145,7 +152,7 @@ def _create(target: str) -> tuple[int, str]:
         name = os.path.join(folder, f".{start}.{secrets.token_hex(6)}.part")
         with temporary.lock:
             try:
-                # the mode is the system's affair: asking for the umask changes it for all threads
+                # the system applies the umask: reading it would change it for all threads
                 handle = os.open(name, flags, 0o666)
             except FileExistsError:
                 continue
@@ -177,7 +184,7 @@ def _write_stream(path: FilePath, number: int | None, writer: Callable[[IO[bytes
         stream = sys.stdout if number == 1 else sys.stderr
         if stream is not None:
             stream.flush()
-        # opened anew, a file would begin at its start again
+        # a file that is opened again would be written from its start
         with os.fdopen(os.dup(number), "wb") as file:
             file.write(content.getbuffer())
     except BrokenPipeError:
@@ -189,7 +196,7 @@ def _write_stream(path: FilePath, number: int | None, writer: Callable[[IO[bytes
 
 
 def _sync_folder(folder: str) -> None:
-    """Have the new name on the disk, too, where a folder can be asked for that."""
+    """Write the new name to the disk, too, where the system can do that."""
     with suppress(OSError):
         handle = os.open(folder or ".", os.O_RDONLY)
         try:

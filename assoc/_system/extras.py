@@ -1,4 +1,4 @@
-"""Optional dependencies: imported when they are used, and asked for by name where they are missing."""
+"""Optional dependencies: imported when they are used; a missing one is named with the command that installs it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from assoc.errors import MissingExtraError
 
 
 def check_extra(package: str, extra: str) -> None:
-    """Refuse early, without importing anything, what a missing package would stop later.
+    """Raise early, without importing anything, if an optional package is missing.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Work in a thread that is left behind when time is over: for libraries that look at no clock, or seldom."""
+"""Work in a thread that is abandoned when time is over: for libraries that have no time limit, or check it seldom."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work spread over processes: results in order, and nobody left behind when it is cut short."""
+"""Work spread over processes: results in order, and no process left running after an interruption."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
             'processes must guard its start by if __name__ == "__main__"); fewer processes take less memory'
         ) from None
     except BaseException:
-        # interrupted, or one item failed: nobody wants the rest, which may take long
+        # interrupted, or one item failed: the rest is not needed and may take long
         executor.shutdown(wait=False, cancel_futures=True)
         _end(before)
         raise
@@ -133,7 +133,7 @@ def signals_as_they_are() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
-def end_with(parent: int, *paths: str) -> None:
+def end_with_parent(parent: int, *paths: str) -> None:
     """End this worker process soon after its parent, also where that was killed and could not say so.
 
     Parameters
@@ -159,12 +159,12 @@ def end_with(parent: int, *paths: str) -> None:
 
 def _start(path: str, parent: int) -> None:
     global _task
-    # Ctrl-C reaches the whole group: let the parent speak, and die quietly
+    # Ctrl-C reaches the whole group: only the parent reports it
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         # programs wait for it in a thread, and their processes inherit that it is blocked
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    end_with(parent, path)
+    end_with_parent(parent, path)
     with open(path, "rb") as file:
         _task = pickle.load(file)
 

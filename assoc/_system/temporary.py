@@ -1,4 +1,4 @@
-"""Temporary files and folders of this process, on one list: a process that must end at once takes them away first."""
+"""Temporary files and folders of this process, on one list: a process that must end at once removes them first."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _paths: dict[str, int] = {}
 def add(path: str) -> None:
     """List a file or folder of this process."""
     with lock:
-        # a forked child has a copy of the list, and no business with what is on it
+        # a forked child has a copy of the list, but must not remove what is on it
         _paths[path] = os.getpid()
 
 
@@ -28,14 +28,14 @@ def forget(path: str) -> None:
 
 
 def remove(path: str) -> None:
-    """Remove a file or folder, whatever may be wrong with it, and take it off the list."""
+    """Remove a file or folder, ignoring errors, and take it off the list."""
     with suppress(OSError):
         os.unlink(path) if not os.path.isdir(path) else shutil.rmtree(path, ignore_errors=True)
     forget(path)
 
 
-def end(code: int, message: str = "") -> None:
-    """End the process now: what is half written goes, no other thread makes more of it, nothing else is waited for."""
+def end_process(code: int, message: str = "") -> None:
+    """End the process now: remove unfinished files, let no other thread make more, and wait for nothing else."""
     # a thread that holds the lock may hang in a file system that does not answer
     lock.acquire(timeout=2.0)
     for path, owner in [*_paths.items()]:

@@ -1,4 +1,4 @@
-"""HTML from text that nobody vouches for: names in files, words of command lines."""
+"""HTML from untrusted text: names in files, words of command lines."""
 
 from __future__ import annotations
 

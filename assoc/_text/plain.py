@@ -4,10 +4,10 @@ from __future__ import annotations
 
 
 def one_line(message: object) -> str:
-    """Return a message with its line breaks taken out, and nothing in it that a terminal would obey."""
+    """Return a message without line breaks and without control characters."""
     return printable(" ".join(str(message).split()))
 
 
 def printable(text: str) -> str:
-    """Return text on one line that shows as it is; the names of files may hold anything."""
+    """Return text with control characters escaped; names of files may contain any."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)

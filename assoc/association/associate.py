@@ -22,7 +22,7 @@ def associate(
     gating: Mapping[str, Any] | None = None,
     **parameters: Any,
 ) -> Association:
-    """Find out for every scan which measurements are one target, and which are false alarms.
+    """Find for every scan which measurements come from the same target, and which are false alarms.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def associate(
     LimitExceededError
         A scan has too many candidate tuples.
     """
-    from assoc.association.plan import Plan
+    from assoc.association.plan import Plan  # loads the compiler, which an Association by itself does not need
 
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")

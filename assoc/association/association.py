@@ -1,8 +1,7 @@
-"""From solutions back to the world: what is a target, where it is, and what is a false alarm."""
+"""The result of an association: targets, their positions, false alarms, cost and gap."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping
@@ -11,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._files.output import write_json
+from assoc._text.html import escape, table
 from assoc.association.scan import ScanAssociation, plain
+from assoc.association.table import rows
 from assoc.solution import Solution
 
 if TYPE_CHECKING:
@@ -150,23 +152,12 @@ class Association:
 
     def _repr_html_(self) -> str:
         """Return what notebooks show: the summary, and one row for each of the first scans."""
-        from assoc._text.html import escape, table
-        from assoc.association.table import rows
-
         headers, cells = rows(self.scans[:_SHOWN], [""] * min(len(self.scans), _SHOWN))
         lines = "<br>".join(escape(line) for line in self.summary().splitlines())
         numbers = [column for column, header in enumerate(headers) if header != "status"]
         rest = len(self.scans) - _SHOWN
         more = f"<p>... and {rest} more scans</p>" if rest > 0 else ""
         return f"<p>{lines}</p>{table(headers, cells, numbers=numbers)}{more}"
-
-
-def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
-    """Write plain data as JSON; the file appears whole or not at all."""
-    from assoc._files.output import write_text
-
-    text = json.dumps(content, allow_nan=False) + "\n"
-    write_text(path, text)
 
 
 def _text(value: float | None) -> str:

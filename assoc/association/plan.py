@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from assoc._system.processes import ordered_map
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
+from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
-from assoc.scene.scan import Scan, true_tuples
+from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
@@ -38,7 +39,7 @@ class Plan:
         Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
     """
 
-    sources: Sequence[Scene | AssignmentProblem]
+    sources: Sequence[Source]
     solver: str
     seed: int = 0
     time_limit: float | None = None
@@ -116,7 +117,7 @@ def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociati
 def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
     targets = _targets(problem, solution)
     positions, covariances = positions_and_covariances(scene, scan, targets)
-    truth = true_tuples(scan)
+    truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
     return ScanAssociation(
         scan=scan.index,

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Iterator, Sequence
 
 from assoc._text.plain import printable
 from assoc.association.scan import ScanAssociation
 
+KEYS = ("file", "scan", "rank")
+"""Columns that say which row it is."""
+
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")
 
 
-def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[str], list[list[str]]]:
+def rows(
+    scans: Sequence[ScanAssociation], files: Sequence[str], *, brief: bool = False
+) -> tuple[list[str], list[list[str]]]:
     """Headers and cells for people.
 
     Parameters
@@ -21,7 +27,11 @@ def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[s
     scans : sequence of ScanAssociation
     files : sequence of str
         The file of each scan; shown only if there are several.
+    brief : bool, default False
+        Leave out the folders of files, and lower bound and gap where all scans are certified optimal.
     """
+    if brief:
+        files = _short_names(files)
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
     truth = any(scan.true_tuples is not None for scan in scans)
@@ -47,7 +57,16 @@ def rows(scans: Sequence[ScanAssociation], files: Sequence[str]) -> tuple[list[s
         if truth:
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
+    if brief and all(one.solution.status == "optimal" for one, _, _ in _lines(scans, files)):
+        kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
+        headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
+
+
+def _short_names(files: Sequence[str]) -> list[str]:
+    """The last parts of paths, where these tell them apart."""
+    short = {file: os.path.basename(file) for file in files}
+    return [short[file] for file in files] if len({*short.values()}) == len(short) else list(files)
 
 
 def _lines(

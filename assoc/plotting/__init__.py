@@ -5,8 +5,9 @@ Each function takes ``ax=None`` and returns the axes; nothing is shown or saved.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from assoc._system.lazy import lazy_names
 
 if TYPE_CHECKING:
     from assoc.plotting.convergence import plot_convergence
@@ -18,19 +19,6 @@ if TYPE_CHECKING:
     from assoc.plotting.scene import plot_scene
     from assoc.plotting.solution import plot_solution
     from assoc.plotting.tracks import plot_tracks
-
-_HOME = {
-    "plot_convergence": "convergence",
-    "plot_costs": "costs",
-    "plot_gates": "costs",
-    "plot_heat_map": "heat_map",
-    "plot_metric": "metric",
-    "plot_overview": "overview",
-    "plot_pheromone": "pheromone",
-    "plot_scene": "scene",
-    "plot_solution": "solution",
-    "plot_tracks": "tracks",
-}
 
 __all__ = [
     "plot_convergence",
@@ -45,11 +33,18 @@ __all__ = [
     "plot_tracks",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home on first use (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'assoc.plotting' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"assoc.plotting.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "plot_convergence": "convergence",
+        "plot_costs": "costs",
+        "plot_gates": "costs",
+        "plot_heat_map": "heat_map",
+        "plot_metric": "metric",
+        "plot_overview": "overview",
+        "plot_pheromone": "pheromone",
+        "plot_scene": "scene",
+        "plot_solution": "solution",
+        "plot_tracks": "tracks",
+    },
+)

@@ -63,7 +63,7 @@ def box_around(near: Array, far: Array) -> Array:
     return np.stack([low - margin, high + margin], axis=1)
 
 
-def plan(ax: Any, box: Array, unit: Unit) -> None:
+def set_plan_view(ax: Any, box: Array, unit: Unit) -> None:
     """Make axes a map: equal scales, bounds, units."""
     middle, width = box.mean(axis=1), np.ptp(box, axis=1)
     # a map may be wide or tall, but no strip

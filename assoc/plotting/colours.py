@@ -1,4 +1,4 @@
-"""Colours, markers and dashes that tell things apart also for the colour-blind and on grey paper.
+"""Colours, markers and dashes that differ also for colour-blind readers and in greyscale.
 
 References
 ----------
@@ -22,7 +22,7 @@ DASHES = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (3, 1)), (0, (8, 2)), ":
 
 
 def colour(number: int) -> str:
-    """Colour of series ``number``; they come round again after seven."""
+    """Colour of series ``number``; they repeat after seven."""
     return SERIES[number % len(SERIES)]
 
 

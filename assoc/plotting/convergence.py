@@ -1,4 +1,4 @@
-"""How cost and lower bound of solutions meet."""
+"""How cost and lower bound of solutions converge."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def plot_convergence(
     ax = axes_or_new(ax)
     named = {solutions.solver: solutions} if isinstance(solutions, Solution) else dict(solutions)
     for number, (name, solution) in enumerate(named.items()):
-        # what was certified at the end stands at the end
+        # the final bound belongs to the end of the run
         last = (solution.iterations, solution.runtime, solution.cost, solution.lower_bound)
         points = np.array([*solution.trace, last], dtype=np.float64)
         x = points[:, 0] if over == "iteration" else 1e3 * points[:, 1]
@@ -52,7 +52,7 @@ def plot_convergence(
         ax.fill_between(x, bound, points[:, 2], step="post", color=colour(number), alpha=0.12, linewidth=0)
     low, high = ax.dataLim.intervaly
     if high - low <= _ROUNDING * max(1.0, abs(low), abs(high)):
-        # the optimum was certified at once: what rounding leaves shall not fill the axis
+        # the optimum was certified at once: rounding errors must not fill the axis
         ax.set_ylim(low - 1.0, high + 1.0)
     ax.ticklabel_format(axis="y", useOffset=False)
     if over == "iteration":

@@ -1,4 +1,4 @@
-"""A parameter study as a heat map whose cells carry their intervals."""
+"""A measure of a parameter study over two parameters, as a heat map."""
 
 from __future__ import annotations
 
@@ -7,19 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._types import Array
+from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new
-from assoc.plotting.study_figures import FACTORS, PANELS, limits_of, short
-from assoc.plotting.study_figures import heat_map as draw_map
 from assoc.sweeps.bootstrap import mean_interval, weighted_mean
-from assoc.sweeps.summary import by_problem, measured, numbers, varied
+from assoc.sweeps.summary import FACTORS, by_problem, measured, numbers, varied
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
-MEASURES = {**dict(PANELS), "cost": "mean cost, nats", "correct": "correct, %"}
+LABELS = {
+    "gap": "mean gap",
+    "optimal": "certified optimal, %",
+    "iterations": "mean iterations",
+    "time": "ms",
+    "cost": "mean cost, nats",
+    "correct": "correct, %",
+}
+"""What is said of each measure; their units are those of `FACTORS`."""
 
 
 def plot_heat_map(
@@ -47,8 +52,8 @@ def plot_heat_map(
     InvalidInputError
         There is no such measure or parameter, or fewer than two parameters vary.
     """
-    if measure not in MEASURES:
-        raise InvalidInputError(f"measure: expected one of {', '.join(MEASURES)}, got {measure!r}")
+    if measure not in LABELS:
+        raise InvalidInputError(f"measure: expected one of {', '.join(LABELS)}, got {measure!r}")
     names = [*(varied(study) if parameters is None else parameters)]
     if len(names) < 2 or (parameters is not None and len(names) != 2):
         raise InvalidInputError(f"parameters: a heat map needs two that vary, got {names}")
@@ -63,15 +68,25 @@ def plot_heat_map(
         if not np.isnan(value):
             texts[place] = f"{value:.3g}\n{low[place]:.3g} .. {high[place]:.3g}"
     known = middle[~np.isnan(middle)]
-    image = draw_map(xs, ys, middle, limits_of(known) if known.size else (0.0, 1.0), ax=ax, texts=texts)
-    ax.figure.colorbar(image, ax=ax, label=MEASURES[measure])
+    image = draw_cells(xs, ys, middle, colour_limits(known), ax=ax, texts=texts)
+    ax.figure.colorbar(image, ax=ax, label=LABELS[measure])
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     return ax
 
 
-def cells(study: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Array, Array, Array, Array, Array]:
+def cells(
+    study: pd.DataFrame, measure: str, across: str, up: str, *, intervals: bool = True
+) -> tuple[Array, Array, Array, Array, Array]:
     """Means and 95 % intervals of a measure over two parameters, in the units in which it is shown.
+
+    Parameters
+    ----------
+    study : DataFrame
+        Runs of one solver.
+    measure, across, up : str
+    intervals : bool, default True
+        Whether to find the intervals, which takes most of the time; they are NaN otherwise.
 
     Returns
     -------
@@ -89,8 +104,37 @@ def cells(study: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Arra
         table = by_problem(runs, measured(runs, measure))
         weights = by_problem(runs, numbers(runs["true_tuples"])) if measure == "correct" else None
         middle[place] = factor * weighted_mean(table, weights)
-        low[place], high[place] = (factor * end for end in mean_interval(table, weights))
+        if intervals:
+            low[place], high[place] = (factor * end for end in mean_interval(table, weights))
     return xs, ys, middle, low, high
 
 
-__all__ = ["MEASURES", "cells", "plot_heat_map", "short"]
+def colour_limits(known: Floats) -> tuple[float, float]:
+    """Ends of the colour scale for the values that are known."""
+    if not known.size:
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    # equal values get one colour in all maps
+    return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def draw_cells(
+    xs: Array, ys: Array, values: Floats, limits: tuple[float, float], *, ax: Any, texts: Array | None = None
+) -> Any:
+    """Draw values (rows: ``ys``) with their numbers, or with given texts, into axes; returns the image."""
+    # the lightness of cividis grows evenly, also for colour-blind readers and in greyscale
+    image = ax.imshow(values, origin="lower", aspect="auto", cmap="cividis", vmin=limits[0], vmax=limits[1])
+    ax.set_xticks(range(len(xs)), [short_text(x) for x in xs])
+    ax.set_yticks(range(len(ys)), [short_text(y) for y in ys])
+    middle = sum(limits) / 2
+    for (i, j), value in np.ndenumerate(values):
+        if not np.isnan(value):
+            color = "black" if value > middle else "white"
+            text = f"{value:.3g}" if texts is None else texts[i, j]
+            ax.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
+    return image
+
+
+def short_text(value: Any) -> str:
+    """Return a parameter's value with four digits."""
+    return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)

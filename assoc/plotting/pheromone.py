@@ -16,7 +16,7 @@ _NAMED = 40
 
 
 def plot_pheromone(history: PheromoneHistory, *, nodes: int = 25, ax: Any = None) -> Any:
-    """Draw how the pheromone gathers on some tuples and leaves the others.
+    """Draw how the pheromone increases on some tuples and evaporates from the others.
 
     Parameters
     ----------

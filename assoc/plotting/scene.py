@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
+from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
 from assoc.plotting.ellipses import ellipses, place_covariances
 from assoc.plotting.places import distances_to_border, places
@@ -68,7 +68,7 @@ def plot_scene(
         _draw_gates(ax, scene, chosen, middle, gate_probability, unit.factor)
     draw_truth(ax, scene, chosen, unit.factor, paths=len(chosen) > 1)
     draw_sensors(ax, scene.sensors, unit.factor)
-    plan(ax, box_around(near, far), unit)
+    set_plan_view(ax, box_around(near, far), unit)
     legend(ax)
     return ax
 

@@ -9,7 +9,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
-from assoc.plotting.axes import axes_or_new, box_around, legend, plan, stacked, unit_of
+from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
 from assoc.plotting.ellipses import ellipses
 from assoc.plotting.places import distances_to_border, places
@@ -89,7 +89,7 @@ def plot_solution(
     ax.plot(*(f * found[:, :2]).T, ".", color=BLACK, markersize=6, label="targets found", zorder=5)
     draw_truth(ax, scene, [scan], f, paths=False)
     draw_sensors(ax, scene.sensors, f)
-    plan(ax, box, unit)
+    set_plan_view(ax, box, unit)
     legend(ax)
     return ax
 

@@ -8,26 +8,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._files.output import write_atomically
 from assoc._system.extras import load_extra
 from assoc.errors import InvalidInputError
+from assoc.plotting.heat_map import LABELS, cells, colour_limits, draw_cells, short_text
 from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import load, load_traces
-from assoc.sweeps.summary import measured, summarize, varied
+from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PANELS = (("gap", "mean gap"), ("optimal", "certified optimal, %"), ("iterations", "mean iterations"), ("time", "ms"))
-FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
+_PANELS = ("gap", "optimal", "iterations", "time")
 _MOST_CELLS = 12
 _MOST_COLUMNS = 6
 _MOST_CURVES = 8
 
 
-def draw(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> list[Path]:
+def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> list[Path]:
     """Draw the heat maps and the convergence curves of a study into its folder.
 
     Parameters
@@ -57,13 +56,13 @@ def draw(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None) -> l
         if not varied(part):
             continue
         name = "heatmap.png" if len(parts) == 1 else f"heatmap-{solver}.png"
-        drawn.append(_save(Path(folder) / name, heat_maps(part, new_figure())))
-    drawn.append(_save(Path(folder) / "convergence.png", convergence(frame, load_traces(folder), new_figure())))
+        drawn.append(save_png(Path(folder) / name, heat_maps(part, new_figure())))
+    drawn.append(save_png(Path(folder) / "convergence.png", convergence(frame, load_traces(folder), new_figure())))
     return drawn
 
 
 def new_figure() -> Any:
-    """Return an empty figure that belongs to nobody's screen: no pyplot in a program.
+    """Return an empty figure that needs no screen and no pyplot.
 
     Raises
     ------
@@ -75,7 +74,8 @@ def new_figure() -> Any:
     return figure
 
 
-def _save(path: Path, figure: Any) -> Path:
+def save_png(path: Path, figure: Any) -> Path:
+    """Write a figure, whole or not at all; returns the path."""
     write_atomically(path, lambda file: figure.savefig(file, format="png", dpi=130))
     return path
 
@@ -98,7 +98,7 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
         The same.
     """
     names = varied(frame)
-    panels = [(name, title) for name, title in PANELS if not np.isnan(measured(frame, name)).all()]
+    panels = [name for name in _PANELS if not np.isnan(measured(frame, name)).all()]
     numeric = [name for name in names if frame[name].dtype.kind in "iuf"]
     if len(numeric) < 2 or any(frame[name].nunique() > _MOST_CELLS for name in names):
         return _over_each(summarize(frame), names, panels, figure)
@@ -107,67 +107,30 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     groups: list[tuple[str, pd.DataFrame]] = [("", frame)]
     if others and frame.groupby(others).ngroups <= _MOST_COLUMNS:
         groups = [
-            (", ".join(f"{n} {short(v)}" for n, v in zip(others, values, strict=True)), part)
+            (", ".join(f"{n} {short_text(v)}" for n, v in zip(others, values, strict=True)), part)
             for values, part in frame.groupby(others)
         ]
     elif others:
         groups = [(f"mean over {', '.join(others)}", frame)]
     figure.set_size_inches(1.6 + 2.6 * len(groups), 0.6 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), len(groups), squeeze=False)
-    for row, (measure, title) in zip(axes, panels, strict=True):
-        tables = [_table(part, measure, across, up) for _, part in groups]
-        known = np.concatenate([values[~np.isnan(values)] for _, _, values in tables])
-        limits = limits_of(known)
+    for row, measure in zip(axes, panels, strict=True):
+        tables = [cells(part, measure, across, up, intervals=False)[:3] for _, part in groups]
+        limits = colour_limits(np.concatenate([values[~np.isnan(values)] for _, _, values in tables]))
         for ax, (label, _), (xs, ys, values) in zip(row, groups, tables, strict=True):
-            image = heat_map(xs, ys, values, limits, ax=ax)
+            image = draw_cells(xs, ys, values, limits, ax=ax)
             ax.set_xlabel(across)
             ax.set_ylabel(up)
             ax.set_title(label, fontsize=9)
-        figure.colorbar(image, ax=list(row), label=title)
+        figure.colorbar(image, ax=list(row), label=LABELS[measure])
     return figure
 
 
-def limits_of(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Ends of the colour scale for values of which at least one is known."""
-    low, high = float(values.min()), float(values.max())
-    # equal values get one colour in all maps
-    return (low, high) if low < high else (low - 0.5, high + 0.5)
-
-
-def heat_map(
-    xs: NDArray[Any],
-    ys: NDArray[Any],
-    values: NDArray[np.float64],
-    limits: tuple[float, float],
-    *,
-    ax: Any,
-    texts: NDArray[Any] | None = None,
-) -> Any:
-    """Draw values (rows: ``ys``) with their numbers, or with given texts, into axes; returns the image."""
-    # cividis grows lighter evenly, also to colour-blind eyes and on grey paper
-    image = ax.imshow(values, origin="lower", aspect="auto", cmap="cividis", vmin=limits[0], vmax=limits[1])
-    ax.set_xticks(range(len(xs)), [short(x) for x in xs])
-    ax.set_yticks(range(len(ys)), [short(y) for y in ys])
-    middle = sum(limits) / 2
-    for (i, j), value in np.ndenumerate(values):
-        if not np.isnan(value):
-            color = "black" if value > middle else "white"
-            text = f"{value:.3g}" if texts is None else texts[i, j]
-            ax.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
-    return image
-
-
-def _table(frame: pd.DataFrame, measure: str, across: str, up: str) -> tuple[Any, Any, NDArray[np.float64]]:
-    values = frame.assign(value=FACTORS.get(measure, 1.0) * measured(frame, measure))
-    table = values.pivot_table(index=up, columns=across, values="value", aggfunc="mean", dropna=False)
-    return table.columns.to_numpy(), table.index.to_numpy(), table.to_numpy(dtype=float)
-
-
-def _over_each(summary: pd.DataFrame, names: list[str], panels: list[tuple[str, str]], figure: Any) -> Any:
+def _over_each(summary: pd.DataFrame, names: list[str], panels: list[str], figure: Any) -> Any:
     """Draw each measure with its interval over each parameter."""
     figure.set_size_inches(0.6 + 3.2 * len(names), 0.6 + 2.3 * len(panels))
     axes = figure.subplots(len(panels), len(names), squeeze=False, sharex="col", sharey="row")
-    for row, (measure, title) in zip(axes, panels, strict=True):
+    for row, measure in zip(axes, panels, strict=True):
         factor = FACTORS.get(measure, 1.0)
         middle = factor * summary[measure].to_numpy(dtype=float)
         low, high = (factor * summary[f"{measure}_{end}"].to_numpy(dtype=float) for end in ("low", "high"))
@@ -177,7 +140,7 @@ def _over_each(summary: pd.DataFrame, names: list[str], panels: list[tuple[str, 
             places = column if column.dtype.kind in "iuf" else column.astype(str)
             ax.errorbar(places, middle, yerr=spread, fmt="o", markersize=4, linewidth=1, capsize=2)
             ax.grid(alpha=0.3)
-        row[0].set_ylabel(title)
+        row[0].set_ylabel(LABELS[measure])
     for ax, name in zip(axes[-1], names, strict=True):
         ax.set_xlabel(name)
     return figure
@@ -211,8 +174,9 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
         for place, row in reversed([*enumerate(summary.to_dict("records"))]):
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if place < _MOST_CURVES:
-                style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": title(row, names, several)}
-            curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
+                label = setting_title(row, names, several)
+                style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": label}
+            draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
             ax.set_xscale("log")
         ax.set_xlabel(label)
@@ -226,19 +190,14 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
     return figure
 
 
-def title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -> str:
+def setting_title(row: Mapping[Any, Any], names: Sequence[str], several: bool) -> str:
     """Return what a setting (a row of a summary) is called among the others of its study."""
     words = [str(row["solver"])] if several or not names else []
-    words += [f"{n} {short(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
+    words += [f"{n} {short_text(row[n])}" for n in names if row[n] == row[n] and row[n] is not None]
     return ", ".join(words)
 
 
-def curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
+def draw_curve(traces: pd.DataFrame, column: str, *, ax: Any, **style: Any) -> None:
     """Draw the mean excess of runs over iterations or milliseconds; see `mean_excess`."""
     if not traces.empty:
         ax.plot(*mean_excess(traces, column), drawstyle="steps-post", **style)
-
-
-def short(value: Any) -> str:
-    """Return a parameter's value with four digits."""
-    return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)

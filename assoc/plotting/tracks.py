@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc.errors import InvalidInputError
-from assoc.plotting.axes import axes_or_new, box_around, legend, plan, unit_of
+from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, unit_of
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
@@ -54,10 +54,10 @@ def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = N
     for number, (name, track) in enumerate(tracks.sort_values("time", kind="stable").groupby("track_id")):
         line = unit.factor * track[["x", "y"]].to_numpy(dtype=np.float64)
         label = f"track {name}" if several <= _NAMED else None
-        # after seven the colours come round again with other dashes
+        # after seven the colours repeat with other dashes
         dashes = DASHES[(number + number // len(DASHES)) % len(DASHES)]
         ax.plot(*line.T, color=colour(number), linestyle=dashes, linewidth=1.8, label=label)
         ax.plot(*line[0], "o", color=BLACK, markersize=4, label="first point" if number == 0 else None)
-    plan(ax, box_around(near, far), unit)
+    set_plan_view(ax, box_around(near, far), unit)
     legend(ax)
     return ax

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,6 @@ from assoc._files.npz import Field, load_npz, save_npz
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors import KINDS
-
-if TYPE_CHECKING:
-    from assoc.scene.scene import Scene
-
 
 FORMAT = "assoc.scene"
 VERSION = 1
@@ -40,13 +37,13 @@ _FIELDS = {
 }
 
 
-def save_parts(path: str | os.PathLike[str], scene: Scene) -> None:
-    """Write a scene; see `assoc.scene.Scene.save`."""
-    save_npz(path, FORMAT, VERSION, _to_arrays(scene))
+def save_parts(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
+    """Write the attributes of an `assoc.scene.Scene`; "truth" holds those of its `assoc.scene.Truth`, or None."""
+    save_npz(path, FORMAT, VERSION, _to_arrays(parts))
 
 
 def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the arguments of `assoc.scene.Scene`; "truth" holds those of `assoc.scene.Truth` or None."""
+    """Read what `save_parts` wrote, as arguments of `assoc.scene.Scene` and `assoc.scene.Truth`."""
     arrays = load_npz(path, FORMAT, VERSION, _FIELDS)
     try:
         return _from_arrays(arrays)
@@ -54,14 +51,14 @@ def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InvalidInputError(f"{path}: {error}") from error
 
 
-def _to_arrays(scene: Scene) -> dict[str, Array | str | int]:
-    sensors, scans = scene.sensors, scene.measurements
+def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
+    sensors, scans = parts["sensors"], parts["measurements"]
     blocks = [[scan[s] for scan in scans] for s in range(len(sensors))]
     counts = np.array([[len(z) for z in block] for block in blocks], dtype=np.int64)
     arrays: dict[str, Array | str | int] = {
-        "name": scene.name,
-        "times": scene.times,
-        "region": scene.region,
+        "name": parts["name"],
+        "times": parts["times"],
+        "region": parts["region"],
         "sensor_kind": np.array([sensor.kind for sensor in sensors]),
         "sensor_name": np.array([sensor.name for sensor in sensors]),
         "sensor_position": np.array([sensor.position for sensor in sensors]),
@@ -75,13 +72,13 @@ def _to_arrays(scene: Scene) -> dict[str, Array | str | int]:
             [np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1
         ),
     }
-    truth = scene.truth
+    truth = parts["truth"]
     if truth is not None:
-        arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth.target_ids)], dtype=np.int64)
-        arrays["truth_ids"] = np.concatenate(truth.target_ids)
-        arrays["truth_positions"] = np.concatenate(truth.positions)
-        if truth.sources is not None:
-            flat = [scan[s] for s in range(len(sensors)) for scan in truth.sources]
+        arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth["target_ids"])], dtype=np.int64)
+        arrays["truth_ids"] = np.concatenate(truth["target_ids"])
+        arrays["truth_positions"] = np.concatenate(truth["positions"])
+        if truth["sources"] is not None:
+            flat = [scan[s] for s in range(len(sensors)) for scan in truth["sources"]]
             arrays["measurement_sources"] = np.concatenate(flat)
     return arrays
 

@@ -36,34 +36,29 @@ class Scan:
         """Measurements per sensor, int32 (S,)."""
         return np.array([len(z) for z in self.measurements], dtype=np.int32)
 
+    def true_tuples(self) -> NDArray[np.int32] | None:
+        """The tuples of the targets that at least two sensors detected.
+
+        Returns
+        -------
+        int32 array (T, S), or None
+            In order of target id; None where the sources are not known. A target of which one sensor has several
+            measurements has no tuple and is left out.
+        """
+        if self.sources is None:
+            return None
+        count = len(self.sources)
+        ids = np.unique(np.concatenate([*self.sources, np.zeros(0, np.int64)]))
+        ids = ids[ids >= 0]
+        tuples = np.zeros((len(ids), count), dtype=np.int32)
+        single = np.ones(len(ids), dtype=bool)
+        for sensor, source in enumerate(self.sources):
+            detected = np.flatnonzero(source >= 0)
+            row = np.searchsorted(ids, source[detected])
+            tuples[row, sensor] = detected + 1
+            single &= np.bincount(row, minlength=len(ids)) <= 1
+        return tuples[single & (np.count_nonzero(tuples, axis=1) >= 2)]
+
     def __repr__(self) -> str:
         sizes = " + ".join(str(len(z)) for z in self.measurements)
         return f"Scan({self.index}, t = {self.time:g} s, {sizes} measurements)"
-
-
-def true_tuples(scan: Scan) -> NDArray[np.int32] | None:
-    """The tuples of the targets that at least two sensors detected.
-
-    Parameters
-    ----------
-    scan : Scan
-
-    Returns
-    -------
-    int32 array (T, S), or None
-        In order of target id; None where the sources are not known. A target of which one sensor has several
-        measurements has no tuple and is left out.
-    """
-    if scan.sources is None:
-        return None
-    count = len(scan.sources)
-    ids = np.unique(np.concatenate([*scan.sources, np.zeros(0, np.int64)]))
-    ids = ids[ids >= 0]
-    tuples = np.zeros((len(ids), count), dtype=np.int32)
-    single = np.ones(len(ids), dtype=bool)
-    for sensor, source in enumerate(scan.sources):
-        real = np.flatnonzero(source >= 0)
-        row = np.searchsorted(ids, source[real])
-        tuples[row, sensor] = real + 1
-        single &= np.bincount(row, minlength=len(ids)) <= 1
-    return tuples[single & (np.count_nonzero(tuples, axis=1) >= 2)]

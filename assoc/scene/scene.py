@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._text.html import escape, table
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.file import load_parts, save_parts
@@ -154,7 +155,8 @@ class Scene:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as an npz file of format "assoc.scene"; the file appears whole or not at all."""
-        save_parts(path, self)
+        # vars: the dataclass as it is, without the copies that dataclasses.asdict makes
+        save_parts(path, {**vars(self), "truth": None if self.truth is None else vars(self.truth)})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -182,8 +184,6 @@ class Scene:
 
     def _repr_html_(self) -> str:
         """Return what notebooks and reports show: one row a sensor."""
-        from assoc._text.html import escape, table
-
         rows = []
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
@@ -213,7 +213,7 @@ def default_region(sensors: Sequence[Sensor]) -> Array:
             boxes.append(sensor.field_of_view[:2])
     places = np.array([sensor.position for sensor in sensors])
     if not boxes:
-        # bearings alone say nothing of distance: take the surroundings of the sensors, at least 100 km
+        # bearings contain no distance: take the surroundings of the sensors, at least 100 km
         reach = max(100_000.0, float(np.ptp(places[:, :2], axis=0).max()))
         boxes.append(np.stack([places[:, :2].min(axis=0) - reach, places[:, :2].max(axis=0) + reach], axis=1))
     floor = float(places[:, 2].min())

@@ -13,7 +13,7 @@ from assoc.sensors.base import finite_array
 
 
 def integers(value: object, what: str, length: int) -> Array:
-    """Return whole numbers as a read-only int64 array (length,), or complain about ``what`` they are."""
+    """Return whole numbers as a read-only int64 array (length,), or raise an error that names them ``what``."""
     array = np.asarray(value)
     if array.size == 0:
         array = array.astype(np.int64)
@@ -28,7 +28,7 @@ def integers(value: object, what: str, length: int) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth:
-    """What really was there.
+    """The true targets.
 
     Parameters
     ----------

@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from assoc._system.lazy import lazy_names
 
 if TYPE_CHECKING:
     from assoc.sweeps.design import grid, random_settings, settings_from
@@ -16,18 +17,6 @@ if TYPE_CHECKING:
     from assoc.sweeps.study import Study
     from assoc.sweeps.summary import summarize
     from assoc.sweeps.tuning import tune
-
-_HOME = {
-    "Setting": "setting",
-    "Study": "study",
-    "grid": "design",
-    "load": "frame",
-    "load_traces": "frame",
-    "random_settings": "design",
-    "settings_from": "design",
-    "summarize": "summary",
-    "tune": "tuning",
-}
 
 __all__ = [
     "Setting",
@@ -41,11 +30,17 @@ __all__ = [
     "tune",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home on first use (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'assoc.sweeps' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"assoc.sweeps.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "Setting": "setting",
+        "Study": "study",
+        "grid": "design",
+        "load": "frame",
+        "load_traces": "frame",
+        "random_settings": "design",
+        "settings_from": "design",
+        "summarize": "summary",
+        "tune": "tuning",
+    },
+)

@@ -20,7 +20,7 @@ def mean_interval(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> tuple[float, float]:
-    """Interval of the mean over problems and repeats, both drawn anew with replacement.
+    """Interval of the mean over problems and repeats, both resampled with replacement.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def mean_interval(
 
 
 def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Floats:
-    """Means of several settings over the same redrawn problems and repeats, to compare them in pairs.
+    """Means of several settings over the same resampled problems and repeats, to compare them in pairs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A digest of the code that results depend on: the version alone does not change while one develops."""
+"""A digest of the code that results depend on; during development the version does not change, but this does."""
 
 from __future__ import annotations
 

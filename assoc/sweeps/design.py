@@ -15,7 +15,7 @@ from assoc.sweeps.setting import Setting, parameter
 from assoc.sweeps.space import Range, Space, read_text, read_value
 
 MOST_SETTINGS = 1_000_000
-"""A design of more settings is refused: it is a slip of the keyboard."""
+"""A design of more settings is refused: it is a typing error."""
 
 
 def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
@@ -140,7 +140,7 @@ def _owners(name: str, solvers: list[str], label: str) -> list[str]:
         except InvalidInputError as error:
             complaints.append(str(error))
     if not owners:
-        # the one that knows a near name says most
+        # the error that suggests a similar name helps most
         complaints.sort(key=lambda text: "did you mean" not in text)
         raise InvalidInputError(f"{label}: {complaints[0]}")
     return owners

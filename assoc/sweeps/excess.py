@@ -1,4 +1,4 @@
-"""How far above the best known cost the runs of a study end, and where they are over time."""
+"""The excess of runs over the best known cost: at the end, and over time."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
     best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
     traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
     excess = traces["cost"] - traces["best"]
-    # what rounding leaves is no excess
+    # rounding errors are no excess
     return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
 
 
 def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average the excess of runs over time; a run counts with what it has found by then.
+    """Average the excess of runs over time; each run counts with its best solution so far.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a study runs on, and a digest of it: the same content is the same source whatever its file is called."""
+"""What a study runs on, and a digest of it: the same content is the same source, whatever the name of its file."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from assoc.association.source import load_source
+from assoc.association.source import Source, load_source
 from assoc.errors import InvalidInputError
-from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 
 
 @dataclass(frozen=True)
-class Source:
+class StudySource:
     """A scene or a problem under its name.
 
     Parameters
@@ -32,7 +31,7 @@ class Source:
         Sixteen hexadecimal digits of the digest of all arrays.
     """
 
-    content: Scene | AssignmentProblem
+    content: Source
     name: str
     fingerprint: str = field(default="")
 
@@ -46,7 +45,7 @@ class Source:
         return self.content.num_scans if isinstance(self.content, Scene) else 1
 
 
-def fingerprint(content: Scene | AssignmentProblem) -> str:
+def fingerprint(content: Source) -> str:
     """Digest of what a file of it would hold (its arrays; not the archive's dates)."""
     digest = hashlib.sha256(type(content).__name__.encode())
     with tempfile.TemporaryDirectory(prefix="assoc-") as folder:
@@ -58,7 +57,7 @@ def fingerprint(content: Scene | AssignmentProblem) -> str:
     return digest.hexdigest()[:16]
 
 
-def load_sources(files: Sequence[str]) -> tuple[Source, ...]:
+def load_sources(files: Sequence[str]) -> tuple[StudySource, ...]:
     """Load scenes and problems from files.
 
     Raises
@@ -66,10 +65,10 @@ def load_sources(files: Sequence[str]) -> tuple[Source, ...]:
     InvalidInputError
         A file is neither, or the same content is given twice.
     """
-    return named([load_source(file) for file in files], files)
+    return named_sources([load_source(file) for file in files], files)
 
 
-def named(contents: Sequence[Scene | AssignmentProblem], files: Sequence[str]) -> tuple[Source, ...]:
+def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
     """Sources under the names of their files: the last part of the path where that tells them apart.
 
     Raises
@@ -79,7 +78,7 @@ def named(contents: Sequence[Scene | AssignmentProblem], files: Sequence[str]) -
     """
     short = [os.path.basename(file) for file in files]
     names = files if len(set(short)) < len(short) else short
-    sources = tuple(Source(content, name) for content, name in zip(contents, names, strict=True))
+    sources = tuple(StudySource(content, name) for content, name in zip(contents, names, strict=True))
     seen: dict[str, str] = {}
     for source, file in zip(sources, files, strict=True):
         if source.fingerprint in seen:

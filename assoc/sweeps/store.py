@@ -27,7 +27,7 @@ LOG = "runs.jsonl"
 REPORT = "tuning.json"
 
 _NEW_MANIFEST = (
-    f"the runs in {LOG} are unharmed: begin the same sweep in a new folder, and put the {MANIFEST} of that one here"
+    f"the runs in {LOG} are not affected: start the same sweep in a new folder, and copy its {MANIFEST} here"
 )
 
 COLUMNS = (
@@ -53,7 +53,7 @@ RunKey = tuple[str, str, int, int]
 
 @dataclass(frozen=True)
 class Manifest:
-    """What all runs of a study have in common; another study cannot go on in its folder.
+    """What all runs of a study have in common; a folder takes runs of one study only.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Manifest:
         }
 
     def check_same(self, new: Manifest, folder: Path) -> None:
-        """Refuse to go on with something else."""
+        """Refuse to continue with another study."""
         elsewhere = "take another folder"
         if self.package != new.package:
             raise InvalidInputError(
@@ -137,7 +137,7 @@ class Store:
         if not (self.folder / MANIFEST).exists() and (self.folder / LOG).exists():
             raise InvalidInputError(f"{self.folder}: {MANIFEST} is missing; {_NEW_MANIFEST}")
         if not (self.folder / MANIFEST).exists() and any(self.folder.glob("[!.]*")):
-            raise InvalidInputError(f"{self.folder}: holds other files and no study; take a new or an empty folder")
+            raise InvalidInputError(f"{self.folder}: contains other files and no study; use a new or an empty folder")
         self._lock = _lock(self.folder)
         try:
             if (self.folder / MANIFEST).exists():
@@ -202,7 +202,7 @@ class Store:
         entries: list[Mapping[str, Any]] = [
             {"setting_key": key, "solver": one.solver, "parameters": dict(one.parameters)} for key, one in new.items()
         ]
-        data = memoryview(b"".join(_line(entry) for entry in [*entries, batch]))
+        data = memoryview(b"".join(log_line(entry) for entry in [*entries, batch]))
         path = self.folder / LOG
         before = os.fstat(self._log.fileno()).st_size
         try:
@@ -210,7 +210,7 @@ class Store:
                 data = data[self._log.write(data) :]
             os.fsync(self._log.fileno())
         except BaseException as error:
-            # half a line would spoil the one that is written after it when there is room again
+            # half a line would damage the next one, which is written when the disk has room again
             with suppress(OSError):
                 os.ftruncate(self._log.fileno(), before)
             if not isinstance(error, OSError):
@@ -224,7 +224,7 @@ class Store:
         return len(fresh)
 
     def close(self) -> None:
-        """Close the files and let others in."""
+        """Close the files and release the folder."""
         self._log.close()
         self._lock.close()
 
@@ -281,7 +281,7 @@ def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
         with open(path, "rb") as file:
             for line in file:
                 if line != b"\n":
-                    yield _read_line(line)
+                    yield _read_log_line(line)
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -291,16 +291,17 @@ def damaged_lines(folder: str | os.PathLike[str]) -> int:
     return sum(entry is None for entry in read_log(folder))
 
 
-def _line(entry: Mapping[str, Any]) -> bytes:
+def log_line(entry: Mapping[str, Any]) -> bytes:
+    """Return a line of the log: the checksum of an entry, and the entry as JSON."""
     body = json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(body), body)
 
 
-def _read_line(line: bytes) -> dict[str, Any] | None:
+def _read_log_line(line: bytes) -> dict[str, Any] | None:
     body = line[9:-1]
     if line[-1:] != b"\n" or line[:9] != b"%08x " % zlib.crc32(body):
         return None
-    # the checksum keeps out accidents, not people
+    # the checksum detects accidents, not manipulation
     try:
         entry = json.loads(body)
     except (ValueError, RecursionError):
@@ -350,7 +351,7 @@ _KINDS: Mapping[str, Callable[[object], bool]] = {
 
 
 def _lock(folder: Path) -> IO[bytes]:
-    """Hold the folder against a second process; the lock goes with the process, however it ends."""
+    """Lock the folder against a second process; the lock ends with the process, however that ends."""
     path = folder / ".lock"
     try:
         file = open(path, "ab")
@@ -358,13 +359,13 @@ def _lock(folder: Path) -> IO[bytes]:
         raise InvalidInputError(f"{folder}: cannot be written ({error.strerror or error})") from None
     try:
         import fcntl
-    except ImportError:  # not a POSIX system: two processes at once are then the user's care
+    except ImportError:  # not a POSIX system: users must then avoid two processes at once
         return file
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         file.close()
-        raise InvalidInputError(f"{folder}: another sweep is at work in this folder") from None
+        raise InvalidInputError(f"{folder}: another sweep is running in this folder") from None
     except OSError:  # a file system without locks
         pass
     return file

@@ -1,4 +1,4 @@
-"""A study: settings, sources and repeats; what is done is kept, and only what is missing is run."""
+"""A study: settings, sources and repeats; results are kept, and only missing runs are run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.sweeps.backends.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import Manifest, RunKey, Store
 from assoc.sweeps.worker import Job, Result
 
@@ -21,7 +21,7 @@ Progress = Callable[["Counts"], object]
 
 @dataclass
 class Counts:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Counts:
 
 @dataclass(frozen=True)
 class Study:
-    """A design on its sources.
+    """Settings to run on scenes and problems.
 
     Parameters
     ----------
-    sources : sequence of Source
+    sources : sequence of StudySource
         Scenes and problems. Each scan is a run of its own.
     settings : sequence of Setting
     repeats : int, or range
@@ -72,7 +72,7 @@ class Study:
         No settings or no sources, or numbers out of range.
     """
 
-    sources: Sequence[Source]
+    sources: Sequence[StudySource]
     settings: Sequence[Setting]
     repeats: int | range = 1
     seed: int = 0
@@ -106,9 +106,9 @@ class Study:
         return len(self.settings) * len(self.repeats) * sum(map(len, self.scans))
 
     def all_runs(self) -> Iterator[RunNumbers]:
-        """All runs, as (setting, source, repeat, scan): first all settings once, so that a part tells something."""
+        """All runs, as (setting, source, repeat, scan): all settings once before the next repeat."""
         assert self.scans is not None and isinstance(self.repeats, range)
-        # loops, not itertools.product, which would first write down all repeats, however many they are
+        # loops, because itertools.product would first make a list of all repeats, however many there are
         for repeat in self.repeats:
             for source, scans in enumerate(self.scans):
                 for setting in range(len(self.settings)):
@@ -117,7 +117,7 @@ class Study:
 
     def missing(self, store: Store) -> Iterator[RunNumbers]:
         """Those runs that the store does not have."""
-        # a copy: what is appended while we go on is not asked for again anyway
+        # a copy: runs that are added meanwhile are not asked for again
         done = frozenset(store.done)
         return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
 
@@ -169,9 +169,9 @@ class Study:
         jobs: int = 1,
         scheduler: str | None = None,
         progress: Progress | None = None,
-        take: Callable[[Result], object] | None = None,
+        on_result: Callable[[Result], object] | None = None,
     ) -> Counts:
-        """Do as `run` does, in a store that is open; ``take`` is called with each result that is kept."""
+        """Do as `run` does, in a store that is open; ``on_result`` is called with each result that is kept."""
         from assoc.sweeps.backends import dask, local
 
         missing = sum(1 for _ in self.missing(store))
@@ -195,8 +195,8 @@ class Study:
                 counts.new += store.append(result.batch.settings, result.columns)
                 counts.solving += sum(time or 0.0 for time in result.columns["time"])
                 batches.learn(result)
-                if take is not None:
-                    take(result)
+                if on_result is not None:
+                    on_result(result)
                 if progress is not None:
                     progress(counts)
         finally:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+INTERVAL = "95 %"
+"""Header of the interval of the measure before it."""
+
 MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
 """What is averaged; "correct" is the share of the true tuples that were found."""
+
+FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
+"""What measures are multiplied by where people read them: per cent, milliseconds."""
 
 
 def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
@@ -87,7 +92,7 @@ def measured(runs: pd.DataFrame, measure: str) -> Floats:
     if measure == "optimal":
         return np.where(runs["cost"].isna(), np.nan, values)
     if measure == "gap":
-        # what rounding leaves of a closed gap says nothing
+        # a gap of the size of rounding errors is 0
         values = np.where(values <= 1e-9 * np.maximum(1.0, runs["cost"].abs()), 0.0 * values, values)
     return np.where(np.isfinite(values), values, np.nan)
 
@@ -97,46 +102,35 @@ def numbers(column: pd.Series[Any]) -> Floats:
     return column.to_numpy(dtype=float, na_value=np.nan)
 
 
-def print_summary(summary: pd.DataFrame, most: int | None = None) -> None:
-    """Print the table to stdout: drawn on a terminal, plain columns elsewhere."""
-    headers, cells = _cells(summary)
-    shown = cells if most is None else cells[:most]
-    if sys.stdout.isatty():
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
+def summary_rows(summary: pd.DataFrame, *, brief: bool = False) -> tuple[list[str], list[list[str]]]:
+    """Headers and cells of a summary for people; the columns before "runs" say which setting a row is.
 
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        for header in headers:
-            table.add_column(header, justify="right")
-        for row in shown:
-            table.add_row(*row)
-        Console().print(table)
-    else:
-        widths = [max(len(row[i]) for row in [headers, *shown]) for i in range(len(headers))]
-        for row in [headers, *shown]:
-            print("  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)).rstrip())
-    if len(shown) < len(cells):
-        print(f"... and {len(cells) - len(shown)} more settings")
-
-
-def _cells(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    Parameters
+    ----------
+    summary : DataFrame
+        Of `summarize`.
+    brief : bool, default False
+        Leave out the intervals of measures that are the same in all runs.
+    """
     parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
     measures = [name for name in MEASURES if summary[name].notna().any()]
     infeasible = ["infeasible"] if summary["infeasible"].any() else []
     titles = {"gap": "mean gap", "cost": "mean cost", "optimal": "optimal %", "time": "ms", "correct": "correct %"}
     headers = ["solver", *map(str, parameters), "runs", *infeasible]
     for name in measures:
-        headers += [titles.get(name, name), "95 %"]
+        headers += [titles.get(name, name), INTERVAL]
     cells = []
     for row in summary.to_dict("records"):
         line = [str(row["solver"]), *(_value(row[name]) for name in parameters), str(row["runs"])]
         line += [str(row[name]) for name in infeasible]
         for name in measures:
-            factor = {"optimal": 100.0, "correct": 100.0, "time": 1e3}.get(name, 1.0)
+            factor = FACTORS.get(name, 1.0)
             line.append(_number(factor * row[name], name))
             line.append(_interval([factor * row[f"{name}_low"], factor * row[f"{name}_high"]], name))
         cells.append(line)
+    if brief:
+        kept = [i for i, header in enumerate(headers) if header != INTERVAL or any(_spread(row, i) for row in cells)]
+        headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
 
 
@@ -152,6 +146,11 @@ def _number(value: float, name: str) -> str:
     if name == "cost":
         return f"{value:.4f}"
     return f"{value:.2f}" if name in ("optimal", "correct", "iterations") else f"{value:.3g}"
+
+
+def _spread(row: Sequence[str], column: int) -> bool:
+    """Whether the interval in a column says more than the value before it."""
+    return row[column] not in ("-", f"{row[column - 1]} .. {row[column - 1]}")
 
 
 def _interval(ends: Sequence[float], name: str) -> str:

@@ -1,4 +1,4 @@
-"""A search for good parameters, and an honest report: on seeds and scans that the search never saw."""
+"""A search for good parameters, and a report on seeds and scans that were held out of the search."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from assoc.solvers import registry
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.frame import load
 from assoc.sweeps.setting import Setting, parameter
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.space import Range, Space, Values
 from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
 from assoc.sweeps.study import Counts, Study
@@ -71,7 +71,7 @@ class Report:
 
 def tune(
     folder: str | os.PathLike[str],
-    sources: Sequence[Source],
+    sources: Sequence[StudySource],
     solver: str,
     space: Mapping[str, Space] | None = None,
     trials: int = 100,
@@ -93,7 +93,7 @@ def tune(
     Parameters
     ----------
     folder : path-like
-    sources : sequence of Source
+    sources : sequence of StudySource
     solver : str
     space : mapping, optional
         Values or range of each parameter; without it the solver's numbers from a quarter of their default to
@@ -148,7 +148,7 @@ def tune(
                 if progress is not None:
                     progress(total)
 
-            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, take=memory.take)
+            part.run_in(store, jobs=jobs, scheduler=scheduler, progress=shown, on_result=memory.add)
             return part
 
         length = sum(map(len, training)) * repeats
@@ -262,7 +262,7 @@ class _Memory:
             if entry is not None and "setting_key" not in entry:
                 self._add(entry)
 
-    def take(self, result: Result) -> None:
+    def add(self, result: Result) -> None:
         self._add(result.columns)
 
     def _add(self, columns: Mapping[str, list[Any]]) -> None:

@@ -1,4 +1,4 @@
-"""What a worker does: a batch of runs, each from a seed of its own, on scenes that it was given once."""
+"""What a worker does: a batch of runs, each with its own seed, on scenes that it gets once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from assoc.sweeps.store import COLUMNS
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Result:
-    """What came out of a batch: the columns of `store.COLUMNS`, and the seconds it all took."""
+    """The results of a batch: the columns of `store.COLUMNS`, and the seconds of the whole batch."""
 
     batch: Batch
     columns: dict[str, list[Any]]
@@ -61,7 +61,7 @@ class Job:
 
     Parameters
     ----------
-    sources : tuple of Source
+    sources : tuple of StudySource
     seed : int
         Of the study.
     time_limit : float or None
@@ -74,7 +74,7 @@ class Job:
         Digest of its solvers, which the worker's must have, too.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[StudySource, ...]
     seed: int
     time_limit: float | None
     gating: Mapping[str, Any]
@@ -88,7 +88,7 @@ class Job:
     _busy: Any = field(default_factory=threading.Lock, compare=False)
 
     def __reduce__(self) -> Any:
-        # what a worker keeps beside stays with that worker
+        # a worker's cache is not sent to others
         return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package, self.code)
 
     def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
@@ -111,26 +111,25 @@ class Job:
         from assoc.costs import build_problem
         from assoc.packing.prepare import prepare
         from assoc.problem import AssignmentProblem
-        from assoc.scene.scan import true_tuples
 
         content = self.sources[source].content
         if isinstance(content, AssignmentProblem):
             prepare(content)
             return content, None
-        one = content.scan(scan)
-        problem, truth = build_problem(content, one, **self.gating), true_tuples(one)
-        # runs share the problem: the first one must not pay for its preparation in its time
+        measured = content.scan(scan)
+        problem, truth = build_problem(content, measured, **self.gating), measured.true_tuples()
+        # runs share the problem: its preparation must not count in the time of the first
         prepare(problem)
         return problem, None if truth is None else {*map(tuple, truth.tolist())}
 
     def seed_of(self, setting: Setting, source: int, repeat: int, scan: int) -> int:
-        """Seed of a run: of what the run is, and not of where or when it is done."""
+        """Seed of a run; it depends on what is run, not on where or when."""
         words = (*setting.words, int(self.sources[source].fingerprint[:8], 16), repeat, scan)
         sequence = np.random.SeedSequence(self.seed, spawn_key=words)
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
-        """Let a family of settings load most of its code on its first problem, at the most for a second."""
+        """Let a family of settings load most of its code on its first problem, for at most a second."""
         from assoc.solvers.assign import assign
 
         if setting.family in self._warm:
@@ -143,7 +142,7 @@ class Job:
         self._warm.add(setting.family)
 
     def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
-        """Solve a problem in a time that is the solver's own.
+        """Solve a problem so that the time is the solver's alone.
 
         A run during which code was compiled or loaded, or a module imported, is done again: no choice of problems
         to warm up on is sure to need all of the code that a later one needs.
@@ -160,7 +159,7 @@ class Job:
 
 
 def run_batch(job: Job, batch: Batch) -> Result:
-    """Do some runs, one after the other.
+    """Do the runs of a batch, one after the other.
 
     Raises
     ------
@@ -173,7 +172,7 @@ def run_batch(job: Job, batch: Batch) -> Result:
     if __version__ != job.package:
         raise InvalidInputError(f"a worker has version {__version__} of assoc, this is {job.package}")
     if code_digest() != job.code:
-        raise InvalidInputError("a worker has other code of assoc than this process, though of the same version")
+        raise InvalidInputError("a worker has other code of assoc than this process, with the same version")
     columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     for run in batch.runs:
         for name, value in zip(COLUMNS, _row(job, batch.settings[run[0]], *run[1:]), strict=True):

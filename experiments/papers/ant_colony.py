@@ -75,9 +75,9 @@ class Measured:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
-    from assoc._cli.program import run
+    from assoc._cli.program import run_program
 
-    return run(lambda: _main(arguments), "experiments.papers.ant_colony")
+    return run_program(lambda: _main(arguments), "experiments.papers.ant_colony")
 
 
 def _main(arguments: Sequence[str] | None) -> None:
@@ -136,18 +136,18 @@ def _parser() -> argparse.ArgumentParser:
 
 def run_study(folder: str, seed: int, scans: int, seeds: int, jobs: int) -> pd.DataFrame:
     """Run all settings in both modes."""
-    from assoc._cli.progress import Bar
+    from assoc._cli.progress import ProgressBar
     from assoc.simulation import simulate
     from assoc.sweeps import Setting, Study, load
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     settings = [
         Setting("aco", {"mode": mode, "ants": ANTS, "alpha": alpha, "beta": beta, "rho": rho})
         for mode in MODES
         for alpha, beta, rho in PAPER
     ]
-    scene = Source(simulate("three-radar", seed, scans=scans), "three-radar")
-    with Bar(sys.stderr) as bar:
+    scene = StudySource(simulate("three-radar", seed, scans=scans), "three-radar")
+    with ProgressBar("runs", "runs") as bar:
         Study([scene], settings, seeds, seed).run(folder, jobs=jobs, progress=bar)
     frame = load(folder)
     keys = {setting.key for setting in settings}

@@ -11,7 +11,6 @@ import assoc
 from assoc.association import Association, associate
 from assoc.association.plan import Plan
 from assoc.scene import Scene, Truth
-from assoc.scene.scan import true_tuples
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 
@@ -71,9 +70,9 @@ def test_correct_means_exactly_the_measurements_of_a_target(by_hand):
 
 
 def test_true_tuples(by_hand):
-    assert true_tuples(by_hand.scan(0)).tolist() == [[2, 1, 1], [1, 0, 2]]
+    assert by_hand.scan(0).true_tuples().tolist() == [[2, 1, 1], [1, 0, 2]]
     scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION)
-    assert true_tuples(scene.scan(0)) is None
+    assert scene.scan(0).true_tuples() is None
     totals = associate(scene, "greedy").totals()
     assert totals["true_tuples"] is None and totals["share_correct"] is None
     # one sensor with two measurements of target 4: it has no tuple
@@ -81,7 +80,7 @@ def test_true_tuples(by_hand):
         [np.array([4])], [np.zeros((1, 3))], [[np.array([4, 4]), np.array([4, -1]), np.full(3, -1)]]
     )
     scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, twice)
-    assert true_tuples(scene.scan(0)).tolist() == []
+    assert scene.scan(0).true_tuples().tolist() == []
 
 
 def test_a_single_measurement_is_a_target_only_at_negative_cost():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from assoc.simulation import simulate
 from assoc.sweeps import Study
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from experiments import sweep_overhead
 
 
 def test_overhead_in_one_process():
-    scene = Source(simulate("three-radar", 1, scans=5), "scene")
+    scene = StudySource(simulate("three-radar", 1, scans=5), "scene")
     study = Study([scene], [sweep_overhead.KINDS["greedy"]], 100)
     overhead, processor, start, solving = sweep_overhead._overhead(study, "one process")
     # of the order of what it is: never nothing, and never a second

@@ -194,10 +194,10 @@ def test_pheromone_gathers_on_what_is_chosen(ax):
 
 def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):
     from assoc.sweeps import Study, grid, load
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     settings = grid("aco", {"mode": ["paper"], "alpha": [1, 2], "rho": [0.3, 0.6, 0.9]})
-    Study([Source(scene, "scene")], settings, 2).run(tmp_path / "s")
+    Study([StudySource(scene, "scene")], settings, 2).run(tmp_path / "s")
     frame = load(tmp_path / "s")
     plotting.plot_heat_map(frame, "iterations", ("alpha", "rho"), ax=ax)
     texts = [text.get_text() for text in ax.texts]

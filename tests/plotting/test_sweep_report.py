@@ -10,7 +10,7 @@ import pytest
 from assoc.plotting.report import write_sweep_report
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid, load, summarize
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
 
@@ -19,7 +19,7 @@ from tests.plotting.test_association_report import EVIL, data_of, parsed
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("study") / "study"
     settings = grid("aco", {"mode": ["paper"], "alpha": [1, 2, 3], "rho": [0.3, 0.9]})
-    Study([Source(simulate("three-radar", 2, scans=4), EVIL)], settings, 3).run(path)
+    Study([StudySource(simulate("three-radar", 2, scans=4), EVIL)], settings, 3).run(path)
     return path
 
 
@@ -65,7 +65,7 @@ def test_what_made_it_is_said_and_text_is_text(page):
 
 def test_studies_without_maps_and_without_runs(tmp_path):
     settings = grid("greedy", {})
-    study = Study([Source(simulate("three-radar", 2, scans=2), "s")], settings, 1)
+    study = Study([StudySource(simulate("three-radar", 2, scans=2), "s")], settings, 1)
     study.run(tmp_path / "study")
     write_sweep_report(tmp_path / "one.html", tmp_path / "study")
     assert data_of(tmp_path / "one.html")["maps"] == []

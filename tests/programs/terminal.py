@@ -8,14 +8,14 @@ import sys
 from collections.abc import Sequence
 
 
-def shown(words: Sequence[object], *, only_errors: bool = False, **options: object) -> str:
-    """Run ``python -m words`` on a pseudo terminal and return what it shows; ``only_errors``: of stderr alone."""
+def shown(words: Sequence[object], *, only_errors: bool = False, columns: int = 200, **options: object) -> str:
+    """Run ``python -m words`` on a pseudo terminal and return what it shows; of stderr alone with ``only_errors``."""
     main, side = os.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", *map(str, words)],
         stdout=subprocess.DEVNULL if only_errors else side,
         stderr=side,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "200"},
+        env={**os.environ, "TERM": "xterm", "COLUMNS": str(columns)},
         **options,
     )
     os.close(side)

@@ -159,7 +159,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--solver", "aco", "--rho", "high"], "--rho: expected a number, got 'high'"),
         (["s.npz", "--solver", "aco", "--mode", "quick"], "mode"),
         (["s.npz", "--json", "no/such/o.json"], "does not exist"),
-        (["s.npz", "--json", "s.npz"], "s.npz: is given twice, or would overwrite what is read"),
+        (["s.npz", "--json", "s.npz"], "s.npz: is given twice, or would overwrite an input file"),
         (["s.npz", "--csv", "."], "is a folder"),
         (["s.npz", "none.npz"], "none.npz: no such file"),
         (["s.npz", "--config", "none.toml"], "none.toml: cannot be read"),

@@ -113,7 +113,7 @@ BAD = {
     "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
-    "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is for --tracker mht-hypothesis"),
+    "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
     "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
     "gate": (["SCENE", "--gate-probability", "2"], "gate_probability must be above 0 and below 1"),
     "noise": (["SCENE", "--process-noise", "-1"], "--process-noise must be a number >= 0"),
@@ -122,7 +122,7 @@ BAD = {
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
     "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, none"),
-    "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite what is read"),
+    "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
     "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }
 

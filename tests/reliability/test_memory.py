@@ -152,10 +152,10 @@ def test_repeats_are_not_written_down() -> None:
     import itertools
 
     from assoc.sweeps import Study, grid
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     problem = gated_problem(np.random.default_rng(0), (3, 3, 3), 0.5)
-    study = Study(sources=[Source(problem, "p")], settings=grid("greedy"), repeats=10**12)
+    study = Study(sources=[StudySource(problem, "p")], settings=grid("greedy"), repeats=10**12)
     assert list(itertools.islice(study.all_runs(), 3)) == [(0, 0, 0, 0), (0, 0, 1, 0), (0, 0, 2, 0)]
 
 

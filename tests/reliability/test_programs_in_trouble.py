@@ -87,13 +87,13 @@ def test_names_that_are_no_text(work, capsys):
 
 def test_what_cannot_be_written_leaves_the_rest(work, capsys, monkeypatch):
     """A disk that fills up while a solve is at work costs one output, and not the answer."""
-    from assoc.association import association
+    from assoc import solve
     from assoc.errors import InvalidInputError
 
     def full(path, content):
         raise InvalidInputError(f"{path}: cannot be written (No space left on device)")
 
-    monkeypatch.setattr(association, "write_json", full)
+    monkeypatch.setattr(solve, "write_json", full)
     assert main("assoc.solve", "scene.npz", "--solver", "greedy", "--json", "o.json", "--csv", "o.csv") == 2
     printed = capsys.readouterr()
     assert printed.err == "assoc.solve: error: o.json: cannot be written (No space left on device)\n"

@@ -153,8 +153,8 @@ def test_threads_write_with_the_mode_that_was_asked_for(tmp_path):
 INTERRUPTED = """
 import sys, time
 from assoc._files.output import write_atomically
-from assoc._cli.program import begin
-begin("assoc.test")
+from assoc._cli.program import prepare_process
+prepare_process("assoc.test")
 def writer(file):
     file.write(b"half of the new")
     file.flush()
@@ -185,10 +185,10 @@ def test_a_study_goes_on_when_the_disk_has_room_again(disk, monkeypatch):
     from assoc.simulation import simulate
     from assoc.sweeps import Study, grid
     from assoc.sweeps.backends import local
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
     monkeypatch.setattr(local, "SECONDS_OF_A_BATCH", 0.02)
-    scene = Source(simulate("three-radar", 2, scans=5), "scene")
+    scene = StudySource(simulate("three-radar", 2, scans=5), "scene")
     study = Study([scene], grid("greedy"), 60)
     (disk / "filler").write_bytes(bytes(200 * 1024 - 5 * 4096))
     with pytest.raises(InvalidInputError, match="No space left on device.*the same command goes on from there"):

@@ -6,7 +6,7 @@ import pytest
 
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 
 
 @pytest.fixture(scope="session")
@@ -18,4 +18,4 @@ def scene():
 def study(scene):
     """Ant colony of the paper: 4 settings, 2 repeats, 5 scans."""
     settings = grid("aco", {"mode": ["paper"], "alpha": [1, 2], "rho": [0.3, 0.9]})
-    return Study([Source(scene, "scene")], settings, 2)
+    return Study([StudySource(scene, "scene")], settings, 2)

@@ -45,9 +45,9 @@ def slow(scene_of_module):
 @pytest.fixture(scope="module")
 def scene_of_module():
     from assoc.simulation import simulate
-    from assoc.sweeps.sources import Source
+    from assoc.sweeps.sources import StudySource
 
-    return Source(simulate("three-radar", 2, scans=5), "scene")
+    return StudySource(simulate("three-radar", 2, scans=5), "scene")
 
 
 @pytest.fixture(scope="module")
@@ -228,7 +228,7 @@ def test_a_job_that_someone_changed_is_not_loaded(slow, tmp_path):
     import os
     import pickle
 
-    from assoc.sweeps.backends.local import _digest, _run
+    from assoc.sweeps.backends.local import content_digest, run_in_process
     from assoc.sweeps.worker import Batch
 
     class Trap:
@@ -238,5 +238,6 @@ def test_a_job_that_someone_changed_is_not_loaded(slow, tmp_path):
     path = tmp_path / "job"
     path.write_bytes(pickle.dumps(Trap()))
     with pytest.raises(InvalidInputError, match="was changed by someone else"):
-        _run(str(path), _digest(b"the job"), os.getpid(), Batch(tuple(slow.settings[:1]), [(0, 0, 0, 0)]))
+        batch = Batch(tuple(slow.settings[:1]), [(0, 0, 0, 0)])
+        run_in_process(str(path), content_digest(b"the job"), os.getpid(), batch)
     assert not (tmp_path / "executed").exists()

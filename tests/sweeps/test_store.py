@@ -13,8 +13,8 @@ from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
-from assoc.sweeps.sources import Source, named
-from assoc.sweeps.store import LOG, MANIFEST, Store, _line, damaged_lines, run_keys
+from assoc.sweeps.sources import StudySource, named_sources
+from assoc.sweeps.store import LOG, MANIFEST, Store, damaged_lines, log_line, run_keys
 
 
 def same(one, other):
@@ -104,7 +104,7 @@ def test_a_line_with_a_right_checksum_and_wrong_content_is_passed_over(whole, co
     at = next(i for i, line in enumerate(lines) if b'"scan"' in line)
     entry = json.loads(lines[at][9:])
     entry[column][-1] = value
-    lines[at] = _line(entry)
+    lines[at] = log_line(entry)
     (whole / LOG).write_bytes(b"".join(lines))
     assert damaged_lines(whole) == 1
     assert len(load(whole)) == 40 - len(entry["scan"]) and len(load_traces(whole)) > 0
@@ -146,7 +146,7 @@ def test_a_run_is_kept_once(study, whole):
 
 
 def test_another_study_is_refused(study, whole, scene, tmp_path):
-    other = Source(Scene(scene.sensors, scene.times + 1.0, scene.measurements, region=scene.region), "other")
+    other = StudySource(Scene(scene.sensors, scene.times + 1.0, scene.measurements, region=scene.region), "other")
     for changed, message in [
         (replace(study, sources=[other], scans=None), "other scenes or problems: other is not among"),
         (replace(study, sources=[*study.sources, other], scans=None), "other is not among"),
@@ -171,20 +171,20 @@ def test_another_study_is_refused(study, whole, scene, tmp_path):
         study.run(whole)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("mine")
-    with pytest.raises(InvalidInputError, match="holds other files and no study"):
+    with pytest.raises(InvalidInputError, match="contains other files and no study"):
         study.run(tmp_path / "full")
 
 
 def test_a_renamed_file_is_the_same_scene(study, whole, scene, tmp_path):
     scene.save(tmp_path / "b.npz")
-    again = Source(Scene.load(tmp_path / "b.npz"), "b.npz")
+    again = StudySource(Scene.load(tmp_path / "b.npz"), "b.npz")
     assert replace(study, sources=[again], scans=None).run(whole).new == 0
     with pytest.raises(InvalidInputError, match="is the same as"):
-        named([scene, again.content], ["a.npz", "b.npz"])
+        named_sources([scene, again.content], ["a.npz", "b.npz"])
 
 
 def test_one_sweep_at_a_time(study, whole):
-    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is at work"):
+    with Store(whole, study.manifest), pytest.raises(InvalidInputError, match="another sweep is running"):
         study.run(whole)
     assert study.run(whole).new == 0
 
@@ -192,7 +192,7 @@ def test_one_sweep_at_a_time(study, whole):
 def test_problems_and_problems_without_a_solution(tmp_path):
     easy = AssignmentProblem([[1, 1], [1, 2]], [-3.0, -1.0], [1, 2])
     none = AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False)
-    study = Study([Source(easy, "easy"), Source(none, "none")], [*grid("greedy"), *grid("milp")], 1)
+    study = Study([StudySource(easy, "easy"), StudySource(none, "none")], [*grid("greedy"), *grid("milp")], 1)
     study.run(tmp_path / "s")
     frame = load(tmp_path / "s").set_index(["scene", "solver"])
     assert frame.loc[("easy", "milp"), "cost"] == -3.0 and frame.loc[("easy", "milp"), "optimal"]

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from assoc.errors import InvalidInputError
-from assoc.plotting.study_figures import draw
+from assoc.plotting.study_figures import draw_study
 from assoc.sweeps import grid, load, summarize
 from assoc.sweeps.bootstrap import mean_interval, resampled_means, weighted_mean
 from assoc.sweeps.store import Store
@@ -71,11 +71,12 @@ def test_the_summary_is_the_mean_of_the_rows(study, tmp_path):
 
 def test_every_kind_of_design_can_be_drawn(study, scene, tmp_path):
     study.run(tmp_path / "a")
-    assert [path.name for path in draw(tmp_path / "a")] == ["heatmap.png", "convergence.png"]
+    assert [path.name for path in draw_study(tmp_path / "a")] == ["heatmap.png", "convergence.png"]
     settings = [*grid("aco", {"alpha": [1, 2]}), *grid("milp", {"backend": ["scip", "highs"]}), *grid("greedy")]
     Study(study.sources, settings, 1).run(tmp_path / "b")
-    assert [path.name for path in draw(tmp_path / "b")] == ["heatmap-aco.png", "heatmap-milp.png", "convergence.png"]
+    drawn = [path.name for path in draw_study(tmp_path / "b")]
+    assert drawn == ["heatmap-aco.png", "heatmap-milp.png", "convergence.png"]
     for path in [*tmp_path.glob("*/*.png")]:
         assert path.read_bytes().startswith(b"\x89PNG\r\n") and path.stat().st_size > 10_000
     with Store(tmp_path / "empty", study.manifest), pytest.raises(InvalidInputError, match="no runs yet"):
-        draw(tmp_path / "empty")
+        draw_study(tmp_path / "empty")

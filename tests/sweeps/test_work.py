@@ -15,7 +15,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.sweeps import Setting, Study, load
-from assoc.sweeps.sources import Source
+from assoc.sweeps.sources import StudySource
 
 
 def chain(number):
@@ -50,7 +50,7 @@ def lazy(monkeypatch, tmp_path):
 
 
 def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
-    sources = [Source(chain(number), str(number)) for number in (1, 2, 3)]
+    sources = [StudySource(chain(number), str(number)) for number in (1, 2, 3)]
     started = time.perf_counter()
     Study(sources, [Setting("lazy", {})], 2).run(tmp_path / "s")
     elapsed = time.perf_counter() - started

@@ -101,7 +101,7 @@ def adapt(
     field_of_view: ArrayLike | None = None,
     name: str = "",
 ) -> AdaptedSensor:
-    """Say what a Stone Soup sensor or measurement model is here.
+    """Convert a Stone Soup sensor or measurement model.
 
     A measurement model says how a sensor measures; what the costs need besides is given here.
 

@@ -99,7 +99,7 @@ def _problem(
     costs = {pair: cost(one) for pair, one in pairs.items()}
     alone = {t: cost(missed[t]) if t in missed else math.inf for t, _ in pairs}
     finite = [abs(value) for value in (*costs.values(), *alone.values()) if math.isfinite(value)]
-    # dearer than any choice that misses one track fewer
+    # costs more than any choice that misses one track fewer
     forced = 2.0 * (sizes[0] + 1) * max(finite, default=0.0) + 1.0
     base = {t: value if math.isfinite(value) else forced for t, value in alone.items()}
     return AssignmentProblem(

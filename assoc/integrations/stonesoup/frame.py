@@ -36,11 +36,11 @@ class Frame:
 
     @property
     def planar(self) -> bool:
-        """Whether heights play no part."""
+        """Whether heights are not measured."""
         return len(self.mapping) == 2
 
     def split(self, detections: Sequence[Any]) -> list[list[Any]]:
-        """Sort out detections by sensor, keeping their order.
+        """Group detections by sensor, keeping their order.
 
         Raises
         ------

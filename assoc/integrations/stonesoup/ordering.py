@@ -1,4 +1,4 @@
-"""Orders that depend on what things are, not on where they lie in memory.
+"""Orders that depend on content, not on memory addresses.
 
 Stone Soup hands over sets of objects that hash by identity: they iterate in another order in each run.
 """

@@ -1,4 +1,4 @@
-"""A page that needs nothing but itself: style, data, plotly and our script in one file."""
+"""A self-contained page: style, data, plotly and our script in one file."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _static(name: str) -> str:
 
 
 def _policy(scripts: Sequence[str]) -> str:
-    """Nothing from outside is loaded and no script runs but ours, even if text should slip through as a tag."""
+    """Content security policy: nothing is loaded, and only our scripts run, even if text were read as a tag."""
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{one}'" for one in hashes)
     return f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._text.html import escape
-from assoc.plotting.heat_map import MEASURES, cells
+from assoc.plotting.heat_map import LABELS, cells
 from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
 from assoc.plotting.report.views import number
-from assoc.plotting.study_figures import FACTORS, title
+from assoc.plotting.study_figures import setting_title
 from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import RESULTS, load, load_traces
 from assoc.sweeps.store import read_manifest
-from assoc.sweeps.summary import measured, summarize, varied
+from assoc.sweeps.summary import FACTORS, measured, summarize, varied
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +85,7 @@ def write_sweep_report(
         return
     table = summarize(frame).sort_values(["gap", "time"], kind="stable").reset_index(drop=True)
     names = varied(frame)
-    titles = [title(row, names, frame["solver"].nunique() > 1) for row in table.to_dict("records")]
+    titles = [setting_title(row, names, frame["solver"].nunique() > 1) for row in table.to_dict("records")]
     sections = [
         ("summary", "Summary", _summary(frame, table, titles)),
         ("table", "Settings compared", _table(table, names)),
@@ -94,7 +94,7 @@ def write_sweep_report(
         ("settings", "Study", settings),
     ]
     data = {
-        "measures": {name: label for name, label in MEASURES.items() if table[name].notna().any()},
+        "measures": {name: label for name, label in LABELS.items() if table[name].notna().any()},
         "settings": [_setting(row, text, names) for row, text in zip(table.to_dict("records"), titles, strict=True)],
         "maps": _maps(frame),
         "curves": _curves(frame, load_traces(folder), table),
@@ -129,9 +129,9 @@ def _summary(frame: pd.DataFrame, table: pd.DataFrame, titles: Sequence[str]) ->
 
 def _table(table: pd.DataFrame, names: Sequence[str]) -> str:
     headers = ["place", "solver", *names, "runs"]
-    shown = [name for name in MEASURES if table[name].notna().any()]
+    shown = [name for name in LABELS if table[name].notna().any()]
     for name in shown:
-        headers += [MEASURES[name], "95 %"]
+        headers += [LABELS[name], "95 %"]
     rows = []
     for place, row in enumerate(table.to_dict("records"), start=1):
         line: list[tuple[str, Any]] = [(str(place), place), (str(row["solver"]), str(row["solver"]))]
@@ -155,7 +155,7 @@ def _value(value: Any) -> tuple[str, Any]:
 
 def _setting(row: Mapping[Any, Any], text: str, names: Sequence[str]) -> dict[str, Any]:
     means = {}
-    for name in MEASURES:
+    for name in LABELS:
         factor = FACTORS.get(name, 1.0)
         means[name] = [number(factor * row[f"{name}{end}"]) for end in ("", "_low", "_high")]
     return {"title": text, "values": {name: _value(row[name])[1] for name in names}, "means": means}
@@ -169,7 +169,7 @@ def _maps(frame: pd.DataFrame) -> list[dict[str, Any]]:
         few = [name for name in varied(part) if part[name].nunique() <= _MOST_VALUES][:_MOST_PARAMETERS]
         for across, up in itertools.combinations(few, 2):
             shown: dict[str, Any] = {}
-            for measure in MEASURES:
+            for measure in LABELS:
                 if np.isnan(measured(part, measure)).all():
                     continue
                 xs, ys, *tables = cells(part, measure, across, up)

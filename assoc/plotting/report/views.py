@@ -11,6 +11,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.association.scan import ScanAssociation
+from assoc.association.source import Source
 from assoc.costs import tuple_costs
 from assoc.plotting.places import measures_height
 from assoc.plotting.solution import measured_places
@@ -50,7 +51,7 @@ def closed_gap(scan: ScanAssociation) -> float | None:
     return 0.0 if gap <= 1e-9 * max(1.0, abs(scan.solution.cost)) else number(gap)
 
 
-def source_view(source: Scene | AssignmentProblem, file: str) -> dict[str, Any]:
+def source_view(source: Source, file: str) -> dict[str, Any]:
     """Sensors and extent of a source."""
     if isinstance(source, AssignmentProblem):
         names = [f"sensor {s + 1}" for s in range(source.num_sensors)]
@@ -91,7 +92,7 @@ def _trace(association: ScanAssociation) -> list[list[float | None]]:
     return [[one.iteration, number(one.seconds), number(one.cost), number(one.lower_bound)] for one in kept]
 
 
-def scan_view(source: Scene | AssignmentProblem, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:
+def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> dict[str, Any]:
     """Figures of a scan, its targets and its history; what can be drawn comes with `scene_view`."""
     solution = one.solution
     tuples = one.targets

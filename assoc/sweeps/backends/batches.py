@@ -1,4 +1,4 @@
-"""Runs put together into batches that take about the same time, whatever a run takes."""
+"""Runs grouped into batches that take about the same time, however long a run takes."""
 
 from __future__ import annotations
 

@@ -42,15 +42,15 @@ def connect(address: str) -> Any:
 
 
 def _quiet() -> None:
-    """Keep distributed from writing its own account of lost connections to stderr: ours is one line."""
+    """Keep distributed from logging lost connections to stderr: our message is one line."""
     import logging
 
     for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "tornado"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-class Cluster:
-    """The workers of a scheduler, at work on one job.
+class DaskWorkers:
+    """The workers of a scheduler, for one job.
 
     What all runs share is sent to every worker once. Workers may come and go: what a lost one had in hand
     is done again by another, with the same result, because seeds belong to runs.
@@ -91,7 +91,7 @@ class Cluster:
             except queue.Empty:
                 self._check_scheduler()
                 continue
-            yield from self._take(future)
+            yield from self._results_of(future)
 
     def _room(self) -> int:
         return _BATCHES_PER_THREAD * max(1, sum(self._client.nthreads().values()))
@@ -104,7 +104,7 @@ class Cluster:
         self._running[future] = batch, attempt
         future.add_done_callback(self._finished.put)
 
-    def _take(self, future: Any) -> Iterator[Result]:
+    def _results_of(self, future: Any) -> Iterator[Result]:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
@@ -114,7 +114,7 @@ class Cluster:
         except AssocError:
             raise
         except (FutureCancelledError, KilledWorker) as error:
-            # the workers that held the job are gone, or they died of the batch
+            # the workers that held the job are lost, or the batch killed them
             if attempt == _ATTEMPTS:
                 raise InvalidInputError(
                     f"--scheduler: {attempt} attempts at a batch ended with the loss of workers "
@@ -152,11 +152,11 @@ def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator
     Raises
     ------
     InvalidInputError
-        See `connect` and `Cluster.run`.
+        See `connect` and `DaskWorkers.run`.
     """
     client = connect(address)
     try:
-        yield from Cluster(client, job).run(batches)
+        yield from DaskWorkers(client, job).run(batches)
     except OSError:  # timeouts and closed connections among them
         raise InvalidInputError(_LOST) from None
     finally:

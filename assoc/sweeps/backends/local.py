@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from assoc._system import temporary
-from assoc._system.processes import end_with, require_processes, signals_as_they_are
+from assoc._system.processes import end_with_parent, require_processes, signals_as_they_are
 from assoc.errors import InvalidInputError
 from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
@@ -47,7 +47,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
         try:
             with signals_as_they_are(), _interrupts_ignored():
                 # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
-                results = parallel(delayed(_run)(str(path), digest, os.getpid(), batch) for batch in batches)
+                results = parallel(delayed(run_in_process)(str(path), digest, os.getpid(), batch) for batch in batches)
             yield from results
         except BrokenProcessPool:
             raise InvalidInputError(
@@ -61,7 +61,7 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
 @contextmanager
 def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
     """A file of the job, and its digest, in the study's folder, which only one sweep at a time has open."""
-    # what a sweep that was killed together with its workers could not take away
+    # left by a sweep that was killed together with its workers
     for stale in folder.glob(_JOB + "*"):
         stale.unlink(missing_ok=True)
     path = folder / f"{_JOB}{uuid.uuid4().hex}"
@@ -72,7 +72,7 @@ def _shared(job: Job, folder: Path) -> Iterator[tuple[Path, str]]:
             path.write_bytes(content)
         except OSError as error:
             raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        yield path, _digest(content)
+        yield path, content_digest(content)
     finally:
         temporary.remove(str(path))
 
@@ -90,7 +90,7 @@ def _interrupts_ignored() -> Iterator[None]:
 
 
 def stop_workers() -> None:
-    """End the worker processes now, whatever they are at."""
+    """End the worker processes now, whatever they are doing."""
     from joblib.externals.loky import reusable_executor
 
     executor = reusable_executor._executor
@@ -101,17 +101,19 @@ def stop_workers() -> None:
 _job: tuple[str, Job] | None = None
 
 
-def _run(path: str, digest: str, parent: int, batch: Batch) -> Result:
+def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
+    """Do a batch in a worker process, of the job in the file ``path``, which the process reads once."""
     global _job
     if _job is None or _job[0] != path:
-        end_with(parent, path)
+        end_with_parent(parent, path)
         content = Path(path).read_bytes()
-        # others may be allowed to write in the study's folder, and a pickle can do anything
-        if _digest(content) != digest:
+        # other users may be able to write to the study's folder, and a pickle can run any code
+        if content_digest(content) != digest:
             raise InvalidInputError(f"{path}: was changed by someone else")
         _job = path, pickle.loads(content)
     return run_batch(_job[1], batch)
 
 
-def _digest(content: bytes) -> str:
+def content_digest(content: bytes) -> str:
+    """Return the digest by which a worker knows the job file of its own sweep."""
     return hashlib.sha256(content).hexdigest()
