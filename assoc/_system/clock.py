@@ -22,12 +22,13 @@ if not _UNCOMPILED and hasattr(time, "clock_gettime"):
     _read = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.voidptr))
     _CLOCK = time.CLOCK_MONOTONIC
 
-    @njit
-    def now() -> float:
+    def _now() -> float:
         """Return seconds of `time.monotonic`."""
         pair = np.empty(2, np.int64)
         _read(_CLOCK, pair.ctypes.data)
         return float(pair[0] + 1e-9 * pair[1])
+
+    now = njit(_now, stand_in=time.monotonic)
 
 elif _UNCOMPILED:
     now = time.monotonic

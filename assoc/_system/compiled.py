@@ -23,6 +23,7 @@ import numpy as np
 from numba.core import caching, event
 
 from assoc._system import temporary
+from assoc._system.interpreted import NotCompiled, first_small, thread
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -80,16 +81,21 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load compiled code; what cannot be read (a file cut by a crash) is compiled again, and replaced."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         except Exception:
             # an index that cannot be read cannot be added to either
             with contextlib.suppress(OSError):
                 self.flush()
-            return None
+            found = None
+        if found is None and thread.may_interpret:
+            raise NotCompiled
+        return found
 
 
-def njit(function: Callable[..., Any]) -> Any:
+def njit(function: Callable[..., Any], *, stand_in: Callable[..., Any] | None = None) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``.
+
+    Until it is compiled, small calls are interpreted (interpreted.py), by ``stand_in`` where that is given.
 
     With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
     """
@@ -105,6 +111,7 @@ def njit(function: Callable[..., Any]) -> Any:
     # nowhere to keep it, not even for a while: each process compiles for itself
     with contextlib.suppress(OSError):
         kernel._cache = _KernelCache(function)
+        kernel._compile_for_args = first_small(kernel, stand_in)
     return kernel
 
 

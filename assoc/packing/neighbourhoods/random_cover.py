@@ -10,6 +10,7 @@ with tau_j the pheromone, rc_j the reduced cost and T the temperature; the cover
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,8 +83,12 @@ def walk(packing: PackingArrays, prices: Prices, trail: Trail, ants: int, rng: A
     num, num_sensors = cols.shape
     num_rows = slack.size
     value = np.empty(num)
-    trace = trail.pheromone**alpha
-    slack_trace = trail.slack_pheromone**alpha
+    # in loops: a power of an array is rounded otherwise where it is interpreted
+    trace, slack_trace = np.empty(num), np.empty(num_rows)
+    for j in range(num):
+        trace[j] = trail.pheromone[j] ** alpha
+    for r in range(num_rows):
+        slack_trace[r] = trail.slack_pheromone[r] ** alpha
     stay = np.zeros(num_rows)
     best = np.full(num_rows, -1, np.int32)
     best_weight = np.inf
@@ -98,10 +103,10 @@ def walk(packing: PackingArrays, prices: Prices, trail: Trail, ants: int, rng: A
         strictness = beta * 2.0 ** (ant % 10) / temperature
         for j in range(num):
             power = strictness * reduced[j]
-            value[j] = trace[j] * np.exp(-power) if power < 40.0 else 0.0
+            value[j] = trace[j] * math.exp(-power) if power < 40.0 else 0.0
         for r in range(num_rows):
             if slack[r]:
-                stay[r] = slack_trace[r] * np.exp(strictness * min(duals[r], 0.0))
+                stay[r] = slack_trace[r] * math.exp(strictness * min(duals[r], 0.0))
         owner[:] = -1
         for i in range(num_rows - 1, 0, -1):
             k = rng.integers(0, i + 1)

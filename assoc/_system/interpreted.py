@@ -1,0 +1,180 @@
+"""Small calls of kernels that are not compiled yet are interpreted, while another process compiles them.
+
+Compiling takes seconds for each kernel, once after an installation. A kernel is a Python function, though: on a
+small scene it does in a hundredth of a second uncompiled what it does in a ten-thousandth compiled. So a call
+with small arrays is interpreted as long as the kernel is in no cache, and a process beside this one compiles it; as
+soon as it is in the cache on disk it is loaded. A call with large arrays waits for the compiler, and so does a kernel
+that has been interpreted for longer than compiling would have taken. Results are the same to the last bit.
+
+``ASSOC_INTERPRET=0`` switches this off.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import importlib
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+# elements of a call's arrays, all together, up to which it may be interpreted
+SMALL = 6000
+# seconds for which a kernel is interpreted, all calls together: about what compiling takes
+PATIENCE = 6.0
+# seconds between two looks whether the kernel has come into the cache
+_LOOK = 0.5
+
+_switched_on = os.environ.get("ASSOC_INTERPRET", "1") != "0"
+
+
+class NotCompiled(Exception):  # noqa: N818  (it is no error)
+    """The kernel is in no cache, and may be interpreted."""
+
+
+class _Thread(threading.local):
+    """What a thread is at."""
+
+    # whether a kernel that is in no cache may be interpreted instead
+    may_interpret = False
+    # whether an interpreted kernel runs: what it calls is interpreted with it
+    interpreting = False
+
+
+thread = _Thread()
+
+
+def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Return what a kernel does on arguments of new types: load, interpret or compile.
+
+    Parameters
+    ----------
+    kernel : Dispatcher
+    stand_in : callable, optional
+        What is called instead of the Python function, where that cannot be interpreted.
+
+    Returns
+    -------
+    callable
+        For ``kernel._compile_for_args``; it returns what is then called with the same arguments.
+    """
+    compiled = kernel._compile_for_args
+    function = stand_in or kernel.py_func
+    spent = 0.0
+    looked = -_LOOK
+
+    def interpreted(*arguments: Any) -> Any:
+        nonlocal spent
+        started = time.perf_counter()
+        thread.interpreting = True
+        try:
+            # compiled code is silent about overflow
+            with np.errstate(all="ignore"):
+                return function(*arguments)
+        finally:
+            thread.interpreting = False
+            spent += time.perf_counter() - started
+
+    def choose(*arguments: Any) -> Any:
+        nonlocal looked
+        if thread.interpreting:
+            return function
+        if spent > PATIENCE or not _are_small(arguments):
+            return compiled(*arguments)
+        if time.monotonic() - looked < _LOOK:
+            return interpreted
+        thread.may_interpret = True
+        try:
+            return compiled(*arguments)
+        except NotCompiled:
+            looked = time.monotonic()
+            _compile_beside(kernel.py_func, tuple(map(kernel.typeof_pyval, arguments)))
+            return interpreted
+        finally:
+            thread.may_interpret = False
+
+    return choose if _switched_on else compiled
+
+
+def _are_small(arguments: tuple[Any, ...]) -> bool:
+    return _elements(arguments) <= SMALL
+
+
+def _elements(value: Any) -> int:
+    if isinstance(value, np.ndarray):
+        return value.size
+    return sum(map(_elements, value)) if isinstance(value, tuple) else 0
+
+
+class _Beside:
+    """The process that compiles; it ends with this one, after the kernel that it is at."""
+
+    def __init__(self) -> None:
+        self._asked: set[Any] = set()
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._owner = 0
+
+    def ask(self, module: str, name: str, kinds: Any) -> None:
+        with self._lock:
+            if self._owner != os.getpid():
+                # a forked process has a copy of its parent's
+                self._asked, self._process, self._owner = set(), None, os.getpid()
+            if (module, name, kinds) in self._asked:
+                return
+            self._asked.add((module, name, kinds))
+            line = base64.b64encode(pickle.dumps((module, name, kinds))) + b"\n"
+            try:
+                if self._process is None:
+                    self._process = _start()
+                assert self._process.stdin is not None
+                self._process.stdin.write(line)
+                self._process.stdin.flush()
+            except (OSError, ValueError):
+                # no process to be had, or it has died: this one compiles, once its patience is over
+                self._process = None
+
+
+def _start() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", __name__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "ASSOC_INTERPRET": "0"},
+        # Ctrl-C is for the program, which then closes the pipe
+        start_new_session=True,
+    )
+
+
+_beside = _Beside()
+
+
+@functools.cache
+def _has_room() -> bool:
+    """Whether there is a core for another process."""
+    return (os.cpu_count() or 1) > 1
+
+
+def _compile_beside(function: Any, kinds: Any) -> None:
+    if _has_room():
+        _beside.ask(function.__module__, function.__qualname__, kinds)
+
+
+def _serve() -> None:
+    """Compile what the lines of standard input ask for."""
+    for line in sys.stdin.buffer:
+        module, name, kinds = pickle.loads(base64.b64decode(line))
+        kernel = getattr(importlib.import_module(module), name)
+        kernel.compile(kinds)
+
+
+if __name__ == "__main__":
+    _serve()
