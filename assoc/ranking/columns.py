@@ -19,11 +19,10 @@ from assoc.packing.packing import Packing, assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.solvers.greedy.fallback import prepare_fallback
 
 
 @dataclass(frozen=True, slots=True)
-class Complete:
+class AllColumns:
     """All distinct columns of a problem over its measurements, with multipliers that price them.
 
     Attributes
@@ -75,16 +74,13 @@ class Complete:
         return indices
 
 
-def complete(problem: AssignmentProblem, run: Run) -> Complete:
+def price_all_columns(problem: AssignmentProblem, run: Run) -> AllColumns:
     """Collect the distinct columns of a problem and price them by the dual bound's multipliers."""
     prepared = prepare(problem)
     packing = prepared.packing
     slack = slack_of(problem)
     # before the ascent, which takes the time that is left
     rows, weights, origin = distinct_columns(problem)
-    if run.time_limit is not None:
-        # what stands for the best when time is over: the ascent would leave no time for it
-        prepare_fallback(packing, run)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
     own = dual_bound(packing, run=run)
@@ -100,7 +96,7 @@ def slack_of(problem: AssignmentProblem) -> NDArray[np.bool_]:
 
 
 def distinct_columns(problem: AssignmentProblem) -> tuple[NDArray[np.int32], Floats, NDArray[np.int32]]:
-    """Return rows, weights and origin of all columns (see ``Complete``)."""
+    """Return rows, weights and origin of all columns (see ``AllColumns``)."""
     prepared = prepare(problem)
     sizes = problem.sizes.astype(np.int64)
     # uncompiled, numpy would warn of the hash's overflow, which is meant
@@ -118,10 +114,10 @@ def priced(
     duals: Floats,
     offset: float,
     single: NDArray[np.int64],
-) -> Complete:
+) -> AllColumns:
     """Put columns and multipliers together; what is negative in the reduced costs must be rounding."""
     duals = np.where(slack, np.minimum(duals, 0.0), duals)
-    return Complete(
+    return AllColumns(
         rows,
         weights,
         origin,

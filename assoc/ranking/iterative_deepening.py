@@ -11,7 +11,7 @@ from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
-from assoc.ranking.columns import Complete
+from assoc.ranking.columns import AllColumns
 from assoc.ranking.component_ranking import FIRST_BUDGET, ComponentRanking, rank_components
 from assoc.ranking.enumeration import Wanted
 from assoc.ranking.head_start import HeadStart
@@ -56,7 +56,7 @@ class Deepening:
 
     Parameters
     ----------
-    columns : Complete
+    columns : AllColumns
         The problem.
     k : int
         Solutions wanted.
@@ -66,7 +66,7 @@ class Deepening:
         Taken before the first branching.
     """
 
-    def __init__(self, columns: Complete, k: int, run: Run, ahead: HeadStart) -> None:
+    def __init__(self, columns: AllColumns, k: int, run: Run, ahead: HeadStart) -> None:
         self._columns = columns
         self._k = k
         self._run = run

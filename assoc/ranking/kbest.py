@@ -24,13 +24,14 @@ from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking.columns import Complete, complete
+from assoc.ranking.columns import AllColumns, price_all_columns
 from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
-from assoc.ranking.two_sensors import rank_planar
+from assoc.ranking.two_sensors import rank_two_sensors
 from assoc.solution import Solution
 from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.certificate import certify
+from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -91,13 +92,13 @@ class Ranking:
         See ``kbest``.
     rest : float
         No other solution costs less than this; ``inf``: there is no other.
-    columns : Complete
+    columns : AllColumns
         The columns and their prices.
     """
 
     solutions: list[Solution]
     rest: float
-    columns: Complete
+    columns: AllColumns
 
 
 def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
@@ -109,11 +110,14 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
     run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
-    ahead = HeadStart(prepare(problem).packing, run)
+    packing = prepare(problem).packing
+    ahead = HeadStart(packing, run)
     if problem.num_sensors == 2:
-        columns, found = rank_planar(problem, most, run)
+        columns, found = rank_two_sensors(problem, most, run)
     else:
-        columns = complete(problem, run)
+        # what stands for the best when time is over: the ascent would leave no time for it
+        prepare_fallback(packing, run)
+        columns = price_all_columns(problem, run)
         found = Deepening(columns, most, run, ahead).run()
     if len(found.chosen) == most < k and found.rest < np.inf:
         run.stopped_by = run.stopped_by or "memory_limit"
@@ -196,7 +200,7 @@ def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
 
 
 def _unproved(
-    problem: AssignmentProblem, bound: float, k: int, run: Run, columns: Complete, known: NDArray[np.int32] | None
+    problem: AssignmentProblem, bound: float, k: int, run: Run, columns: AllColumns, known: NDArray[np.int32] | None
 ) -> Solution:
     """Return the best solution known when time was over before the best was proved."""
     if known is None:

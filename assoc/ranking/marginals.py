@@ -16,7 +16,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.clusters import clusters_of, distinct, numbered
-from assoc.ranking.columns import Complete
+from assoc.ranking.columns import AllColumns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
 from assoc.solvers.assign import checked_time_limit
@@ -214,7 +214,7 @@ def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, f
     return np.minimum(own / total, 1.0), share, len(solutions)
 
 
-def _others(problem: AssignmentProblem, columns: Complete, listed: Floats, rest: float, run: Run) -> float:
+def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, rest: float, run: Run) -> float:
     """Bound the weight, relative to the best's, of all solutions but those listed; the others cost ``rest``."""
     if rest == np.inf:
         return 0.0
@@ -239,7 +239,7 @@ def _others(problem: AssignmentProblem, columns: Complete, listed: Floats, rest:
     return smallest
 
 
-def _rounding(problem: AssignmentProblem, columns: Complete, excess: float) -> float:
+def _rounding(problem: AssignmentProblem, columns: AllColumns, excess: float) -> float:
     """How far the sum of a solution's reduced costs may be from its cost less the bound.
 
     Weights are differences of costs, and reduced costs are differences of weights: what they lose is a share of the

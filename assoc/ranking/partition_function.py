@@ -32,7 +32,7 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.kernels.heap import doubled, pop, push
 from assoc.packing.packing import Packing
-from assoc.ranking.columns import Complete
+from assoc.ranking.columns import AllColumns
 
 # column visits for each component: about a tenth of a second in all for a hard one
 WORK = 20_000_000
@@ -65,7 +65,7 @@ class Terms(NamedTuple):
 
 
 def log_partition(
-    columns: Complete,
+    columns: AllColumns,
     a: float,
     work: int = WORK,
     deadline: float = math.inf,
@@ -75,7 +75,7 @@ def log_partition(
 
     Parameters
     ----------
-    columns : Complete
+    columns : AllColumns
         The problem.
     a : float
         Inverse temperature >= 0; 0 counts the solutions.

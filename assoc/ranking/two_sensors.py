@@ -8,12 +8,12 @@ from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking.columns import Complete, distinct_columns, priced, slack_of
+from assoc.ranking.columns import AllColumns, distinct_columns, priced, slack_of
 from assoc.ranking.iterative_deepening import Found
 from assoc.ranking.murty.murty import Murty
 
 
-def rank_planar(problem: AssignmentProblem, k: int, run: Run) -> tuple[Complete, Found]:
+def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllColumns, Found]:
     """Return the columns of a problem with two sensors and its k lightest solutions.
 
     Raises

@@ -12,7 +12,7 @@ from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking import iterative_deepening
-from assoc.ranking.columns import complete
+from assoc.ranking.columns import price_all_columns
 from assoc.ranking.component_ranking import ComponentRanking
 from assoc.ranking.kbest import kbest, rank
 from assoc.ranking.merging import merge
@@ -130,7 +130,7 @@ def test_branching_instead_of_enumeration(budget):
     """The same lists with next to no enumeration: branch and bound down to the leaves."""
     branched = 0
     for number, problem in enumerate(small_problems(120, seed=52)):
-        packing = complete(problem, Run(np.random.default_rng(0))).keep(np.inf)
+        packing = price_all_columns(problem, Run(np.random.default_rng(0))).keep(np.inf)
         if packing.num_columns > 40 or (~packing.slack & (np.diff(packing.row_ptr) == 0)).any():
             continue
         duals = dual_bound(packing)

@@ -7,7 +7,7 @@ import assoc
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking.columns import complete
+from assoc.ranking.columns import price_all_columns
 from assoc.ranking.marginals import marginals
 from assoc.ranking.partition_function import log_partition
 from experiments.common import oracles
@@ -117,7 +117,7 @@ def test_the_unseen_weight_is_bounded_tightly_when_solved_out():
 @pytest.mark.parametrize("a", [0.0, 0.5, 1.0])
 def test_partition_function_is_never_underestimated(work, a):
     for problem, found in enumerable(100, 63, limit=600):
-        columns = complete(problem, Run(np.random.default_rng(0)))
+        columns = price_all_columns(problem, Run(np.random.default_rng(0)))
         bound = columns.bound + columns.offset
         excess = np.array([s.cost for s in found]) - bound
         exact = np.log(np.exp(-a * excess).sum())

@@ -3,10 +3,6 @@
 Rows and columns that may stay alone are joined to one more node, the dummy, with potential z: a row that
 stays alone is matched to it, a column that stays alone is matched by it, and a path may lead through it. The
 dummy takes many at once, so that by complementary slackness its edges in use have reduced costs <= 0, not 0.
-
-Nodes are rows of arrays (``murty.Murty`` owns them): the edge of each row, the row of each column, the
-multipliers u and v (the dummy's is the last of v), the order in which rows are split by, how many of them
-are fixed, and the link to the edge that the node's own row may not use.
 """
 
 from __future__ import annotations
@@ -16,39 +12,36 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
 from assoc.packing.kernels.heap import pop, push
-
-ALONE = -1
+from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Taboo
 
 
 @njit
-def set_taboo(
-    parent: int, place: int, columns: Any, edge_of: Any, order: Any, fixed: Any, forbidden: Any, taboo_row: Any,
-    taboo_column: Any, taboo_edge: Any, on: bool
-) -> None:  # fmt: skip
+def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int, on: bool) -> None:
     """Mark (or unmark) what the child at ``place`` may not touch: its fixed rows and its forbidden edges."""
     for t in range(place):
-        r = order[parent, t]
-        taboo_row[r] = on
-        if edge_of[parent, r] >= 0:
-            taboo_column[columns[edge_of[parent, r]]] = on
-    own = edge_of[parent, order[parent, place]]
+        r = nodes.order[parent, t]
+        taboo.row[r] = on
+        if nodes.edge_of[parent, r] >= 0:
+            taboo.column[graph.columns[nodes.edge_of[parent, r]]] = on
+    own = nodes.edge_of[parent, nodes.order[parent, place]]
     if own >= 0:
-        taboo_edge[own] = on
-    if place == fixed[parent]:
+        taboo.edge[own] = on
+    if place == nodes.fixed[parent]:
+        forbidden = nodes.forbidden
         node = parent
         while node >= 0 and forbidden[node, 1] != -1:
             # an entry is 2 + edge, so that 1 stands for staying alone
             if forbidden[node, 1] >= 2:
-                taboo_edge[forbidden[node, 1] - 2] = on
+                taboo.edge[forbidden[node, 1] - 2] = on
             node = forbidden[node, 0]
 
 
 @njit
-def may_stay_alone(parent: int, row: int, edge_of: Any, order: Any, fixed: Any, forbidden: Any, row_alone: Any) -> bool:
+def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
     """Whether the child of ``row`` may leave that row alone."""
-    if not row_alone[row] or edge_of[parent, row] == ALONE:
+    order, fixed, forbidden = nodes.order, nodes.fixed, nodes.forbidden
+    if not graph.row_alone[row] or nodes.edge_of[parent, row] == ALONE:
         return False
     if fixed[parent] < order.shape[1] and order[parent, fixed[parent]] == row:
         node = parent
@@ -60,9 +53,9 @@ def may_stay_alone(parent: int, row: int, edge_of: Any, order: Any, fixed: Any, 
 
 
 @njit
-def _relax(room: Any, size: int, num_reached: int, item: int, value: float, edge: int, row: int) -> Any:
+def _relax(work: PathWork, size: int, num_reached: int, item: int, value: float, edge: int, row: int) -> Any:
     """Offer a way to a column (or the dummy); the sizes of the queue and of the list of what was reached."""
-    distance, previous, previous_row, closed, reached, _, _, queue_key, queue_item = room
+    distance, previous, previous_row, closed, reached, _, _, queue_key, queue_item = work
     if closed[item] or value >= distance[item]:
         return size, num_reached
     if distance[item] == np.inf:
@@ -77,12 +70,14 @@ def _relax(room: Any, size: int, num_reached: int, item: int, value: float, edge
 
 @njit
 def search_path(
-    parent: int, row: int, alone: bool, limit: float, costs: Floats, columns: Any, row_ptr: Any, row_edges: Any,
-    row_alone: Any, column_alone: Any, edge_of: Any, row_of: Any, u: Any, v: Any, taboo_row: Any, taboo_column: Any,
-    taboo_edge: Any, room: Any,
-) -> Any:  # fmt: skip
+    graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, parent: int, row: int, alone: bool, limit: float
+) -> Any:
     """Dijkstra from a row to what its parent matched it to; length (inf: above the limit), reached, tree."""
-    distance, _, _, closed, _, tree_row, tree_distance, queue_key, queue_item = room
+    costs, columns, row_ptr, row_edges = graph.costs, graph.columns, graph.row_ptr, graph.row_edges
+    row_alone, column_alone = graph.row_alone, graph.column_alone
+    edge_of, row_of, u, v = nodes.edge_of, nodes.row_of, nodes.u, nodes.v
+    taboo_row, taboo_column, taboo_edge = taboo
+    distance, _, _, closed, _, tree_row, tree_distance, queue_key, queue_item = work
     dummy = column_alone.size
     own = edge_of[parent, row]
     target = columns[own] if own >= 0 else dummy
@@ -102,11 +97,11 @@ def search_path(
                     continue
                 value = d + max(0.0, costs[e] - u[parent, i] - v[parent, j])
                 if value <= limit:
-                    size, num_reached = _relax(room, size, num_reached, j, value, e, i)
+                    size, num_reached = _relax(work, size, num_reached, j, value, e, i)
             if alone if i == row else (row_alone[i] and edge_of[parent, i] != ALONE):
                 value = d + max(0.0, -u[parent, i] - z)
                 if value <= limit:
-                    size, num_reached = _relax(room, size, num_reached, dummy, value, -1, i)
+                    size, num_reached = _relax(work, size, num_reached, dummy, value, -1, i)
         item = -1
         while size > 0:
             d = queue_key[0]
@@ -129,44 +124,40 @@ def search_path(
                 if column_alone[j] and not taboo_column[j] and row_of[parent, j] != ALONE:
                     value = d + max(0.0, z - v[parent, j])
                     if value <= limit:
-                        size, num_reached = _relax(room, size, num_reached, j, value, -1, -1)
+                        size, num_reached = _relax(work, size, num_reached, j, value, -1, -1)
             for r in range(row_alone.size):
                 if edge_of[parent, r] == ALONE and not taboo_row[r] and r != row:
                     value = d + max(0.0, u[parent, r] + z)
                     if value <= limit:
-                        size, num_reached = _relax(room, size, num_reached, dummy + 1 + r, value, -1, -1)
+                        size, num_reached = _relax(work, size, num_reached, dummy + 1 + r, value, -1, -1)
         elif row_of[parent, item] == ALONE:
             # the dummy that held this column is free now
             value = d + max(0.0, v[parent, item] - z)
             if value <= limit:
-                size, num_reached = _relax(room, size, num_reached, dummy, value, item, -1)
+                size, num_reached = _relax(work, size, num_reached, dummy, value, item, -1)
         else:
             i = row_of[parent, item]
 
 
 @njit
-def clear(room: Any, num_reached: int) -> None:
+def clear(work: PathWork, num_reached: int) -> None:
     """Make the working arrays ready for the next path."""
-    distance, _, _, closed, reached, _, _, _, _ = room
     for t in range(num_reached):
-        distance[reached[t]] = np.inf
-        closed[reached[t]] = False
+        work.distance[work.reached[t]] = np.inf
+        work.closed[work.reached[t]] = False
 
 
 @njit
 def make_node(
-    node: int, parent: int, place: int, alone: bool, costs: Floats, columns: Any, row_ptr: Any, row_edges: Any,
-    row_alone: Any, column_alone: Any, edge_of: Any, row_of: Any, u: Any, v: Any, order: Any, fixed: Any,
-    forbidden: Any, node_cost: Any, taboo_row: Any, taboo_column: Any, taboo_edge: Any, room: Any,
-) -> None:  # fmt: skip
+    graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, node: int, parent: int, place: int, alone: bool
+) -> None:
     """Turn a child into a node: its solution and the multipliers that prove it the best of its kind."""
-    distance, previous, previous_row, closed, reached, tree_row, tree_distance, _, _ = room
-    dummy = column_alone.size
+    columns = graph.columns
+    edge_of, row_of, u, v, order, fixed, forbidden, node_cost = nodes
+    distance, previous, previous_row, closed, reached, tree_row, tree_distance, _, _ = work
+    dummy = graph.column_alone.size
     row = order[parent, place]
-    length, num_reached, num_tree = search_path(
-        parent, row, alone, np.inf, costs, columns, row_ptr, row_edges, row_alone, column_alone, edge_of, row_of,
-        u, v, taboo_row, taboo_column, taboo_edge, room,
-    )  # fmt: skip
+    length, num_reached, num_tree = search_path(graph, nodes, taboo, work, parent, row, alone, np.inf)
     edge_of[node] = edge_of[parent]
     row_of[node] = row_of[parent]
     u[node] = u[parent]
@@ -198,16 +189,15 @@ def make_node(
         else:
             row_of[node, item] = ALONE
             item = dummy
-    clear(room, num_reached)
+    clear(work, num_reached)
 
 
 @njit
-def open_children(
-    node: int, worst: float, costs: Floats, rows: Any, columns: Any, index: Any, row_alone: Any, column_alone: Any,
-    edge_of: Any, u: Any, v: Any, order: Any, fixed: Any, node_cost: Any, taboo_row: Any, taboo_column: Any,
-    heap_key: Any, heap_item: Any, size: int, limits: Any,
-) -> int:  # fmt: skip
-    """Queue the children of a node by their bounds; the size of the queue."""
+def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node: int, worst: float) -> None:
+    """Queue the children of a node by their bounds."""
+    columns, row_alone = graph.columns, graph.row_alone
+    edge_of, order, fixed, node_cost = nodes.edge_of, nodes.order, nodes.fixed, nodes.cost
+    taboo_row, taboo_column, counts, limits = taboo.row, taboo.column, queues.counts, queues.limits
     num_rows = row_alone.size
     first = fixed[node]
     for t in range(first):
@@ -220,20 +210,15 @@ def open_children(
         start = first + 1 if first > 0 or node > 0 else first
         bounds = np.empty(num_rows - start)
         for t in range(start, num_rows):
-            bounds[t - start] = -_way_round(
-                node, order[node, t], costs, rows, columns, index, row_alone, column_alone, edge_of, u, v, taboo_row,
-                taboo_column,
-            )  # fmt: skip
+            bounds[t - start] = -_way_round(graph, nodes, taboo, node, order[node, t])
         order[node, start:] = order[node, start:][np.argsort(bounds)]
     for t in range(first, num_rows):
         r = order[node, t]
-        bound = node_cost[node] + _way_round(
-            node, r, costs, rows, columns, index, row_alone, column_alone, edge_of, u, v, taboo_row, taboo_column
-        )
+        bound = node_cost[node] + _way_round(graph, nodes, taboo, node, r)
         if bound <= worst:
             if bound < np.inf:
-                push(heap_key, heap_item, size, bound, (np.int64(node) * num_rows + t) << 1)
-                size += 1
+                push(queues.key, queues.item, counts[1], bound, (np.int64(node) * num_rows + t) << 1)
+                counts[1] += 1
         else:
             limits[0] = min(limits[0], worst)
         taboo_row[r] = True
@@ -242,16 +227,14 @@ def open_children(
     for r in range(num_rows):
         taboo_row[r] = False
     taboo_column[:] = False
-    return size
 
 
 @njit
-def _way_round(
-    node: int, row: int, costs: Floats, rows: Any, columns: Any, index: Any, row_alone: Any, column_alone: Any,
-    edge_of: Any, u: Any, v: Any, taboo_row: Any, taboo_column: Any
-) -> float:  # fmt: skip
+def _way_round(graph: Graph, nodes: Nodes, taboo: Taboo, node: int, row: int) -> float:
     """Return a bound on any path from a row to what it is matched to: the first step and the last."""
-    row_ptr, row_edges, column_ptr, column_edges = index
+    costs, rows, columns, row_alone, column_alone, row_ptr, row_edges, column_ptr, column_edges = graph
+    edge_of, u, v = nodes.edge_of, nodes.u, nodes.v
+    taboo_row, taboo_column = taboo.row, taboo.column
     own = edge_of[node, row]
     z = v[node, column_alone.size]
     out = np.inf

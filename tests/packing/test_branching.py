@@ -1,0 +1,151 @@
+"""Branch and bound on packings against enumeration."""
+
+import numpy as np
+import pytest
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.feasibility import first_solution
+from assoc.packing.branching.nodes import OpenNodes, is_dropped, new_node, push_children, take_node
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.prepare import prepare
+from assoc.packing.run import Run
+from experiments.common.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
+
+
+def feasible(count, seed):
+    """Small problems that have a solution, with their optimal cost."""
+    for problem in small_problems(count, seed):
+        if all_solutions(problem):
+            yield problem, brute_force(problem)
+
+
+def search_of(packing, incumbent=np.inf):
+    return BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9)
+
+
+def covers(packing, columns):
+    """Whether the columns are disjoint and cover every row that must be."""
+    used = packing.cols[columns]
+    count = np.bincount(used[used >= 0], minlength=packing.num_rows)
+    return count.max(initial=0) <= 1 and bool((packing.slack | (count == 1)).all())
+
+
+def test_the_optimum_is_that_of_enumeration():
+    for problem, optimum in feasible(60, 71):
+        prepared = prepare(problem)
+        search = search_of(prepared.packing)
+        while not search.done:
+            search.run(7)
+        assert search.columns is not None and covers(prepared.packing, search.columns)
+        weight = prepared.packing.weights[search.columns].sum()
+        assert weight == pytest.approx(search.weight, abs=1e-9)
+        assert weight + prepared.offset == pytest.approx(optimum, abs=1e-8)
+        assert search.lower_bound + prepared.offset <= optimum + 1e-9
+
+
+def test_a_bound_holds_when_the_search_is_stopped_early():
+    rng = np.random.default_rng(72)
+    stopped = 0
+    for number in range(12):
+        # enough to branch on
+        sizes = (7, 7, 7)
+        problem = axial_problem(rng, sizes, 1.0, "positive") if number % 2 else gated_problem(rng, sizes, 0.3)
+        prepared = prepare(problem)
+        whole = search_of(prepared.packing)
+        whole.run(100_000)
+        assert whole.done
+        for nodes in (0, 1, 2, 5):
+            search = search_of(prepared.packing)
+            search.run(nodes)
+            stopped += not search.done
+            assert search.nodes <= nodes
+            assert search.lower_bound <= whole.weight + 1e-9
+            assert search.weight >= whole.weight - 1e-9
+            # and it goes on where it stopped
+            search.run(100_000)
+            assert search.done and search.weight == pytest.approx(whole.weight, abs=1e-9)
+    assert stopped > 12
+
+
+def test_only_better_solutions_are_looked_for():
+    for problem, optimum in feasible(20, 73):
+        prepared = prepare(problem)
+        search = search_of(prepared.packing, optimum - prepared.offset)
+        search.run(10_000)
+        assert search.done and search.columns is None
+
+
+def test_without_memory_the_deepest_node_is_given_up():
+    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
+    nodes = OpenNodes(packing, np.zeros(packing.num_rows))
+    nodes.arrays.bound[0] = -7.0
+    nodes.grow(lambda needed: False)
+    assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
+
+
+def test_the_two_children_of_a_node_partition_its_solutions():
+    """Two rows of different sensors are together in one child, apart in the other: no solution is lost or twice."""
+    for problem, _ in feasible(30, 75):
+        prepared = prepare(problem)
+        packing = prepared.packing
+        pairs = [(a, b) for cols in packing.cols.tolist() for a in cols for b in cols if 0 <= a < b]
+        if not pairs:
+            continue
+        one, two = pairs[len(pairs) // 2]
+        stack = OpenNodes(packing, dual_bound(packing)).arrays
+        node = new_node(packing.arrays, stack, 1)
+        num = take_node(stack, 0, node)
+        assert num == packing.num_columns
+        assert push_children(packing.arrays, stack, 0, node, num, (one, two, 0.7), -5.0, node.duals) == 2
+        children = [set(stack.arena[stack.first[t] : stack.first[t] + stack.size[t]].tolist()) for t in range(2)]
+        # the likelier one is on top
+        for columns, joined in zip(children, (False, True), strict=True):
+            assert columns == {j for j in range(num) if not is_dropped(packing.cols, j, one, two, joined)}
+        assert (stack.bound[:2] == -5.0).all()
+        assert not stack.slack[1, [one, two]].any() and np.array_equal(stack.slack[0], packing.slack)
+        for solution in all_covers(packing):
+            together = any({one, two} <= set(packing.cols[j].tolist()) for j in solution)
+            inside = [
+                set(solution) <= columns and must_be_covered(packing, stack.slack[t], solution)
+                for t, columns in enumerate(children)
+            ]
+            # both alone, or apart in two columns: apart
+            assert inside == [not together, together]
+
+
+def all_covers(packing):
+    """Every choice of disjoint columns that covers the rows without slack."""
+    masks = [sum(1 << r for r in cols if r >= 0) for cols in packing.cols.tolist()]
+    must = sum(1 << r for r in range(packing.num_rows) if not packing.slack[r])
+    found = []
+
+    def extend(first, covered, chosen):
+        if len(found) < 2000:
+            if not must & ~covered:
+                found.append(chosen)
+            for j in range(first, len(masks)):
+                if not masks[j] & covered:
+                    extend(j + 1, covered | masks[j], (*chosen, j))
+
+    extend(0, 0, ())
+    return found
+
+
+def must_be_covered(packing, slack, solution):
+    used = packing.cols[list(solution)]
+    covered = np.zeros(packing.num_rows, dtype=bool)
+    covered[used[used >= 0]] = True
+    return bool((slack | covered).all())
+
+
+def test_first_solution_is_one_or_there_is_none():
+    found = 0
+    for problem in small_problems(60, 76, dummy=False):
+        packing = prepare(problem).packing
+        columns = first_solution(packing, Run(0))
+        if all_solutions(problem):
+            assert columns is not None and covers(packing, columns)
+            found += 1
+        else:
+            assert columns is None
+    assert found > 20
