@@ -10,7 +10,7 @@ from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
 from assoc.sensors.base import Sensor, wrap_angle
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 
 
 def observe(
@@ -54,7 +54,7 @@ def observe(
     """
     rate = max((float(sensor.false_alarm_rate) for sensor in sensors), default=0.0)
     present = max((len(ids) for ids in target_ids), default=0)
-    require_room(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
+    require_scene_memory(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
     measurements: list[list[Array]] = []
     sources: list[list[Array]] = []
     for ids, places in zip(target_ids, positions, strict=True):

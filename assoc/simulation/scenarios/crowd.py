@@ -12,7 +12,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radar_over
 from assoc.simulation.scenarios.base import ScenarioParameters
@@ -66,7 +66,7 @@ def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
     rate = p.false_alarms_per_target * p.targets
-    require_room(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
+    require_scene_memory(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
     width = p.width * (np.sqrt(p.targets / REFERENCE_TARGETS) if p.constant_density else 1.0)
     box = np.array([[0.0, width], [0.0, width], [0.0, p.height]])
     start = rng.uniform(box[:, 0], box[:, 1], size=(p.targets, 3))

@@ -16,7 +16,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.scenarios.base import ScenarioParameters
@@ -66,7 +66,7 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
     flights = [_flight(p, zones, rng) for _ in range(p.targets)]
     beats = max(path.length for path in flights) / p.speed / p.interval + 1
     names = "1/interval radars targets false_alarms"
-    require_room(beats, p.radars, p.targets, p.false_alarms, names)
+    require_scene_memory(beats, p.radars, p.targets, p.false_alarms, names)
     heights = rng.uniform(p.height / 3, p.height, p.targets)
     tracks = [path.sample(p.speed, p.interval)[1] for path in flights]
     scans = max(len(track) for track in tracks)

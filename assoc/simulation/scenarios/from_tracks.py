@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.scene import Scene
 from assoc.simulation.geodesy import east_north_up
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.scenarios.base import ScenarioParameters
@@ -104,7 +104,7 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     reports = east_north_up(recording.latitude, recording.longitude, recording.height, origin)
     times = _epochs(p, recording)
     targets = len(np.unique(recording.target))
-    require_room(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
+    require_scene_memory(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
     ids, positions = resample(recording, reports, times, p.max_gap)
     region = around(reports, 0.01)
     diagonal = float(np.hypot(*(region[:2, 1] - region[:2, 0])))

@@ -14,7 +14,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.scenarios.base import ScenarioParameters
@@ -69,7 +69,7 @@ REFERENCE_RANGE = 50_000.0
 def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
-    require_room(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
+    require_scene_memory(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
     times = parameters.interval * np.arange(parameters.scans)
     paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
     region = around(paths, parameters.margin)

@@ -12,7 +12,7 @@ from assoc.costs.tracks.scores import doubted_gain, log_birth
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
+from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
 class MultiSensorTracker(SingleScanTracker):
@@ -36,7 +36,7 @@ class MultiSensorTracker(SingleScanTracker):
 
     name = "multi-sensor"
 
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         measurements = list(scan.measurements)
         tuples = grow_track_tuples(
             self.filter, states, measurements, self.sensors, self.terms,
@@ -52,7 +52,7 @@ class MultiSensorTracker(SingleScanTracker):
         solution = self._assign(problem)
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return Outcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
+        return ScanOutcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""

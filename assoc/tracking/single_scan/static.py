@@ -15,7 +15,7 @@ from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
+from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
 class StaticFusionTracker(SingleScanTracker):
@@ -33,7 +33,7 @@ class StaticFusionTracker(SingleScanTracker):
 
     name = "static"
 
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         fused = self._assign(
             build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
         ).tuples
@@ -53,7 +53,7 @@ class StaticFusionTracker(SingleScanTracker):
         free = np.ones(len(fused) + 1, dtype=np.bool_)
         free[chosen] = False
         after = concatenate([corrected, states])[kept]
-        return Outcome(after, gain[kept], rows, fused[free[1:]])
+        return ScanOutcome(after, gain[kept], rows, fused[free[1:]])
 
     def _pairs(self, scan: Scan, states: Any, fused: Array) -> tuple[Array, Array, Array, Any]:
         """Tracks and tuples within the gates: rows of both, costs, and the corrected states."""
