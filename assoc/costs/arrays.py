@@ -13,18 +13,14 @@ from assoc.costs.conversion import convert
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-
-# the codes are known to the kernels in conversion.py and kernels.py
-_CODES = {PositionSensor: 0, Radar3D: 1, Radar2D: 2, BearingSensor: 3}
-POSITION, BEARING = 0, 3
+from assoc.sensors.codes import BEARING, CODES
 
 
 class SensorArrays(NamedTuple):
     """The sensors of a scene, S of them, in the form the kernels take."""
 
     code: Array
-    """Measurement model, int64 (S,): 0 position, 1 range-azimuth-elevation, 2 range-azimuth, 3 azimuth."""
+    """Kind of each, int64 (S,); see `assoc.sensors.codes`."""
     dim: Array
     """Components of a measurement, int64 (S,)."""
     place: Array
@@ -96,7 +92,7 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     # a flat region says where the targets are, it must not overrule what the sensors measure
     half = np.maximum(half, 0.1 * half.max())
     return SensorArrays(
-        code=np.array([_CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
+        code=np.array([CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
         dim=np.array([sensor.dim for sensor in scene.sensors], dtype=np.int64),
         place=np.array([sensor.position for sensor in scene.sensors]),
         covariance=covariance,

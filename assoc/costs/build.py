@@ -13,7 +13,7 @@ from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
-from assoc.costs.positions import _scan
+from assoc.costs.positions import scan_of
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
@@ -77,7 +77,7 @@ def build_problem(
         probability = math.nan
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
-    one = _scan(scene, scan)
+    one = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]

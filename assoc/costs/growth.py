@@ -8,11 +8,12 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
-from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
+from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
 from assoc.costs.limits import refuse, too_many
 from assoc.costs.pairs import Pairs
+from assoc.sensors.codes import BEARING
 
 # an azimuth predicted with a larger standard deviation (rad) is not trusted to rule measurements out
 _TRUSTED = 0.03

@@ -7,11 +7,12 @@ import weakref
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors.codes import POSITION
 
 
 def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
@@ -108,12 +109,13 @@ def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array
     return positions, covariances
 
 
-def _scan(scene: Scene, scan: int | Scan) -> Scan:
+def scan_of(scene: Scene, scan: int | Scan) -> Scan:
+    """Scan of that number, or the scan itself."""
     return scan if isinstance(scan, Scan) else scene.scan(scan)
 
 
 def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
-    one = _scan(scene, scan)
+    one = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
     measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
     count, sizes = len(scene.sensors), one.sizes

@@ -13,7 +13,7 @@ from assoc.filters.kernels.gaussian import GIVEN, LINEAR
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import finite, positive_definite
 from assoc.sensors.base import Sensor
-from assoc.sensors.kernels import CODES
+from assoc.sensors.codes import CODES, POSITION
 
 _NO_MATRIX = np.zeros((0, 0))
 _NO_PLACE = np.zeros(3)
@@ -147,7 +147,7 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
     if isinstance(measurement, Sensor):
         columns = np.array(motion.position, dtype=np.int64)
         code = CODES.get(type(measurement))
-        if code == 0 and measurement.dim > len(columns):
+        if code == POSITION and measurement.dim > len(columns):
             raise InvalidInputError(
                 f"sensor measures {measurement.dim} coordinates, the motion model has {len(columns)}"
             )

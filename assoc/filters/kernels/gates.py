@@ -10,7 +10,7 @@ from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, GOOD, LINEAR, LOG_TURN, PLAIN, STATUSES, modify
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels import linearise, wrap
+from assoc.sensors.kernels.dispatch import linearise, wrap
 
 
 @njit

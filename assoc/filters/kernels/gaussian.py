@@ -14,7 +14,7 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels import linearise, wrap
+from assoc.sensors.kernels.dispatch import linearise, wrap
 
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""

@@ -20,7 +20,7 @@ from assoc.filters.kernels.gaussian import (
 )
 from assoc.filters.kernels.gaussian import correct as correct_one
 from assoc.filters.kernels.linear_algebra import factor, solve_in_place
-from assoc.sensors.kernels import measure, wrap
+from assoc.sensors.kernels.dispatch import measure, wrap
 
 
 @njit
