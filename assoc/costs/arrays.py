@@ -22,7 +22,7 @@ class SensorArrays(NamedTuple):
     code: Array
     """Kind of each, int64 (S,); see `assoc.sensors.codes`."""
     dim: Array
-    """Components of a measurement, int64 (S,)."""
+    """Components of a measurement that tell of the position, int64 (S,)."""
     place: Array
     """(S, 3), metres."""
     covariance: Array
@@ -45,7 +45,7 @@ class ScanArrays(NamedTuple):
     """The N measurements of one scan, sensor after sensor, in the form the kernels take."""
 
     z: Array
-    """Measurements padded with zeros, (N, 3); those of a bearing sensor sorted by azimuth."""
+    """Measurements without range rates, padded with zeros, (N, 3); those of a bearing sensor sorted by azimuth."""
     owner: Array
     """Sensor of each, int64 (N,)."""
     start: Array
@@ -74,9 +74,11 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     covariance, weight = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     gain, base = np.zeros(count), 0.0
     for s, sensor in enumerate(scene.sensors):
-        d = sensor.dim
-        covariance[s, :d, :d] = sensor.covariance
-        weight[s, :d, :d] = np.linalg.inv(sensor.covariance)
+        # range rates have no part in positions; `assoc.costs.range_rates` weighs them
+        located = sensor.position_part
+        d = located.dim
+        covariance[s, :d, :d] = located.covariance
+        weight[s, :d, :d] = np.linalg.inv(located.covariance)
         log_determinant = float(np.linalg.slogdet(2 * math.pi * sensor.covariance)[1])
         detected = math.log(sensor.detection_probability * sensor.volume / sensor.false_alarm_rate)
         missed = -math.log1p(-sensor.detection_probability)
@@ -93,11 +95,11 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     half = np.maximum(half, 0.1 * half.max())
     return SensorArrays(
         code=np.array([CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
-        dim=np.array([sensor.dim for sensor in scene.sensors], dtype=np.int64),
+        dim=np.array([sensor.position_part.dim for sensor in scene.sensors], dtype=np.int64),
         place=np.array([sensor.position for sensor in scene.sensors]),
         covariance=covariance,
         weight=weight,
-        full=np.array([sensor.dim == 3 for sensor in scene.sensors]),
+        full=np.array([sensor.dim >= 3 for sensor in scene.sensors]),
         middle=scene.region.mean(axis=1),
         half=half,
         gain=gain,
@@ -128,7 +130,7 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
             order = np.argsort(azimuth, kind="stable")
             z[rows, 0] = azimuth[order]
         else:
-            z[rows, : measured.shape[1]] = measured
+            z[rows, : sensors.dim[s]] = measured[:, : sensors.dim[s]]
         index[rows] = order + 1
     centre, spread, information = convert(
         sensors.code,

@@ -45,6 +45,8 @@ class ModifiedEKF(GaussianFilter):
         o = super().observe(sensor)
         if o.code != RADAR3D:
             raise InvalidInputError(f"sensor must be a Radar3D for a modified EKF, got {type(sensor).__name__}")
+        if o.dim != 3:
+            raise InvalidInputError("sensor: a modified EKF takes no range rate; use ExtendedKalmanFilter")
         if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
         return o

@@ -48,7 +48,7 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[An
 
 def planar(sensors: Sequence[Sensor]) -> bool:
     """Whether no sensor tells a height, so that states of two dimensions are enough."""
-    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim == 3 for one in sensors)
+    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim >= 3 for one in sensors)
 
 
 def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:

@@ -42,6 +42,18 @@ def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> No
 
 
 @njit
+def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Array, columns: int) -> float:
+    """Write the range rate's derivatives by position and, from `columns` on, by velocity into H[3]; return it."""
+    slant = math.hypot(max(math.hypot(dx, dy), NEAREST), dz)
+    u = (dx / slant, dy / slant, dz / slant)
+    rate = u[0] * velocity[0] + u[1] * velocity[1] + u[2] * velocity[2]
+    for i in range(columns):
+        H[3, i] = (velocity[i] - rate * u[i]) / slant
+        H[3, columns + i] = u[i]
+    return rate
+
+
+@njit
 def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums

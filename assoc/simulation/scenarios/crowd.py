@@ -52,14 +52,19 @@ class CrowdParameters(ScenarioParameters):
     false_alarms_per_target: float = field(
         default=0.1, metadata={"help": "mean false alarms per sensor and scan, for each target"}
     )
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", "sensors")
         self._number("interval", "width", "height", "noise", "false_alarms_per_target", above=0.0)
-        self._number("speed", least=0.0)
+        self._number("speed", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
         if self.sensor not in ("position", "radar"):
             raise InvalidInputError(f"sensor: expected 'position' or 'radar', got {self.sensor!r}")
+        if self.range_rate_noise > 0 and self.sensor != "radar":
+            raise InvalidInputError("range_rate_noise: only radars measure range rate, set sensor to 'radar'")
 
 
 def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
@@ -76,7 +81,9 @@ def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -
     # nobody leaves the region, however long the scene lasts
     region = box + p.speed * times[-1] * np.array([[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     ids = [np.arange(p.targets)] * p.scans
-    return observe(_sensors(p, region), times, ids, paths, rng, region=region, name=name)
+    return observe(
+        _sensors(p, region), times, ids, paths, rng, region=region, name=name, velocities=[velocity] * p.scans
+    )
 
 
 def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
@@ -94,6 +101,8 @@ def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
                 detection_probability=p.detection_probability,
                 false_alarm_rate=rate,
                 name=f"radar {number}",
+                range_rate_noise=p.range_rate_noise,
+                fastest=p.speed,
             )
             for number, place in enumerate(places, start=1)
         ]

@@ -45,6 +45,9 @@ class DubinsParameters(ScenarioParameters):
     )
     detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
     false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("targets", "radars", most=10_000)
@@ -53,7 +56,7 @@ class DubinsParameters(ScenarioParameters):
             "interval", "speed", "turning_radius", "obstacle_radius", "width", "height", "noise", "false_alarms",
             above=0.0,
         )  # fmt: skip
-        self._number("margin", least=0.0)
+        self._number("margin", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
         if self.width < 4 * self.turning_radius:
             raise InvalidInputError(f"width: expected at least four turning radii, got {self.width!r}")
@@ -90,6 +93,8 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
             detection_probability=p.detection_probability,
             false_alarm_rate=p.false_alarms,
             name=f"radar {number}",
+            range_rate_noise=p.range_rate_noise,
+            fastest=p.speed,
         )
         for number, place in enumerate(on_circle(region.mean(axis=1), distance, p.radars), start=1)
     ]

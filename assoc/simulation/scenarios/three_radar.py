@@ -54,11 +54,14 @@ class ThreeRadarParameters(ScenarioParameters):
     margin: float = field(
         default=0.1, metadata={"help": "how far the region reaches past the trajectories, as a share of them"}
     )
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("scans", "radars")
         self._number("interval", "noise", "false_alarms", above=0.0)
-        self._number("radar_distance", "margin", least=0.0)
+        self._number("radar_distance", "margin", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
 
 
@@ -72,6 +75,8 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
     require_scene_memory(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
     times = parameters.interval * np.arange(parameters.scans)
     paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
+    speeds = np.stack([trajectory.velocities(times) for trajectory in TRAJECTORIES], axis=1)
+    fastest = float(np.linalg.norm(speeds, axis=2).max())
     region = around(paths, parameters.margin)
     places = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
     sensors = [
@@ -83,11 +88,13 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
             detection_probability=parameters.detection_probability,
             false_alarm_rate=parameters.false_alarms,
             name=f"radar {number}",
+            range_rate_noise=parameters.range_rate_noise,
+            fastest=fastest,
         )
         for number, place in enumerate(places, start=1)
     ]
     ids = [np.arange(len(TRAJECTORIES))] * parameters.scans
-    return observe(sensors, times, ids, list(paths), rng, region=region, name=name)
+    return observe(sensors, times, ids, list(paths), rng, region=region, name=name, velocities=list(speeds))
 
 
 def around(positions: Array, margin: float) -> Array:

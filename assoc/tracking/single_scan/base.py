@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.scores import log_birth
+from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import TrackBatch
@@ -53,6 +55,13 @@ class SingleScanTracker(Tracker):
     def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         """Associate a scan with predicted tracks of these scores."""
 
+    def _problem(self, scan: Scan) -> AssignmentProblem:
+        """Which measurements of a scan may be a target, whether there is a track of it or not."""
+        return build_problem(
+            self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples,
+            speed=self.initiation.speed,
+        )  # fmt: skip
+
     @property
     def _volume(self) -> float:
         """Of the region, m^3."""
@@ -71,9 +80,8 @@ class SingleScanTracker(Tracker):
         states = self.initiation.start(self.filter, positions, covariances)
         seen = rows > 0
         several = log_birth(covariances, self._volume, self.initiation.birth_rate)
-        score = np.where(
-            seen.sum(axis=1) == 1, self._single_scores(rows), several - tuple_costs(self._place, scan, rows)
-        )
+        costs = tuple_costs(self._place, scan, rows, speed=self.initiation.speed)
+        score = np.where(seen.sum(axis=1) == 1, self._single_scores(rows), several - costs)
         return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
 
     def _single_scores(self, rows: Array) -> Array:

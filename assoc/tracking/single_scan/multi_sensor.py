@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.build import build_problem
 from assoc.costs.tracks.scores import doubted_gain, log_birth
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
@@ -56,7 +55,7 @@ class MultiSensorTracker(SingleScanTracker):
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""
-        problem = build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
+        problem = self._problem(scan)
         rows, costs = problem.tuples, np.array(problem.costs)
         several = np.count_nonzero(rows, axis=1) > 1
         # where false alarms are rarer than new targets a single measurement is one, too

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.build import build_problem
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.scores import doubted_gain
@@ -34,9 +33,7 @@ class StaticFusionTracker(SingleScanTracker):
     name = "static"
 
     def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
-        fused = self._assign(
-            build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
-        ).tuples
+        fused = self._assign(self._problem(scan)).tuples
         track, which, costs, corrected = self._pairs(scan, states, fused)
         count, alone = len(states), -float(self.terms.miss.sum())
         # every track may be missed: (track, 0), with the state as predicted
