@@ -131,6 +131,21 @@ class Parameters:
 
     __slots__ = ()
 
+    def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
+        """Estimate the memory that a solver takes with these parameters, beside the problem itself.
+
+        Parameters
+        ----------
+        num_columns, num_rows : int
+            Of the packing: candidate tuples and measurements.
+
+        Returns
+        -------
+        (float, str, str) or None
+            Bytes, what would take them, and how to take fewer; None: next to nothing.
+        """
+        return None
+
     def _require(self, condition: bool, name: str, expected: str) -> None:
         if not condition:
             raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")

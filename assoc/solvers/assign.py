@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system import memory
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.packing import Packing
@@ -69,6 +70,9 @@ def assign(
         prepared = prepare(problem)
         run.offset = prepared.offset
         packing = prepared.packing
+        estimate = chosen.memory(packing.num_columns, packing.num_rows)
+        if estimate is not None:
+            memory.require(*estimate)
         if solver != "greedy":
             prepare_fallback(packing, run)
         try:

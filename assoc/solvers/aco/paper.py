@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system import memory
 from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc._types import Floats
@@ -48,12 +47,6 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     positive = transformed(costs, parameters.visibility, parameters.scale)
     visibility = 1.0 / positive  # eq. 7
     pheromone = visibility.copy()
-    # their tours, and the owners of rows from which they are made
-    memory.require(
-        8.0 * parameters.ants * packing.num_rows,
-        f"ants = {parameters.ants} on {packing.num_rows} measurements",
-        "take fewer ants",
-    )
     tours = np.full((parameters.ants, packing.num_rows), -1, dtype=np.int32)
     lengths = np.zeros(parameters.ants, dtype=np.int64)
     starts = run.rng.permutation(costs.size)[np.arange(parameters.ants) % costs.size]

@@ -60,3 +60,9 @@ class AcoParameters(Parameters):
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
         self._number("scale", above=0.0)
         self._whole("clusters", least=0)
+
+    def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
+        """In mode paper: the ants' tours, and the owners of rows from which they are made."""
+        if self.mode != "paper":
+            return None
+        return 8.0 * self.ants * num_rows, f"ants = {self.ants} on {num_rows} measurements", "take fewer ants"

@@ -46,3 +46,8 @@ class GeneticParameters(Parameters):
         self._number("mutation", least=0.0, most=1.0)
         self._whole("iterations", "patience")
         self._whole("clusters", least=0)
+
+    def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
+        """The members in a list, and again as an array."""
+        what = f"population = {self.population} on {num_rows} measurements"
+        return 8.0 * self.population * num_rows, what, "take a smaller population"

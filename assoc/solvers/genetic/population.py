@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system import memory
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.components.component import Component
@@ -36,12 +35,6 @@ class Breeding:
 
     def __init__(self, component: Component, parameters: GeneticParameters) -> None:
         self.parameters = parameters
-        # the members in a list, and again as an array
-        memory.require(
-            8.0 * parameters.population * component.packing.num_rows,
-            f"population = {parameters.population} on {component.packing.num_rows} measurements",
-            "take a smaller population",
-        )
         self.members = np.empty((0, component.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)
 

@@ -9,6 +9,10 @@ from assoc._parameters import Parameters
 BACKENDS = ("scip", "cp_sat", "highs")
 
 
+# bytes for each tuple of three sensors, measured on 1e5 tuples (docs/reliability.md)
+_MODEL = {"scip": 7_000.0, "cp_sat": 6_000.0, "highs": 2_300.0}
+
+
 @dataclass(frozen=True)
 class MilpParameters(Parameters):
     """Parameters of ``milp``.
@@ -28,3 +32,16 @@ class MilpParameters(Parameters):
     def __post_init__(self) -> None:
         self._require(self.backend in BACKENDS, "backend", "one of " + ", ".join(BACKENDS))
         self._whole("workers", most=1024)
+
+    def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
+        """The backend's model; with each worker come a stack and a copy of it."""
+        if num_columns == 0:
+            return None
+        workers = self.workers if self.backend == "cp_sat" else 1
+        needed = _MODEL[self.backend] * num_columns * (1.0 + 0.5 * (workers - 1)) + 10e6 * (workers - 1)
+        several = f" with workers = {workers}" if workers > 1 else ""
+        return (
+            needed,
+            f"milp: backend {self.backend} on {num_columns} tuples{several}",
+            "take fewer workers" if workers > 1 else "take solver exact, which needs less",
+        )

@@ -22,7 +22,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system import memory
 from assoc._system.in_time import StopSignal, in_time
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.branching.feasibility import infeasible
@@ -35,8 +34,6 @@ from assoc.solvers.milp.cp_sat import solve_by_cp_sat
 from assoc.solvers.milp.math_opt import solve_by_math_opt
 from assoc.solvers.milp.parameters import MilpParameters
 
-# bytes for each tuple of three sensors, measured on 1e5 tuples (docs/reliability.md)
-_MODEL = {"scip": 7_000.0, "cp_sat": 6_000.0, "highs": 2_300.0}
 # seconds that a model takes for each entry of its matrix, at the least (measured: 1.3e-6 and 2.8e-6)
 _ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
 
@@ -53,7 +50,6 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         if packing.is_axial:
             raise infeasible(packing)
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
-    _require_memory(packing, parameters)
     bound, duals = -math.inf, None
     columns: NDArray[np.integer] | None = None
     if run.time_limit is None:
@@ -77,19 +73,6 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         bound, duals = answer.bound, None
     run.record(answer.nodes, float(packing.weights[columns].sum()), bound)
     return Outcome(columns, answer.nodes, bound, duals)
-
-
-def _require_memory(packing: Packing, parameters: MilpParameters) -> None:
-    """Refuse a model that would take more memory than there is."""
-    workers = parameters.workers if parameters.backend == "cp_sat" else 1
-    # with each worker come a stack and a copy of the model
-    needed = _MODEL[parameters.backend] * packing.num_columns * (1.0 + 0.5 * (workers - 1)) + 10e6 * (workers - 1)
-    memory.require(
-        needed,
-        f"milp: backend {parameters.backend} on {packing.num_columns} tuples"
-        + (f" with workers = {workers}" if workers > 1 else ""),
-        "take fewer workers" if workers > 1 else "take solver exact, which needs less",
-    )
 
 
 def _solve(packing: Packing, parameters: MilpParameters, seconds: float, stop: StopSignal | None = None) -> Answer:
