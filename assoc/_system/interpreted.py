@@ -27,7 +27,7 @@ import numpy as np
 
 # elements of a call's arrays, all together, up to which it may be interpreted
 SMALL = 6000
-# seconds for which a kernel is interpreted, all calls together: about what compiling takes
+# processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
 PATIENCE = 6.0
 # seconds between two looks whether the kernel has come into the cache
 _LOOK = 0.5
@@ -72,7 +72,7 @@ def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..
 
     def interpreted(*arguments: Any) -> Any:
         nonlocal spent
-        started = time.perf_counter()
+        started = time.thread_time()
         thread.interpreting = True
         try:
             # compiled code is silent about overflow
@@ -80,7 +80,7 @@ def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..
                 return function(*arguments)
         finally:
             thread.interpreting = False
-            spent += time.perf_counter() - started
+            spent += time.thread_time() - started
 
     def choose(*arguments: Any) -> Any:
         nonlocal looked
