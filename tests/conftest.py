@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 
 from hypothesis import settings
+
+# tests are of compiled kernels, and what they start is not to compile beside them; those of interpreting switch it on
+os.environ.setdefault("ASSOC_INTERPRET", "0")
 
 # the first example pays for compilation, and machines differ: a deadline would only find that out
 settings.register_profile("assoc", deadline=None)
