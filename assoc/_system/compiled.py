@@ -23,7 +23,7 @@ import numpy as np
 from numba.core import caching, event
 
 from assoc._system import temporary
-from assoc._system.interpreted import NotCompiled, first_small, thread
+from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -92,10 +92,13 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
         return found
 
 
-def njit(function: Callable[..., Any], *, stand_in: Callable[..., Any] | None = None) -> Any:
+def njit(
+    function: Callable[..., Any], *, small: int = SMALL, stand_in: Callable[..., Any] | None = None
+) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``.
 
-    Until it is compiled, small calls are interpreted (interpreted.py), by ``stand_in`` where that is given.
+    Until it is compiled, calls with arrays of at most ``small`` elements together are interpreted (interpreted.py), by
+    ``stand_in`` where that is given.
 
     With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
     """
@@ -111,8 +114,13 @@ def njit(function: Callable[..., Any], *, stand_in: Callable[..., Any] | None = 
     # nowhere to keep it, not even for a while: each process compiles for itself
     with contextlib.suppress(OSError):
         kernel._cache = _KernelCache(function)
-        kernel._compile_for_args = first_small(kernel, stand_in)
+        kernel._compile_for_args = first_small(kernel, small, stand_in)
     return kernel
+
+
+def search_njit(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that searches a tree: as `njit`, but interpreted only where its arrays are very small."""
+    return njit(function, small=SMALL_SEARCH)
 
 
 class _Loads(event.Listener):

@@ -12,6 +12,7 @@ that has been interpreted for longer than compiling would have taken. Results ar
 from __future__ import annotations
 
 import base64
+import contextlib
 import functools
 import importlib
 import os
@@ -20,13 +21,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
-# elements of a call's arrays, all together, up to which it may be interpreted
-SMALL = 6000
+# elements of a call's arrays, all together, up to which it may be interpreted; and of kernels that search a tree,
+# whose work grows faster than their arrays
+SMALL, SMALL_SEARCH = 6000, 1500
 # processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
 PATIENCE = 6.0
 # seconds between two looks whether the kernel has come into the cache
@@ -39,11 +41,23 @@ class NotCompiled(Exception):  # noqa: N818  (it is no error)
     """The kernel is in no cache, and may be interpreted."""
 
 
+@contextlib.contextmanager
+def compiled_only() -> Iterator[None]:
+    """Interpret nothing in this thread: for those who want the compiled code now."""
+    before, thread.never = thread.never, True
+    try:
+        yield
+    finally:
+        thread.never = before
+
+
 class _Thread(threading.local):
     """What a thread is at."""
 
     # whether a kernel that is in no cache may be interpreted instead
     may_interpret = False
+    # whether nothing may be interpreted
+    never = False
     # whether an interpreted kernel runs: what it calls is interpreted with it
     interpreting = False
 
@@ -51,12 +65,14 @@ class _Thread(threading.local):
 thread = _Thread()
 
 
-def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..., Any]:
+def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) -> Callable[..., Any]:
     """Return what a kernel does on arguments of new types: load, interpret or compile.
 
     Parameters
     ----------
     kernel : Dispatcher
+    small : int
+        Elements of the arguments up to which a call may be interpreted.
     stand_in : callable, optional
         What is called instead of the Python function, where that cannot be interpreted.
 
@@ -86,7 +102,7 @@ def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..
         nonlocal looked
         if thread.interpreting:
             return function
-        if spent > PATIENCE or not _are_small(arguments):
+        if thread.never or spent > PATIENCE or _elements(arguments) > small:
             return compiled(*arguments)
         if time.monotonic() - looked < _LOOK:
             return interpreted
@@ -101,10 +117,6 @@ def first_small(kernel: Any, stand_in: Callable[..., Any] | None) -> Callable[..
             thread.may_interpret = False
 
     return choose if _switched_on else compiled
-
-
-def _are_small(arguments: tuple[Any, ...]) -> bool:
-    return _elements(arguments) <= SMALL
 
 
 def _elements(value: Any) -> int:
@@ -169,8 +181,11 @@ def _compile_beside(function: Any, kinds: Any) -> None:
 
 
 def _serve() -> None:
-    """Compile what the lines of standard input ask for."""
+    """Compile what the lines of standard input ask for, as long as the process that asks is there."""
+    parent = os.getppid()
     for line in sys.stdin.buffer:
+        if os.getppid() != parent:
+            return
         module, name, kinds = pickle.loads(base64.b64decode(line))
         kernel = getattr(importlib.import_module(module), name)
         kernel.compile(kinds)

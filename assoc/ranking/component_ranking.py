@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
 from assoc.packing.branching.doubtful_pairs import doubtful_pairs, new_doubts
 from assoc.packing.branching.nodes import (
@@ -141,7 +141,7 @@ def _sorted_store(store: Store) -> Any:
     return weights, columns
 
 
-@njit
+@search_njit
 def _rank(
     packing: PackingArrays, stack: NodeArrays, num_open: int, wanted: Wanted, store: Store, node_limit: int
 ) -> Any:
@@ -204,7 +204,7 @@ def _rank(
     return num_open, nodes, store
 
 
-@njit
+@search_njit
 def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, wanted: Wanted) -> Any:
     """Enumerate the k lightest solutions of each component of a packing.
 

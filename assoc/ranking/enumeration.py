@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
 from assoc.packing.kernels.heap import doubled, pop, push
 
@@ -147,7 +147,7 @@ def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: 
     return store
 
 
-@njit
+@search_njit
 def enumerate_solutions(
     priced: PricedColumns, top: int, end: int, base: float, wanted: Wanted, check: bool, store: Store
 ) -> Any:

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
 from assoc.packing.kernels.heap import doubled, pop, push
 from assoc.packing.packing import Packing
@@ -112,7 +112,7 @@ def log_partition(
     return total
 
 
-@njit
+@search_njit
 def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     """Bound ln Z(a) of one component by splitting the part of the largest product first."""
     cols, row_ptr, row_cols, log_weights, _, log_alone, _ = terms

@@ -7,13 +7,16 @@ ones never meet branch and bound, and the first hard one would wait for half a m
 from __future__ import annotations
 
 import contextlib
+import subprocess
+import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
 from assoc.packing.kernels.sorting import ascending
 from assoc.problem import AssignmentProblem
@@ -27,11 +30,15 @@ _TUPLES = 2000
 _LIMITS = {"patience": 12, "nodes": 60}
 
 
+# what a second process compiles while this one compiles the kernels of the other solvers
+_HEURISTICS = ("aco", "genetic", "tabu")
+
+
 def warm_up(solvers: Iterable[str] | None = None) -> float:
     """Compile the kernels of solvers, or load them, so that no later call of ``assign`` has to.
 
-    After an installation this takes a minute or more, afterwards a second or two. Worth a call at the start of a
-    program with time limits, and once after the installation.
+    Call it once after installation: it then takes up to a minute, and uses two processes. Afterwards it takes a second
+    or two; worth a call at the start of a program with time limits. On a terminal it says on stderr what it is at.
 
     Parameters
     ----------
@@ -51,27 +58,90 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     started = time.perf_counter()
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:
-        known = {field.name for field in fields(registry.parameters(name))}  # type: ignore[arg-type]
-        limits: dict[str, Any] = {key: value for key, value in _LIMITS.items() if key in known}
-        for problem in _problems():
-            # with a limit and without: what looks at the clock is asked to look
-            for limit in (None, 1e3):
-                with contextlib.suppress(InfeasibleError):
-                    assign(problem, name, time_limit=limit, **limits)
-                # what was prepared is made anew
-                problem._prepared = None
-    # only large problems sort so, and their time limits are the hardest to keep
-    ascending(np.zeros(10_000))
+        registry.parameters(name)
+    # small problems first: their kernels are shared between two processes without compiling any twice
+    beside = [name for name in names if name in _HEURISTICS]
+    here = [name for name in names if name not in beside]
+    with compiled_only(), _Line() as say:
+        helper = _begin_beside(beside) if beside and here else None
+        for name in here:
+            say(name)
+            _solve_all(name, _easy_problems())
+        if helper is not None:
+            say(", ".join(beside))
+            helper.wait()
+        for name in names:
+            say(name)
+            _solve_all(name, _problems())
+        # only large problems sort so, and their time limits are the hardest to keep
+        ascending(np.zeros(10_000))
     return time.perf_counter() - started
+
+
+class _Line:
+    """One line on a terminal that says what is being prepared."""
+
+    def __enter__(self) -> Callable[[str], None]:
+        self._shown = sys.stderr is not None and sys.stderr.isatty()
+        return self._say
+
+    def _say(self, name: str) -> None:
+        if self._shown:
+            print(f"\r\033[Kassoc: preparing {name} (slow only once after installation)", end="", file=sys.stderr)
+            sys.stderr.flush()
+
+    def __exit__(self, *exception: object) -> None:
+        if self._shown:
+            print("\r\033[K", end="", file=sys.stderr)
+            sys.stderr.flush()
+
+
+def _begin_beside(names: list[str]) -> subprocess.Popen[bytes] | None:
+    """Start a process that compiles the kernels of these solvers; None where none can be started."""
+    code = f"from assoc.solvers.warm_up import prepare_easy; prepare_easy({names!r})"
+    command = [sys.executable, "-c", code]
+    quiet: Any = subprocess.DEVNULL
+    try:
+        return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+    except OSError:
+        return None
+
+
+def prepare_easy(names: Iterable[str]) -> None:
+    """Compile what easy problems need of some solvers; for the second process of `warm_up`."""
+    with compiled_only():
+        for name in names:
+            _solve_all(name, _easy_problems())
+
+
+def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
+    known = {field.name for field in fields(registry.parameters(name))}  # type: ignore[arg-type]
+    limits: dict[str, Any] = {key: value for key, value in _LIMITS.items() if key in known}
+    for problem in problems:
+        # with a limit and without: what looks at the clock is asked to look
+        for limit in (None, 1e3):
+            with contextlib.suppress(InfeasibleError):
+                assign(problem, name, time_limit=limit, **limits)
+            # what was prepared is made anew
+            problem._prepared = None
+
+
+def _easy_problems() -> list[AssignmentProblem]:
+    """Problems too small for `exact` to call a metaheuristic, but not closed by their bound."""
+    rng = np.random.default_rng(2)
+    return [_random_problem(rng, 8, 150)]
 
 
 def _problems() -> list[AssignmentProblem]:
     """Hard problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one."""
     rng = np.random.default_rng(1)
-    sizes = [_ROWS] * 3
-    tuples = rng.integers(0, _ROWS + 1, size=(_TUPLES, 3))
-    tuples = tuples[np.count_nonzero(tuples, axis=1) >= 2]
-    dense = AssignmentProblem(tuples, -rng.gamma(4.0, 1.0, size=len(tuples)), sizes)
+    dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
     planar = AssignmentProblem.from_dense(rng.normal(size=(5, 6)))
     return [dense, axial, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
+
+
+def _random_problem(rng: np.random.Generator, rows: int, count: int) -> AssignmentProblem:
+    tuples = rng.integers(0, rows + 1, size=(count, 3))
+    tuples = tuples[np.count_nonzero(tuples, axis=1) >= 2]
+    return AssignmentProblem(tuples, -rng.gamma(4.0, 1.0, size=len(tuples)), [rows] * 3)

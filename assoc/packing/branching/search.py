@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
 from assoc.packing.branching.doubtful_pairs import child_bound, doubtful_pairs, new_child, new_doubts
 from assoc.packing.branching.nodes import (
@@ -176,7 +176,7 @@ def _most_decisive(
     return pick
 
 
-@njit
+@search_njit
 def _search(
     packing: PackingArrays, stack: NodeArrays, num_open: int, incumbent: float, limits: Limits, found: Any
 ) -> Any:

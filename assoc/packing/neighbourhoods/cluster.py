@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
 from assoc.packing.kernels.columns import first_row
@@ -202,7 +202,7 @@ def _grow(
     return num
 
 
-@njit
+@search_njit
 def _search_clusters(
     packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, effort: _Effort, deadline: float
 ) -> Any:

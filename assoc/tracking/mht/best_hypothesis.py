@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Array
 
 VISITS = 100_000
@@ -42,7 +42,7 @@ def choose(tree: Array, score: Array, history: Array) -> Array | None:
     return chosen
 
 
-@njit
+@search_njit
 def _choose(tree: Any, score: Any, history: Any, visits: int, chosen: Any) -> bool:
     """Fill in `chosen`; False when the visits are used up."""
     good = np.flatnonzero(score > 0.0)
@@ -123,7 +123,7 @@ def _mark(history: Any, first: Any, used: Any, row: int, value: bool) -> None:
             used[first[c] + m - 1] = value
 
 
-@njit
+@search_njit
 def _search(
     trees: Any, good: Any, start: Any, score: Any, history: Any, first: Any, used: Any, left: int, chosen: Any
 ) -> int:
