@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba.core import caching, event
 
-from assoc._system import temporary
+from assoc._system import shipped, temporary
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -78,14 +78,18 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
             super().save_overload(sig, data)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load compiled code; what cannot be read (a file cut by a crash) is compiled again, and replaced."""
+        """Load compiled code, own or shipped; what cannot be read (cut by a crash) is compiled again, and replaced."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         except Exception:
             # an index that cannot be read cannot be added to either
             with contextlib.suppress(OSError):
                 self.flush()
-            return None
+            found = None
+        if found is None:
+            with contextlib.suppress(Exception):
+                found = shipped.load(self, sig, target_context)
+        return found
 
 
 def njit(function: Callable[..., Any]) -> Any:
