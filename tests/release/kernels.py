@@ -75,7 +75,8 @@ def go() -> None:
     read: set[str] = set()
 
     def note(what: str, arguments: Any) -> None:
-        if what == "open" and isinstance(arguments[0], str) and arguments[0].endswith(".nbc") and arguments[1] == "rb":
+        # those that are written get their names when they are complete
+        if what == "open" and isinstance(arguments[0], str) and arguments[0].endswith(".nbc"):
             read.add(arguments[0])
 
     sys.addaudithook(note)

@@ -22,7 +22,7 @@ from tests.release.requirements import canonical, read
 def table(folder: Path) -> list[str]:
     """Lines of a table of the wheels in a folder, the largest first."""
     base = [one.name for one in read() if one.group == "base"]
-    through = {canonical(name): "" for name in base} | {name: ", ".join(sorted(by)) for name, by in behind(base).items()}
+    through = {name: ", ".join(sorted(roots)) for name, roots in behind(base).items()}
     rows = []
     for path in folder.glob("*.whl"):
         with zipfile.ZipFile(path) as archive:
