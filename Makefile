@@ -6,7 +6,8 @@
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
 # make test-uncompiled  a part of the tests with numba switched off
 # make test-cold        the same bytes with a cold cache of kernels, a warm one, and on 1, 2 and 4 processes
-# make check-dist       sdist and wheel: what they hold, and that they work in an empty environment
+# make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
+# make check-dist       builds them, checks what they hold, that they work in an empty environment, and compile nothing
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
 
@@ -21,7 +22,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-oldest test-uncompiled test-cold lint docs fuzz check-dist audit bench bench-quick clean
+.PHONY: demo test test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -53,6 +54,9 @@ test-uncompiled: $(VENV)/.installed-test
 test-cold: $(VENV)/.installed-test
 	$(PY) -m tests.reliability.cold_cache
 
+dist: $(VENV)/.installed-release
+	$(PY) -m tests.release.build dist
+
 check-dist: $(VENV)/.installed-release
 	$(PY) -m tests.release.distribution
 
@@ -67,7 +71,7 @@ bench-quick: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks --quick
 
 clean:
-	rm -rf $(VENV) $(OLDEST) demo docs/_build
+	rm -rf $(VENV) $(OLDEST) demo dist docs/_build
 
 # the stamps make a changed pyproject.toml (a new dependency, say) reach an environment that exists already
 $(VENV)/.created:

@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba.core import caching, event
 
-from assoc._system import temporary
+from assoc._system import shipped, temporary
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
@@ -79,7 +79,7 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
             super().save_overload(sig, data)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load compiled code; what cannot be read (a file cut by a crash) is compiled again, and replaced."""
+        """Load compiled code, own or shipped; what cannot be read (cut by a crash) is compiled again, and replaced."""
         try:
             found = super().load_overload(sig, target_context)
         except Exception:
@@ -87,6 +87,9 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
             with contextlib.suppress(OSError):
                 self.flush()
             found = None
+        if found is None:
+            with contextlib.suppress(Exception):
+                found = shipped.load(self, sig, target_context)
         if found is None and thread.may_interpret:
             raise NotCompiled
         return found

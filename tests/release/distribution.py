@@ -1,16 +1,16 @@
-"""What is given away: sdist and wheel, built, looked through, installed into empty environments and tried.
+"""What is given away: sdist and wheels, built, looked through, installed into empty environments and tried.
 
     python -m tests.release.distribution      (make check-dist)
 
-takes some minutes and a network (or an index that pip knows): each environment gets all dependencies anew, and
-compiles the kernels it needs.
+takes some minutes and a network (or an index that pip knows): each environment gets all dependencies anew. With the
+wheel that ships compiled kernels nothing may be compiled; where they do not fit, the same answers must come from
+kernels that are compiled on the spot.
 """
 
 from __future__ import annotations
 
 import getpass
-import os
-import re
+import pickle
 import socket
 import subprocess
 import sys
@@ -20,13 +20,19 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.release.build import Built, WrongError, build, installed, run
 from tests.release.requirements import ROOT
+from tests.reliability.cold_cache import without_times
 
 _FOLDERS = ("assoc", "docs", "experiments", "tests")
-_FILES = ("Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "README.md", "LICENSE", "pyproject.toml")
+_FILES = ("Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "README.md", "LICENSE")
+_BUILD = ("pyproject.toml", "hatch_build.py")
 _ADDED = ("PKG-INFO", ".gitignore")
 """What the build adds to a source distribution."""
 _PROGRAMS = ("assoc.simulate", "assoc.solve", "assoc.track", "assoc.sweep")
+
+_LARGEST_WHEEL = 5_000_000
+"""Bytes."""
 
 SMOKE = """
 import json, sys
@@ -42,10 +48,6 @@ from assoc.simulation import simulate
 found = assoc.associate(simulate("three-radar", 1, scans=2), "greedy")
 assert len(found.solutions) == 2
 """
-
-
-class WrongError(Exception):
-    """Something is not as it should be."""
 
 
 def tracked() -> set[str]:
@@ -102,61 +104,118 @@ def check_members(path: Path, expected: set[str]) -> None:
 
 def check_sdist(path: Path) -> None:
     """Check that a source distribution holds what is under version control and is meant for others."""
-    files = {name for name in tracked() if name.startswith(tuple(f"{one}/" for one in _FOLDERS)) or name in _FILES}
+    folders = tuple(f"{one}/" for one in _FOLDERS)
+    files = {name for name in tracked() if name.startswith(folders) or name in _FILES + _BUILD}
     check_members(path, files | {*_ADDED})
 
 
-def check_wheel(path: Path) -> None:
-    """Check that a wheel holds the package and what describes it, no more."""
+def check_wheel(path: Path, kernels: list[str] | None = None) -> None:
+    """Check that a wheel holds the package, what describes it, and its kernels, no more; and that it is small."""
     about = f"{'-'.join(path.name.split('-')[:2])}.dist-info"
     files = {name for name in tracked() if name.startswith("assoc/")}
-    check_members(path, files | {f"{about}/{one}" for one in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")})
+    described = {f"{about}/{one}" for one in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")}
+    check_members(path, files | described | {*(kernels or [])})
+    if path.stat().st_size > _LARGEST_WHEEL:
+        raise WrongError(f"{path.name}: {path.stat().st_size} bytes, expected {_LARGEST_WHEEL} at the most")
 
 
-def run(*command: object, cwd: Path, **more: str) -> str:
-    """Run a command that knows nothing of this tree.
-
-    Raises
-    ------
-    WrongError
-        It fails, or complains.
-    """
-    kept = {name: value for name, value in os.environ.items() if not re.match("PYTHON|NUMBA|VIRTUAL_ENV", name)}
-    words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, env={**kept, **more}, capture_output=True, text=True, timeout=1200)
-    if done.returncode:
-        raise WrongError(f"{' '.join(words)[:200]}: exit code {done.returncode}: {done.stderr[-2000:]}")
-    return done.stdout
-
-
-def installed(archive: Path, folder: Path) -> Path:
-    """Install an archive, with nothing but its dependencies, into an empty environment; its Python."""
-    run(sys.executable, "-m", "venv", folder / "env", cwd=folder)
-    python = folder / "env" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", archive, cwd=folder)
-    run(python, "-m", "pip", "check", cwd=folder)
-    return python
-
-
-def smoke(python: Path, folder: Path, *, programs: bool) -> None:
-    """Try what is installed, from an empty folder; with all programs, or their help alone."""
+def smoke(python: Path, folder: Path) -> None:
+    """Try what is installed, from an empty folder: the package, and the help of its programs."""
     place = folder / "empty"
     place.mkdir()
-    strict = [python, "-W", "error", "-m"]
     run(python, "-W", "error", "-c", SMOKE, cwd=place)
     for program in _PROGRAMS:
-        if f"python -m {program}" not in run(*strict, program, "--help", cwd=place):
+        if f"python -m {program}" not in run(python, "-W", "error", "-m", program, "--help", cwd=place):
             raise WrongError(f"{program} --help: does not say how it is called")
-    if programs:
-        run(*strict, "assoc.simulate", "three-radar", "-o", "scene.npz", cwd=place)
-        run(*strict, "assoc.solve", "scene.npz", "--solver", "aco", "--scans", "0", "--json", "a.json", cwd=place)
-        run(*strict, "assoc.solve", "scene.npz", "--scans", "0", "--csv", "a.csv", cwd=place)
-        run(*strict, "assoc.track", "scene.npz", "-o", "tracks.csv", cwd=place)
-        sweep = ["scene.npz", "--solver", "aco", "--grid", "ants=2,3", "--scans", "0", "-o", "study"]
-        run(*strict, "assoc.sweep", *sweep, cwd=place)
-        made = {path.name for path in place.iterdir()}
-        if made != {"scene.npz", "a.json", "a.csv", "tracks.csv", "study"}:
-            raise WrongError(f"the programs leave {sorted(made)}")
+
+
+COUNTED = """
+import importlib, sys
+from numba.core import event
+seen = event.RecordingListener()
+event.register("numba:compile", seen)
+code = importlib.import_module(sys.argv[1]).main(sys.argv[2:])
+assert "ortools" not in sys.modules, "only milp needs ortools"
+with open("compiled.txt", "a") as file:
+    print(sum(1 for _, one in seen.buffer if one.is_start), *sys.argv[1:], file=file)
+sys.exit(code)
+"""
+"""Runs a program and notes how many kernels were compiled in its process."""
+
+_USUAL = (
+    ("simulate", "three-radar", "-o", "scene.npz"),
+    ("simulate", "crowd", "--targets", "30", "-o", "crowd.npz"),
+    ("solve", "scene.npz", "--json", "exact.json", "--csv", "exact.csv"),
+    ("solve", "scene.npz", "--solver", "aco", "--json", "aco.json"),
+    ("solve", "scene.npz", "--solver", "aco", "--jobs", "2", "--json", "aco2.json"),
+    ("solve", "scene.npz", "--kbest", "3", "--scans", "0:10", "--json", "kbest.json"),
+    ("solve", "crowd.npz", "--json", "crowd.json"),
+    ("track", "scene.npz", "-o", "tracks.csv"),
+    ("sweep", "scene.npz", "--solver", "aco", "--grid", "ants=2,3", "--scans", "0:2", "-o", "study"),
+)
+_COMPILING = (*_USUAL[:1], *_USUAL[2:4])
+"""What is run where kernels must be compiled."""
+
+
+def compiled(python: Path, place: Path, programs: tuple[tuple[str, ...], ...], **more: str) -> int:
+    """Run programs in a new folder with an empty cache; how many kernels they and their processes compiled."""
+    place.mkdir()
+    for program, *words in programs:
+        command = [python, "-W", "error", "-c", COUNTED, f"assoc.{program}", *words]
+        run(*command, cwd=place, NUMBA_CACHE_DIR=str(place / "cache"), **more)
+    counts = [int(line.split()[0]) for line in (place / "compiled.txt").read_text().splitlines()]
+    if len(counts) != len(programs):
+        raise WrongError(f"{place.name}: {len(counts)} programs of {len(programs)} say what they compiled")
+    # other processes say nothing, but what they compile they keep
+    return max(sum(counts), sum(1 for _ in place.rglob("*.nbc")))
+
+
+def check_kernels(python: Path, folder: Path) -> None:
+    """Check that shipped kernels are taken, that others are compiled where they do not fit, and give the same."""
+    place = folder / "usual"
+    count = compiled(python, place, _USUAL)
+    print(f"compiled: {count}", flush=True)
+    if count:
+        raise WrongError((place / "compiled.txt").read_text())
+    made = {path.name for path in place.iterdir()} - {"cache", "compiled.txt"}
+    written = {word for _, *words in _USUAL for word in words if word.endswith((".npz", ".json", ".csv"))} | {"study"}
+    if made != written:
+        raise WrongError(f"the programs leave {sorted(made)}")
+    for name, settings in (("generic", {"NUMBA_CPU_NAME": "generic"}), ("other-numba", {})):
+        if name == "other-numba":
+            _spoil(python)
+        count = compiled(python, folder / name, _COMPILING, **settings)
+        print(f"compiled, {name}: {count}", flush=True)
+        if not count:
+            raise WrongError(f"{name}: shipped kernels are taken that do not fit")
+        for answer in ("exact.json", "aco.json"):
+            if without_times(folder / name / answer) != without_times(place / answer):
+                raise WrongError(f"{name}, {answer}: compiled kernels give other answers than shipped ones")
+
+
+def _spoil(python: Path) -> None:
+    """Let the shipped kernels of an environment be those of another version of numba."""
+    (package,) = (python.parents[1] / "lib").glob("*/site-packages/assoc")
+    for path in (package / "_kernels").rglob("*.nbi"):
+        with open(path, "rb") as file:
+            pickle.load(file)
+            rest = file.read()
+        path.write_bytes(pickle.dumps("0.1") + rest)
+
+
+def check(done: Built, folder: Path) -> None:
+    """Check all that was built."""
+    check_sdist(done.sdist)
+    check_wheel(done.plain)
+    check_wheel(done.compiled, done.kernels)
+    for archive in (done.compiled, done.sdist):
+        place = folder / archive.suffix.strip(".")
+        place.mkdir()
+        python = installed(archive, place)
+        smoke(python, place)
+        if archive is done.compiled:
+            check_kernels(python, place)
+        print(f"{archive.name}: installs and works in an empty environment", flush=True)
 
 
 def main() -> int:
@@ -164,17 +223,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="assoc-dist-") as name:
         folder = Path(name)
         try:
-            run(sys.executable, "-m", "build", "--outdir", folder / "dist", ROOT, cwd=folder)
-            (sdist,) = (folder / "dist").glob("*.tar.gz")
-            (wheel,) = (folder / "dist").glob("*.whl")
-            check_sdist(sdist)
-            # built from the sdist, not from the tree
-            check_wheel(wheel)
-            for archive in (wheel, sdist):
-                place = folder / archive.suffix.strip(".")
-                place.mkdir()
-                smoke(installed(archive, place), place, programs=archive is wheel)
-                print(f"{archive.name}: installs and works in an empty environment", flush=True)
+            check(build(folder / "dist"), folder)
         except WrongError as error:
             print(error, file=sys.stderr)
             return 1
