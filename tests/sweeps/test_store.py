@@ -212,7 +212,7 @@ def test_without_its_manifest_the_runs_can_be_had_again(study, whole, tmp_path):
     lost = (whole / MANIFEST).read_text()
     for spoil in (lambda: (whole / MANIFEST).unlink(), lambda: (whole / MANIFEST).write_text(lost[:40])):
         spoil()
-        with pytest.raises(InvalidInputError, match="begin the same sweep in a new folder, and put the study.json"):
+        with pytest.raises(InvalidInputError, match="start the same sweep in a new folder, and copy its study.json"):
             study.run(whole)
         with Store(tmp_path / "new", study.manifest):
             pass
