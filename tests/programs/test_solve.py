@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -40,6 +41,7 @@ def test_table_json_and_csv_agree(run, scene_file, tmp_path):
     )
     assert [line.split()[0] for line in lines[1:7]] == list("012345")
     assert "6 of 6 scans certified optimal" in done.stdout and "true tuples correct" in done.stdout
+    assert re.search(r" s of it in the solver, \d+\.\d\d s compiling$", done.stdout, re.M)
     scans = json.loads(json_file.read_text())["scans"]
     rows = table(csv_file)
     expected = assoc.associate(assoc.Scene.load(scene_file), "milp")
