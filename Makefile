@@ -1,5 +1,6 @@
 # make demo   simulate the three-radar scene, associate it with the ant colony, print the result
-# make test   install what the tests need and run them
+# make test   install what the tests need and run them, of the slow ones a sample (CONTRIBUTING.md)
+# make test-all         all tests: what a release needs
 # make lint   ruff, mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
@@ -22,7 +23,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick clean
+.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -30,6 +31,11 @@ demo: $(VENV)/.installed
 	$(PY) -m assoc.solve demo/scene.npz --solver aco --json demo/result.json
 
 test: $(VENV)/.installed-test
+	$(PY) -m tests.compile_first
+	$(PY) -m pytest -n 2 -q -m "not slow"
+
+test-all: $(VENV)/.installed-test
+	$(PY) -m tests.compile_first
 	$(PY) -m pytest -n 2 -q
 
 lint: $(VENV)/.installed-lint

@@ -23,7 +23,7 @@ class TracePoint(NamedTuple):
     iteration: int
     """Iterations done so far (what one iteration is, each solver's documentation says)."""
     seconds: float
-    """Seconds since the solver started."""
+    """Seconds since the solver started, without compiling."""
     cost: float
     """Cost of the best solution known."""
     lower_bound: float
@@ -51,7 +51,7 @@ class Solution:
     iterations : int
         Iterations used.
     runtime : float
-        Seconds from the problem to this solution.
+        Seconds from the problem to this solution, without compiling.
     stopped_by : str
         Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", or "memory_limit": what
         was left needed more memory than there was.
@@ -62,6 +62,9 @@ class Solution:
         History of cost and bound, thinned out beyond 100,000 points.
     parameters : mapping
         The solver's parameters.
+    compile_time : float
+        Seconds in which kernels were compiled (once after installation) or loaded (once in a process); they count in a
+        time limit, not in ``runtime``.
     """
 
     tuples: NDArray[np.int32]
@@ -75,6 +78,7 @@ class Solution:
     duals: tuple[NDArray[np.float64], ...] = ()
     trace: tuple[TracePoint, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    compile_time: float = 0.0
 
     @property
     def gap(self) -> float:

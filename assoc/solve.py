@@ -215,7 +215,9 @@ def _print(association: Association, names: list[str], elapsed: float, *, every:
         print(f"... and {len(names) - shown} more scans (--all shows them)")
     print()
     print(association.summary())
-    print(f"{elapsed:.2f} s in all, {association.totals()['runtime']:.2f} s of it in the solver")
+    total = association.totals()
+    solving, compiling = total["runtime"], total["compile_time"]
+    print(f"{elapsed:.2f} s in all, {solving:.2f} s of it in the solver, {compiling:.2f} s compiling")
 
 
 if __name__ == "__main__":

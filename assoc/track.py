@@ -18,6 +18,7 @@ from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
 from assoc._cli.values import number, seconds, whole_number
 from assoc._parameters import Option, options
+from assoc._system.compile_time import compile_seconds
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -87,14 +88,15 @@ def _track(words: list[str]) -> None:
         "initiation": Initiation(**parameter_values(start, parsed)),
         **common_values(parsed),
     }
-    started = time.perf_counter()
+    started, compiled = time.perf_counter(), compile_seconds()
     if _is_npz(file):
         if parsed["window"] is not None:
             raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
         count, tracker, table, scene = _of_scene(file, parsed, settings)
     else:
         count, tracker, table, scene = _of_plots(file, parsed, settings)
-    elapsed = time.perf_counter() - started
+    compiling = compile_seconds() - compiled
+    elapsed = time.perf_counter() - started - compiling
 
     def write_report() -> None:
         if parsed["report"]:
@@ -107,7 +109,7 @@ def _track(words: list[str]) -> None:
     write_all(
         lambda: table.to_csv(parsed["output"]),
         write_report,
-        lambda: _report(parsed["output"], count, tracker, table, scene, elapsed),
+        lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
     )
 
 
@@ -247,10 +249,13 @@ def _of_plots(
     return len(windows), tracker, table, None
 
 
-def _report(output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float) -> None:
+def _report(
+    output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float, compiling: float
+) -> None:
     _, ids, _ = table.arrays()
     print(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
-    print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {1e3 * elapsed / max(count, 1):.3g} ms a scan")
+    each = 1e3 * elapsed / max(count, 1)
+    print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling")
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise

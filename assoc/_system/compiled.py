@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba.core import caching, event
 
-from assoc._system import shipped, temporary
+from assoc._system import compile_time, shipped, temporary
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
@@ -127,16 +127,17 @@ def search_njit(function: Callable[..., Any]) -> Any:
 
 
 class _Loads(event.Listener):
-    """Counts how often the compiler was asked: for code to compile, or to load from the cache."""
+    """Counts how often the compiler was asked, for code to compile or to load from the cache, and how long it took."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def on_start(self, event: Any) -> None:
         self.count += 1
+        compile_time.entered()
 
     def on_end(self, event: Any) -> None:
-        pass
+        compile_time.left()
 
 
 _loads = _Loads()

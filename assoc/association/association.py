@@ -23,6 +23,8 @@ FORMAT = "assoc.result"
 VERSION = 1
 
 _SHOWN = 10
+# seconds of compiling that the summary speaks of
+_WORTH_A_LINE = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +51,7 @@ class Association:
         return [scan.solution for scan in self.scans]
 
     def totals(self) -> dict[str, Any]:
-        """Sums over the scans: number of scans, of targets found, costs, bounds, and solver seconds.
+        """Sums over the scans: number of scans, of targets found, costs, bounds, seconds of solver and compiler.
 
         ``optimal`` counts the scans whose status is "optimal"; ``true_tuples``, ``correct_tuples`` and
         their ratio ``share_correct`` are over the scans with known truth, None where there is none.
@@ -68,6 +70,7 @@ class Association:
             "gap": plain(math.fsum(solution.gap for solution in solutions)),
             "optimal": sum(solution.status == "optimal" for solution in solutions),
             "runtime": math.fsum(solution.runtime for solution in solutions),
+            "compile_time": math.fsum(scan.compile_time for scan in self.scans),
             "true_tuples": true,
             "correct_tuples": correct,
             "share_correct": correct / true if true and correct is not None else None,
@@ -88,6 +91,10 @@ class Association:
             lines.append(
                 f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "
                 f"({100 * total['share_correct']:.1f} %)"
+            )
+        if total["compile_time"] >= _WORTH_A_LINE:
+            lines.append(
+                f"{total['compile_time']:.1f} s more for compiling (once after installation) and loading compiled code"
             )
         return "\n".join(lines)
 

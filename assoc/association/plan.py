@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import ordered_map
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
@@ -66,20 +67,27 @@ class Plan:
         """Associate scan ``item[1]`` of source ``item[0]``."""
         source = self.sources[item[0]]
         if isinstance(source, AssignmentProblem):
-            return _best([_of_problem(source, one) for one in self._solve(source, self.seed)], self.kbest)
+            compiled = compile_seconds()
+            return self._best([_of_problem(source, one) for one in self._solve(source, self.seed)], compiled)
         return self.associate(source, source.scan(item[1]))
 
     def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
         """Associate a scan of the sensors of a scene."""
+        compiled = compile_seconds()
         # a seed of its own for each scan, whichever process solves it and whatever was solved before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
-        return _best([_of_scan(scene, scan, problem, one) for one in self._solve(problem, seed)], self.kbest)
+        return self._best([_of_scan(scene, scan, problem, one) for one in self._solve(problem, seed)], compiled)
 
     def _solve(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> list[Solution]:
         if self.kbest is not None:
             return kbest(problem, self.kbest, time_limit=self.time_limit)
         return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)]
+
+    def _best(self, scans: list[ScanAssociation], compiled: float) -> ScanAssociation:
+        """Return the first of ranked associations, which carries all of them where they were asked for."""
+        scans = [replace(one, compile_time=compile_seconds() - compiled) for one in scans]
+        return scans[0] if self.kbest is None else replace(scans[0], ranked=tuple(scans))
 
     def items(self) -> list[tuple[int, int]]:
         """All scans of all sources, as (source, scan)."""
@@ -96,11 +104,6 @@ class Plan:
         """Put associated scans together."""
         name = self.solver if self.kbest is None else "kbest"
         return Association(tuple(scans), name, self.all_parameters, int(self.seed))
-
-
-def _best(scans: list[ScanAssociation], k: int | None) -> ScanAssociation:
-    """Return the first of ranked associations, which carries all of them where they were asked for."""
-    return scans[0] if k is None else replace(scans[0], ranked=tuple(scans))
 
 
 def _targets(problem: AssignmentProblem, solution: Solution) -> NDArray[np.int32]:

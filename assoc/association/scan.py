@@ -38,6 +38,9 @@ class ScanAssociation:
         Those of them whose measurements, all of them and no other, form a chosen tuple.
     ranked : tuple of ScanAssociation
         The k best associations of the scan, this one first; empty where they were not asked for.
+    compile_time : float
+        Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
+        no part of ``solution.runtime``.
     """
 
     scan: int
@@ -50,6 +53,7 @@ class ScanAssociation:
     true_tuples: int | None = None
     correct_tuples: int | None = None
     ranked: tuple[ScanAssociation, ...] = ()
+    compile_time: float = 0.0
 
     @property
     def false_alarms(self) -> int:
@@ -84,6 +88,7 @@ class ScanAssociation:
             "tuples": solution.tuples.tolist(),
             "targets": targets,
             "runtime": solution.runtime,
+            "compile_time": self.compile_time,
         }
         if self.ranked:
             content["ranked"] = [

@@ -86,6 +86,7 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     writer.writerow(
         ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
         + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
+        + ["compile_time"]
     )
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
@@ -93,6 +94,6 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
         writer.writerow(
             [file, scan.scan, *([rank] if ranked else []), scan.time, sizes, len(scan.targets), scan.false_alarms]
             + [solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
-            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples]
+            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples, scan.compile_time]
         )
     return text.getvalue()

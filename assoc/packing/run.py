@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assoc._parameters import Parameters
 from assoc._system import memory
+from assoc._system.compile_time import compile_seconds
 from assoc.solution import TracePoint
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Run:
         The greedy choice of columns, where it was made first (fallback.py).
     watch : callable or None
         Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
+    compiled : float
+        Seconds that this thread had spent on compiling before the run.
     """
 
     seed: int | np.random.SeedSequence | np.random.Generator
@@ -57,6 +60,7 @@ class Run:
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""
     fallback: NDArray[np.integer] | None = None
+    compiled: float = field(default_factory=compile_seconds)
     _rng: np.random.Generator | None = None
 
     @property
@@ -67,8 +71,17 @@ class Run:
         return self._rng
 
     def elapsed(self) -> float:
-        """Seconds since the start."""
+        """Seconds since the start, compiling included: what a time limit limits."""
         return time.perf_counter() - self.started
+
+    def compile_time(self) -> float:
+        """Seconds of these in which kernels were compiled, or loaded as the solver's modules were."""
+        # a callback's thread may have compiled less than the one that began
+        return max(compile_seconds() - self.compiled, 0.0)
+
+    def runtime(self) -> float:
+        """Seconds of the search alone: what results report."""
+        return self.elapsed() - self.compile_time()
 
     def remaining(self) -> float:
         """Seconds left; infinite without a time limit."""
@@ -90,7 +103,7 @@ class Run:
 
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""
-        point = TracePoint(iteration, self.elapsed(), weight + self.offset, bound + self.offset)
+        point = TracePoint(iteration, self.runtime(), weight + self.offset, bound + self.offset)
         self.trace.append(point)
         if len(self.trace) > _TRACE:
             # a search that improves for days: every second point is enough to see how, the first and last stay

@@ -135,7 +135,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
         rest = max(rest, ahead.bound + columns.offset - rounding)
         return Ranking([_unproved(problem, rest, k, run, columns, found.known)], rest, columns)
     answers = _in_order(problem, [columns.indices(own) for own in found.chosen])
-    runtime = run.elapsed()
+    runtime, compile_time = run.runtime(), run.compile_time()
     solutions = [
         Solution(
             tuples=problem.tuples[indices],
@@ -147,6 +147,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
             runtime=runtime,
             stopped_by=run.stopped_by or "converged",
             parameters={"k": k, "rank": place + 1},
+            compile_time=compile_time,
         )
         for place, (cost, indices) in enumerate(answers)
     ]
@@ -213,7 +214,8 @@ def _unproved(
     return replace(
         solution,
         solver="kbest",
-        runtime=run.elapsed(),
+        runtime=run.runtime(),
+        compile_time=run.compile_time(),
         stopped_by=run.stopped_by,
         duals=(),
         trace=(),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
+from assoc._system.compile_time import compile_seconds, loading
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.packing import Packing
@@ -60,12 +61,14 @@ def assign(
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
     """
-    started = time.perf_counter()
+    started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     chosen = registry.make_parameters(solver, parameters)
-    solve = registry.solver(solver)
-    run = Run(_seed(seed), time_limit=checked_time_limit(time_limit), callback=callback, started=started)
+    with loading():
+        solve = registry.solver(solver)
+    limit = checked_time_limit(time_limit)
+    run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset

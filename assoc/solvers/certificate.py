@@ -51,11 +51,12 @@ def certify(
         lower_bound=min(bound + prepared.offset - rounding, cost),
         solver=solver,
         iterations=outcome.iterations,
-        runtime=run.elapsed(),
+        runtime=run.runtime(),
         stopped_by=run.stopped_by or "converged",
         duals=_duals_by_sensor(problem, prepared, duals) if duals is not None else (),
         trace=tuple(run.trace),
         parameters={f.name: getattr(parameters, f.name) for f in fields(parameters)},
+        compile_time=run.compile_time(),
     )
 
 

@@ -160,6 +160,7 @@ def test_frame_summary_and_json(by_hand, tmp_path):
     (scan,) = content["scans"]
     assert list(scan) == (
         ["scan", "time", "sizes", "cost", "lower_bound", "gap", "status", "tuples", "targets", "runtime"]
+        + ["compile_time"]
     )
     assert sorted(map(tuple, scan["tuples"])) == [(0, 0, 3), (0, 2, 0), (1, 0, 2), (2, 1, 1)]
     assert [target["tuple"] for target in scan["targets"]] == [[1, 0, 2], [2, 1, 1]]

@@ -8,9 +8,10 @@ from experiments.common.claims import load_json
 from experiments.filters import benchmark, consistency, manoeuvres
 from experiments.filters.b1 import Setting
 from experiments.papers import dubins_enkf, fuzzy_ekf, modified_ekf
+from tests.sizes import few_or_all
 
 
-@pytest.mark.parametrize("module", [modified_ekf, dubins_enkf])
+@few_or_all("module", modified_ekf, dubins_enkf)
 def test_programs_whose_claims_hold(module, tmp_path, capsys):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert module.program(["--quick", "--json", files[0], "--figure", files[1], "--seed", "1"]) == 0

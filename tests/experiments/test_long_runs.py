@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from experiments import long_runs
+from tests.sizes import few_or_all
 
 
 @pytest.fixture(autouse=True)
@@ -57,6 +58,7 @@ def test_a_short_run_of_each_tracker(kind):
     assert len(watch.steps) == 10 and min(watch.unchanging) > 0.0
 
 
-def test_a_short_run_of_the_solvers():
-    claims, watch = long_runs.solve(350, np.random.default_rng(1))
+@few_or_all("count", 50, 350)
+def test_a_short_run_of_the_solvers(count):
+    claims, watch = long_runs.solve(count, np.random.default_rng(1))
     assert claims[-1].holds and len(watch.steps) == 10

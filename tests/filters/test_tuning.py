@@ -34,6 +34,7 @@ def test_wherever_the_search_goes_centres_increase():
         assert all(np.diff(one).min() > 0 for one in (*data["outputs"], data["calm"]))
 
 
+@pytest.mark.slow
 def test_end_to_end(tmp_path, capsys):
     pytest.importorskip("cma")
     texts = []

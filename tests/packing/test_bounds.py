@@ -9,6 +9,7 @@ from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems
+from tests.sizes import few_or_all
 from tests.solvers.test_against_brute_force import installed
 
 
@@ -51,12 +52,13 @@ def check_proof(problem, duals, bound):
 
 
 @pytest.mark.parametrize("with_dummies", [True, False])
-def test_thousands_of_random_problems(with_dummies):
+@few_or_all("number", 200, 1500)
+def test_thousands_of_random_problems(number, with_dummies):
     """The bound of arbitrary, poor and good multipliers is valid, rectangular and gated."""
     rng = np.random.default_rng(1)
     tight = 0
     count = 0
-    for problem in small_problems(1500, seed=31, dummy=with_dummies):
+    for problem in small_problems(number, seed=31, dummy=with_dummies):
         try:
             optimum = brute_force(problem)
         except InfeasibleError:
@@ -100,10 +102,11 @@ def test_against_linear_program(kind):
 
 
 @pytest.mark.parametrize("name", installed())
-def test_duals_of_solutions_prove_their_bound(name):
+@few_or_all("count", 20, 90)
+def test_duals_of_solutions_prove_their_bound(count, name):
     proved = 0
     rng = np.random.default_rng(3)
-    problems = list(small_problems(90, seed=32))
+    problems = list(small_problems(count, seed=32))
     problems += [gated_problem(rng, (8, 7, 9), 0.1, "mixed", listed_singletons=0.5) for _ in range(10)]
     problems += [axial_problem(rng, (6, 7, 9), 0.5, "mixed") for _ in range(10)]
     for problem in problems:
@@ -116,7 +119,7 @@ def test_duals_of_solutions_prove_their_bound(name):
             check_proof(problem, solution.duals, -np.inf)
             proved += sum(u.sum() for u in solution.duals) >= solution.lower_bound - 1e-6
     if name in ("exact", "greedy"):
-        assert proved >= 60
+        assert proved >= 0.54 * len(problems)
 
 
 def test_exact_gives_duals_only_where_they_are_the_proof():
@@ -132,9 +135,10 @@ def test_exact_gives_duals_only_where_they_are_the_proof():
 
 
 @pytest.mark.parametrize("name", installed())
-def test_bounds_of_solvers_on_middle_sized_problems(name):
+@few_or_all("count", 2, 8)
+def test_bounds_of_solvers_on_middle_sized_problems(count, name):
     rng = np.random.default_rng(6)
-    for number in range(8):
+    for number in range(count):
         sizes = tuple(int(n) for n in rng.integers(5, 10, 3))
         style = ("mixed", "ties")[number % 2]
         problem = gated_problem(rng, sizes, 0.3, style) if number % 4 else axial_problem(rng, sizes, 0.9, style)

@@ -12,6 +12,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from experiments.common.instances.synthetic import axial_known_optimum, axial_random
 from experiments.common.oracles import brute_force, gated_problem, small_problems
+from tests.sizes import few_or_all
 
 
 def _feasible(packing, owner):
@@ -46,9 +47,10 @@ def _searched(problem, steps, size, rng):
     return total
 
 
-def test_whole_problem_is_solved():
+@few_or_all("count", 60, 300)
+def test_whole_problem_is_solved(count):
     rng = np.random.default_rng(0)
-    for problem in small_problems(300, seed=4):
+    for problem in small_problems(count, seed=4):
         try:
             expected = brute_force(problem)
         except InfeasibleError:

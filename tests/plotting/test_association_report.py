@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -206,3 +207,12 @@ def test_the_program_writes_it(tmp_path, scene):
     assert (done.returncode, done.stderr) == (0, "")
     assert [scan["scan"] for scan in data_of(tmp_path / "out.html")["scans"]] == [2, 3, 4]
     assert "python -m assoc.solve " + " ".join(words) in " ".join(parsed(tmp_path / "out.html").text)
+
+
+def test_compiling_is_told_apart_from_solving(scene, association, tmp_path):
+    first, *others = association.scans
+    scans = (replace(first, compile_time=12.5), *(replace(one, compile_time=0.0) for one in others))
+    for name, content in (("cold.html", scans), ("warm.html", scans[1:])):
+        write_association_report(tmp_path / name, replace(association, scans=content), scene)
+    assert "12.5 s" in parsed(tmp_path / "cold.html").text
+    assert "Compiling" not in parsed(tmp_path / "warm.html").text

@@ -10,6 +10,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
+from tests.sizes import sample
 
 
 class Trap:
@@ -100,7 +101,7 @@ def solve(run, folder, *words):
     ), before
 
 
-@pytest.mark.parametrize("case", SCENES)
+@sample("case", [*SCENES], every=3)
 def test_bad_scenes(run, tmp_path, scene_fields, case):
     spoil, message = SCENES[case]
     np.savez(tmp_path / "bad.npz", **spoil(scene_fields))
@@ -109,7 +110,7 @@ def test_bad_scenes(run, tmp_path, scene_fields, case):
     assert "bad.npz" in done.stderr
 
 
-@pytest.mark.parametrize("case", PROBLEMS)
+@sample("case", [*PROBLEMS], every=3)
 def test_bad_problems(run, tmp_path, case):
     changed, message = PROBLEMS[case]
     np.savez(tmp_path / "bad.npz", **{**PROBLEM, **changed})
@@ -142,8 +143,8 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
     check(done, tmp_path, name, before)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
+@sample(
+    "words,message",
     [
         ([], "FILE"),
         (["s.npz", "--solver", "magic"], "unknown name 'magic'"),
@@ -169,6 +170,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
         (["s.npz", "--config", "solver.toml"], "[bees] is no solver"),
     ],
+    every=3,
 )
 def test_bad_options(run, tmp_path, scene_fields, words, message):
     np.savez(tmp_path / "s.npz", **scene_fields)

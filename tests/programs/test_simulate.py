@@ -6,6 +6,7 @@ import pytest
 
 import assoc
 from assoc.recordings import read_plots
+from tests.sizes import sample
 
 
 @pytest.mark.parametrize("scenario", ["three-radar", "crowd", "bearing-only"])
@@ -65,8 +66,8 @@ def test_help_is_silent_on_stderr(run, words):
     assert "usage:" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
+@sample(
+    "words,message",
     [
         ([], "SCENARIO"),
         (["five-radar", "-o", "x.npz"], "invalid choice: 'five-radar'"),
@@ -80,6 +81,7 @@ def test_help_is_silent_on_stderr(run, words):
         (["crowd", "-o", "no/such/x.npz"], "does not exist"),
         (["crowd", "-o", "."], "is a folder"),
     ],
+    every=3,
 )
 def test_bad_input(run, tmp_path, words, message):
     done = run("assoc.simulate", *words, cwd=tmp_path)

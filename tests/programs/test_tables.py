@@ -48,7 +48,7 @@ def test_a_narrow_terminal_gets_lists():
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", [80, *(pytest.param(width, marks=pytest.mark.slow) for width in (60, 120, 200))])
 def test_solve_shows_twenty_scans(run, tmp_path, width):
     simulate("three-radar", 1, scans=23).save(tmp_path / "s.npz")
     words = ["assoc.solve", "s.npz", "--solver", "greedy"]

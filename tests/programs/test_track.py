@@ -1,5 +1,7 @@
 """`python -m assoc.track` as a program."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,6 +39,7 @@ def test_a_scene_as_a_program(run, scene_file, tmp_path):
                "-o", tmp_path / "tracks.csv")  # fmt: skip
     assert done.returncode == 0 and done.stderr == ""
     assert "3 confirmed tracks" in done.stdout and "GOSPA" in done.stdout
+    assert re.search(r" ms a scan; \d+\.\d\d s more compiling$", done.stdout, re.M)
     table = pd.read_csv(tmp_path / "tracks.csv")
     assert list(table.columns[:8]) == COLUMNS
     assert table.track_id.nunique() == 3 and table.confirmed.all()

@@ -27,6 +27,7 @@ from experiments.common.oracles import (
     gated_problem,
     small_problems,
 )
+from tests.sizes import few_or_all
 from tests.solvers.test_against_brute_force import blackman_popoli
 
 
@@ -126,10 +127,11 @@ def test_textbook():
 
 
 @pytest.mark.parametrize("budget", [0, 5])
-def test_branching_instead_of_enumeration(budget):
+@few_or_all("count", 30, 120)
+def test_branching_instead_of_enumeration(count, budget):
     """The same lists with next to no enumeration: branch and bound down to the leaves."""
     branched = 0
-    for number, problem in enumerate(small_problems(120, seed=52)):
+    for number, problem in enumerate(small_problems(count, seed=52)):
         packing = price_all_columns(problem, Run(np.random.default_rng(0))).keep(np.inf)
         if packing.num_columns > 40 or (~packing.slack & (np.diff(packing.row_ptr) == 0)).any():
             continue
@@ -155,7 +157,7 @@ def test_branching_instead_of_enumeration(budget):
                 assert ranking.proven == np.inf
             else:
                 assert ranking.proven == pytest.approx(expected[k - 1][0], abs=1e-9)
-    assert branched > 20
+    assert branched > count // 6
 
 
 def _solutions_of(piece):

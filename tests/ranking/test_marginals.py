@@ -12,6 +12,7 @@ from assoc.ranking.marginals import marginals
 from assoc.ranking.partition_function import log_partition
 from experiments.common import oracles
 from experiments.common.oracles import all_solutions, axial_problem, gated_problem, small_problems
+from tests.sizes import few_or_all
 
 
 def enumerable(count, seed, limit=4000):
@@ -25,9 +26,10 @@ def enumerable(count, seed, limit=4000):
             yield problem, found
 
 
-def test_intervals_contain_the_truth():
+@few_or_all("count", 40, 160)
+def test_intervals_contain_the_truth(count):
     widths = []
-    for number, (problem, found) in enumerate(enumerable(160, 61)):
+    for number, (problem, found) in enumerate(enumerable(count, 61)):
         k = (1, 3, 20, 5000)[number % 4]
         result = marginals(problem, k)
         truth = oracles.marginals(problem)

@@ -20,7 +20,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-_MEASURED = ("runtime", "seconds")
+_MEASURED = ("runtime", "compile_time", "seconds")
 """Fields that are measurements of time."""
 
 

@@ -7,27 +7,31 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
 from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, exact_optimum, make
+from tests.sizes import few_or_all
 
 QUICK = [name for name in (*WAYS, *LISTED) if not name.startswith("milp")]
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
-def test_every_structure(structure):
-    for number, temper in enumerate(("normal", "ties", "wide")):
+@few_or_all("tempers", ("normal",), ("normal", "ties", "wide"))
+def test_every_structure(tempers, structure):
+    for number, temper in enumerate(tempers):
         problem = make(np.random.default_rng([41, number]), structure, temper)
         assert judge(Case(problem, structure, temper, number), QUICK) == []
 
 
 @pytest.mark.parametrize("temper", TEMPERS)
-def test_every_temper(temper):
-    for number, structure in enumerate(("duplicates", "axial rectangular")):
+@few_or_all("structures", ("duplicates",), ("duplicates", "axial rectangular"))
+def test_every_temper(structures, temper):
+    for number, structure in enumerate(structures):
         problem = make(np.random.default_rng([42, number]), structure, temper)
         assert judge(Case(problem, structure, temper, number), [*WAYS, *LISTED]) == []
 
 
 @pytest.mark.parametrize(("structure", "temper"), [("odd cycle", "large gap"), ("axial square", "18 decades")])
-def test_intervals_hold_where_the_bound_is_far_from_the_optimum(structure, temper):
-    for number in range(30):
+@few_or_all("count", 8, 30)
+def test_intervals_hold_where_the_bound_is_far_from_the_optimum(count, structure, temper):
+    for number in range(count):
         problem = make(np.random.default_rng([44, number]), structure, temper)
         assert judge(Case(problem, structure, temper, number), list(LISTED)) == []
 

@@ -14,6 +14,7 @@ from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from tests.reliability.fuzzing import ROOMS, Room, _bomb, judge, prepare, run_case, warm_up
 from tests.reliability.mutations import bombs
+from tests.sizes import few_or_all
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +25,10 @@ def made(tmp_path_factory):
     return files
 
 
-def test_five_hundred_spoiled_files(made, tmp_path, monkeypatch):
+@few_or_all("count", 120, 500)
+def test_hundreds_of_spoiled_files(count, made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    faults = [run_case(77, number, made, tmp_path) for number in range(500)]
+    faults = [run_case(77, number, made, tmp_path) for number in range(count)]
     assert [fault for fault in faults if fault] == []
 
 

@@ -7,10 +7,11 @@ import subprocess
 import sys
 
 from tests.reliability.answers import answers, differences
+from tests.sizes import few_or_all
 
 
-def test_answers_without_the_compiler():
-    parts = ["solutions", "rankings", "costs", "tracks"]
+@few_or_all("parts", ["rankings", "costs"], ["solutions", "rankings", "costs", "tracks"])
+def test_answers_without_the_compiler(parts):
     command = [sys.executable, "-W", "error", "-m", "tests.reliability.answers", "--only", ",".join(parts)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)

@@ -21,6 +21,7 @@ from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from assoc.tracking import MultiSensorTracker
 from experiments.common.oracles import gated_problem, small_problems
+from tests.sizes import few_or_all
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute
 KERNEL = """
@@ -45,10 +46,11 @@ def work():
     return [(name, number) for number in range(6) for name in names]
 
 
-def test_eight_threads_answer_like_one():
+@few_or_all("rounds", 1, 3)
+def test_eight_threads_answer_like_one(rounds):
     alone = [answer(item) for item in work()]
     with ThreadPoolExecutor(8) as pool:
-        for _ in range(3):
+        for _ in range(rounds):
             assert list(pool.map(answer, work())) == alone
 
 

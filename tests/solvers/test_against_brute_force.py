@@ -11,6 +11,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.assign import assign
 from experiments.common.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
+from tests.sizes import few_or_all
 
 # milp has a test file of its own, and its backends take their time
 PROVING = ("exact", "milp")
@@ -56,9 +57,10 @@ def check(problem, solution, optimum):
 
 
 @pytest.mark.parametrize("name", installed())
-def test_small_problems(name):
+@few_or_all("share", 0.2, 1.0)
+def test_small_problems(share, name):
     # searches take a tenth of a second for each; thousands more are in tests.reliability.differential
-    count = {"milp": 90, "genetic": 200, "tabu": 200, "aco": 200}.get(name, 450)
+    count = int(share * {"milp": 90, "genetic": 200, "tabu": 200, "aco": 200}.get(name, 450))
     infeasible = 0
     for problem in small_problems(count, seed=21):
         try:
@@ -76,9 +78,10 @@ def test_small_problems(name):
 
 
 @pytest.mark.parametrize("name", [name for name in installed() if name != "greedy"])
-def test_metaheuristics_find_most_optima_of_small_problems(name):
+@few_or_all("count", 20, 60)
+def test_metaheuristics_find_most_optima_of_small_problems(count, name):
     missed = 0
-    problems = list(small_problems(60, seed=22, dummy=True))
+    problems = list(small_problems(count, seed=22, dummy=True))
     for problem in problems:
         solution = assign(problem, name)
         missed += solution.cost > brute_force(problem) + 1e-9

@@ -19,6 +19,7 @@ from experiments.common.oracles import (
     milp_optimum,
     small_problems,
 )
+from tests.sizes import few_or_all
 
 SETTINGS = [
     {},
@@ -28,10 +29,11 @@ SETTINGS = [
 ]
 
 
-def test_bound_is_valid_on_two_thousand_small_problems():
+@few_or_all("count", 300, 2000)
+def test_bound_is_valid_on_small_problems(count):
     closed = 0
     solved = 0
-    for number, problem in enumerate(small_problems(2000, seed=21)):
+    for number, problem in enumerate(small_problems(count, seed=21)):
         try:
             expected = brute_force(problem)
         except InfeasibleError:

@@ -168,6 +168,7 @@ def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp
     assert same(tmp_path / "s", expected)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
     slow, expected, scheduler, start_worker, tmp_path, monkeypatch
 ):

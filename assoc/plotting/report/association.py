@@ -121,6 +121,8 @@ def _summary(association: Association) -> str:
         "Certified optimal": (f"{total['optimal']:,} of {count:,}", "scans with a closed gap"),
         "Solver": (f"{total['runtime']:.3g} s", f"{1e3 * total['runtime'] / max(count, 1):.3g} ms a scan"),
     }
+    if total["compile_time"] > 0.0:
+        content["Compiling"] = (f"{total['compile_time']:.3g} s", "not in the solver's time; once after installation")
     if total["share_correct"] is not None:
         content["Correct"] = (
             f"{100 * total['share_correct']:.1f} %",

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from assoc._system.compile_time import loading
 from assoc._system.in_time import StopSignal
 from assoc.packing.packing import Packing
 from assoc.solvers.milp.answer import Answer, most_columns, solution_or_none
@@ -20,8 +21,9 @@ _LARGEST_SUM = 57
 def solve_by_cp_sat(packing: Packing, parameters: MilpParameters, seconds: float, stop: StopSignal | None) -> Answer:
     """Solve by CP-SAT on integer weights."""
     # who takes the other backends does not load this one
-    from ortools.sat import cp_model_pb2
-    from ortools.sat.python import cp_model
+    with loading():
+        from ortools.sat import cp_model_pb2
+        from ortools.sat.python import cp_model
 
     exponent = _integer_exponent(packing)
     scaled = np.ldexp(packing.weights, exponent)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.compile_time import loading
 from assoc.packing.packing import Packing
 from assoc.solvers.milp.answer import Answer, most_columns, solution_or_none
 from assoc.solvers.milp.parameters import MilpParameters
@@ -22,7 +23,8 @@ _LARGEST_COST = 7
 def solve_by_math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> Answer:
     """Solve by SCIP or HiGHS through MathOpt."""
     # who takes the other backend does not load this one
-    from ortools.math_opt.python import mathopt
+    with loading():
+        from ortools.math_opt.python import mathopt
 
     exponent = _LARGEST_COST - math.frexp(float(np.abs(packing.weights).max()))[1]
     model = mathopt.Model.from_model_proto(_model(packing, np.ldexp(packing.weights, exponent)))

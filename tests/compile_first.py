@@ -1,0 +1,36 @@
+"""Compile the kernels that most tests need, before pytest starts: two processes, each of which compiles other ones.
+
+    python -m tests.compile_first      (make test; a minute or two after the installation, then some seconds)
+
+Two workers of pytest begin with the same kernels, and each would compile all of them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+
+# nothing is to be interpreted meanwhile
+os.environ["ASSOC_INTERPRET"] = "0"
+
+
+def _solvers() -> None:
+    import assoc
+
+    assoc.warm_up()
+
+
+def _all_but_solvers() -> None:
+    from tests.reliability.answers import answers
+
+    # costs and filters first: what trackers and rankings need of the solvers is on disk by then
+    answers(["costs", "tracks", "rankings"])
+
+
+if __name__ == "__main__":
+    processes = [multiprocessing.get_context("spawn").Process(target=one) for one in (_solvers, _all_but_solvers)]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    raise SystemExit(max(process.exitcode or 0 for process in processes))

@@ -1,0 +1,115 @@
+"""Compiling is told apart from solving: in a first process after installation, in a later one, and in none."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+import assoc
+from assoc._system import compile_time
+from assoc._system.compile_time import compile_seconds, loading
+from assoc.simulation import simulate
+
+# one small kernel in place of a solver's many
+_PROGRAM = """
+import json, time
+from assoc._system.compiled import njit
+from assoc.packing.run import Run
+
+@njit
+def kernel(x):
+    return np.sort(x).sum()
+
+import numpy as np
+
+times = []
+for _ in range(2):
+    run = Run(0)
+    kernel(np.ones(9))
+    runtime = run.runtime()
+    times.append([run.elapsed(), runtime, run.compile_time()])
+print(json.dumps(times))
+"""
+# greedy: the solver with the fewest kernels
+_SOLVER = """
+import json, time, assoc
+
+problem = assoc.AssignmentProblem([[1, 1, 1], [1, 2, 0], [2, 1, 2], [0, 2, 1]], [-3.0, -1.0, -2.0, -4.0], [2, 2, 2])
+times = []
+for _ in range(2):
+    started = time.perf_counter()
+    found = assoc.assign(problem, "greedy")
+    times.append([time.perf_counter() - started, found.runtime, found.compile_time])
+print(json.dumps(times))
+"""
+
+
+@pytest.mark.parametrize("text", [_PROGRAM, pytest.param(_SOLVER, marks=pytest.mark.slow)], ids=["kernel", "solver"])
+def test_a_first_process_and_a_second(text, tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(text)
+    answers = []
+    for _ in range(2):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
+        answers.append(json.loads(done.stdout))
+    (cold, again), (warm, warm_again) = answers
+    whole, runtime, compiling = cold
+    assert compiling > 0.3 and runtime < 0.2 * compiling
+    assert runtime + compiling == pytest.approx(whole, rel=0.2)
+    # what the first has compiled the second only loads
+    assert warm[2] < 0.5 * compiling and warm[1] < 0.5
+    for whole, runtime, compiling in (again, warm_again):
+        assert compiling < 1e-3 and 0.0 < runtime <= whole
+
+
+@pytest.fixture
+def scene():
+    return simulate("bearing-only", targets=2, scans=1, seed=1)
+
+
+def test_results_report_it_apart(scene):
+    result = assoc.associate(scene, "greedy")
+    (scan,) = result.scans
+    # costs and positions compile, too
+    assert 0.0 <= scan.solution.compile_time <= scan.compile_time
+    assert result.totals()["compile_time"] == scan.compile_time == scan.to_dict()["compile_time"]
+    assert assoc.associate(scene, "greedy").totals()["compile_time"] < 1e-3
+
+
+def test_the_summary_says_what_was_compiled(scene, monkeypatch):
+    assoc.associate(scene, "greedy")
+    assert "compiling" not in assoc.associate(scene, "greedy").summary()
+    readings = iter([3.0, 103.0])
+    monkeypatch.setattr("assoc.association.plan.compile_seconds", lambda: next(readings))
+    assert "100.0 s more for compiling" in assoc.associate(scene, "greedy").summary()
+
+
+def test_only_the_own_thread_counts():
+    def load():
+        with loading():
+            time.sleep(0.02)
+
+    before = compile_seconds()
+    other = threading.Thread(target=load)
+    other.start()
+    other.join()
+    assert compile_seconds() == before
+    with loading(), loading():
+        time.sleep(0.02)
+    assert 0.02 <= compile_seconds() - before < 5.0
+
+
+def test_what_was_interrupted_counts_no_further():
+    before = compile_seconds()
+    # Ctrl-C between a compilation's beginning and its lock: its end is never told
+    compile_time.entered()
+    assert compile_seconds() == before
+    compile_time.left()
+    with loading():
+        time.sleep(0.01)
+    assert 0.01 <= compile_seconds() - before < 5.0
