@@ -112,7 +112,7 @@ def test_murty_finds_them_in_order():
         )
         while murty.feasible and not murty.done:
             murty.run(7)
-        costs = [murty._costs[murty.edges(place)].sum() for place in range(murty.num_found)]
+        costs = [murty._graph.costs[murty.edges(place)].sum() for place in range(murty.num_found)]
         assert costs == pytest.approx(sorted(costs), abs=1e-12)
         if costs:
             assert murty.rest >= costs[-1] - 1e-12
