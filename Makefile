@@ -11,6 +11,7 @@
 # make check-dist       builds them, checks what they hold, that they work in an empty environment, and compile nothing
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
 # make bench  benchmarks at full size (bench-quick: a minute's worth)
+# make bench-cold       what a user waits for after an installation, with an empty cache of kernels
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
@@ -23,7 +24,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick clean
+.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -75,6 +76,9 @@ bench: $(VENV)/.installed-test
 
 bench-quick: $(VENV)/.installed-test
 	$(PY) -m experiments.benchmarks --quick
+
+bench-cold: $(VENV)/.installed-test
+	$(PY) -m experiments.cold_start
 
 clean:
 	rm -rf $(VENV) $(OLDEST) demo dist docs/_build
