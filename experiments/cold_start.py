@@ -46,7 +46,7 @@ def measure(words: list[str], folder: Path, cache: Path) -> tuple[float, float]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print a row for each command."""
     parser = argparse.ArgumentParser(
-        prog="experiments.cold_start", description="What a user waits for after an installation."
+        prog="python -m experiments.cold_start", description="What a user waits for after an installation."
     )
     parser.add_argument("--runs", type=int, default=3, metavar="N", help="runs of each command (default 3)")
     parser.add_argument("--json", metavar="FILE", help="write the seconds of all runs here")
