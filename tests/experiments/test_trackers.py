@@ -13,7 +13,7 @@ from experiments.trackers.running import in_plane
 from tests.sizes import few_or_all
 
 
-@few_or_all("names", ("multi-sensor",), ("multi-sensor", "static", "mht", "nearest-neighbour"))
+@few_or_all("names", ("multi-sensor", "nearest-neighbour"), ("multi-sensor", "static", "mht", "nearest-neighbour"))
 def test_comparison_as_a_program(names, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(comparison, "NAMES", names)
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
