@@ -8,36 +8,29 @@ need not compile.
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from collections.abc import Iterator
+from threading import get_ident
 
-
-class _Clock(threading.local):
-    """The compiling of one thread."""
-
-    depth = 0
-    since = 0.0
-    total = 0.0
-
-
-_clock = _Clock()
+# by thread; every solution reads it, and a dictionary is quicker than threading.local
+_total: dict[int, float] = {}
+_under_way: dict[int, tuple[int, float]] = {}
 
 
 def entered() -> None:
     """Note that the compiler was entered; it calls itself for the kernels that a kernel calls."""
-    if _clock.depth == 0:
-        _clock.since = time.perf_counter()
-    _clock.depth += 1
+    depth, since = _under_way.get(get_ident(), (0, 0.0))
+    _under_way[get_ident()] = depth + 1, since if depth else time.perf_counter()
 
 
 def left() -> None:
     """Note that the compiler was left."""
     # compilations that Ctrl-C cut short were forgotten by `compile_seconds`
-    if _clock.depth > 0:
-        _clock.depth -= 1
-        if _clock.depth == 0:
-            _clock.total += time.perf_counter() - _clock.since
+    depth, since = _under_way.pop(get_ident(), (0, 0.0))
+    if depth > 1:
+        _under_way[get_ident()] = depth - 1, since
+    elif depth == 1:
+        _total[get_ident()] = _total.get(get_ident(), 0.0) + time.perf_counter() - since
 
 
 @contextlib.contextmanager
@@ -55,5 +48,6 @@ def compile_seconds() -> float:
 
     Who asks is not in the compiler: what seems under way was cut short by Ctrl-C on its way to the compiler's lock.
     """
-    _clock.depth = 0
-    return _clock.total
+    if _under_way:
+        _under_way.pop(get_ident(), None)
+    return _total.get(get_ident(), 0.0)

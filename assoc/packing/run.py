@@ -76,8 +76,9 @@ class Run:
 
     def compile_time(self) -> float:
         """Seconds of these in which kernels were compiled, or loaded as the solver's modules were."""
+        seconds = compile_seconds() - self.compiled
         # a callback's thread may have compiled less than the one that began
-        return max(compile_seconds() - self.compiled, 0.0)
+        return seconds if seconds > 0.0 else 0.0
 
     def runtime(self) -> float:
         """Seconds of the search alone: what results report."""

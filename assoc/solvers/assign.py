@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
-from assoc._system.compile_time import compile_seconds, loading
+from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.packing import Packing
@@ -65,8 +65,7 @@ def assign(
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
     chosen = registry.make_parameters(solver, parameters)
-    with loading():
-        solve = registry.solver(solver)
+    solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
     run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
     with interruptible():

@@ -7,6 +7,7 @@ imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the funct
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
@@ -14,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from assoc._parameters import Parameters
+from assoc._system.compile_time import loading
 from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
 
@@ -99,7 +101,11 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
 def _module(name: str, part: str) -> ModuleType:
     if name not in _NAMES:
         raise InvalidInputError(f"solver: unknown name {name!r}; {_near(name, names())}")
-    return import_module(f"assoc.solvers.{name}.{part}")
+    path = f"assoc.solvers.{name}.{part}"
+    if path in sys.modules:
+        return import_module(path)  # which waits where another thread is still importing it
+    with loading():
+        return import_module(path)
 
 
 def _near(name: object, known: list[str]) -> str:

@@ -10,12 +10,10 @@ from experiments.common.claims import load_json
 from experiments.trackers import benchmark, comparison, plane
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
-from tests.sizes import few_or_all
 
 
-@few_or_all("names", ("multi-sensor",), ("multi-sensor", "static", "mht", "nearest-neighbour"))
-def test_comparison_as_a_program(names, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(comparison, "NAMES", names)
+def test_comparison_as_a_program(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(comparison, "NAMES", ("multi-sensor", "static", "mht", "nearest-neighbour"))
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert comparison.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
     by_name = {claim.quantity: claim for claim in load_json(files[0])}
