@@ -130,7 +130,7 @@ def _road(cache: Path) -> tuple[int, list[str]]:
     """Go the road in a new process with a cache; how much it compiled, and the files it read."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
     # Intel's library of functions would be missing where it is not installed
-    own = {**PROCESSOR, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_INTEL_SVML": "1"}
+    own = {**PROCESSOR, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_INTEL_SVML": "1", "ASSOC_INTERPRET": "0"}
     with tempfile.TemporaryDirectory() as place:
         command = [sys.executable, str(Path(__file__).resolve()), "--road"]
         done = subprocess.run(command, cwd=place, env={**kept, **own}, stdout=subprocess.PIPE, text=True, check=True)
