@@ -13,20 +13,16 @@ from assoc.costs.conversion import convert
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-
-# the codes are known to the kernels in conversion.py and kernels.py
-_CODES = {PositionSensor: 0, Radar3D: 1, Radar2D: 2, BearingSensor: 3}
-POSITION, BEARING = 0, 3
+from assoc.sensors.codes import BEARING, CODES
 
 
 class SensorArrays(NamedTuple):
     """The sensors of a scene, S of them, in the form the kernels take."""
 
     code: Array
-    """Measurement model, int64 (S,): 0 position, 1 range-azimuth-elevation, 2 range-azimuth, 3 azimuth."""
+    """Kind of each, int64 (S,); see `assoc.sensors.codes`."""
     dim: Array
-    """Components of a measurement, int64 (S,)."""
+    """Components of a measurement that tell of the position, int64 (S,)."""
     place: Array
     """(S, 3), metres."""
     covariance: Array
@@ -49,7 +45,7 @@ class ScanArrays(NamedTuple):
     """The N measurements of one scan, sensor after sensor, in the form the kernels take."""
 
     z: Array
-    """Measurements padded with zeros, (N, 3); those of a bearing sensor sorted by azimuth."""
+    """Measurements without range rates, padded with zeros, (N, 3); those of a bearing sensor sorted by azimuth."""
     owner: Array
     """Sensor of each, int64 (N,)."""
     start: Array
@@ -78,9 +74,11 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     covariance, weight = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     gain, base = np.zeros(count), 0.0
     for s, sensor in enumerate(scene.sensors):
-        d = sensor.dim
-        covariance[s, :d, :d] = sensor.covariance
-        weight[s, :d, :d] = np.linalg.inv(sensor.covariance)
+        # range rates have no part in positions; `assoc.costs.range_rates` weighs them
+        located = sensor.position_part
+        d = located.dim
+        covariance[s, :d, :d] = located.covariance
+        weight[s, :d, :d] = np.linalg.inv(located.covariance)
         log_determinant = float(np.linalg.slogdet(2 * math.pi * sensor.covariance)[1])
         detected = math.log(sensor.detection_probability * sensor.volume / sensor.false_alarm_rate)
         missed = -math.log1p(-sensor.detection_probability)
@@ -96,12 +94,12 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
     # a flat region says where the targets are, it must not overrule what the sensors measure
     half = np.maximum(half, 0.1 * half.max())
     return SensorArrays(
-        code=np.array([_CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
-        dim=np.array([sensor.dim for sensor in scene.sensors], dtype=np.int64),
+        code=np.array([CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
+        dim=np.array([sensor.position_part.dim for sensor in scene.sensors], dtype=np.int64),
         place=np.array([sensor.position for sensor in scene.sensors]),
         covariance=covariance,
         weight=weight,
-        full=np.array([sensor.dim == 3 for sensor in scene.sensors]),
+        full=np.array([sensor.dim >= 3 for sensor in scene.sensors]),
         middle=scene.region.mean(axis=1),
         half=half,
         gain=gain,
@@ -132,7 +130,7 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
             order = np.argsort(azimuth, kind="stable")
             z[rows, 0] = azimuth[order]
         else:
-            z[rows, : measured.shape[1]] = measured
+            z[rows, : sensors.dim[s]] = measured[:, : sensors.dim[s]]
         index[rows] = order + 1
     centre, spread, information = convert(
         sensors.code,

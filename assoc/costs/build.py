@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
-from assoc.costs.positions import _scan
+from assoc.costs.positions import scan_of
+from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
@@ -30,6 +32,7 @@ def build_problem(
     *,
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
+    speed: float | Sequence[float] = SPEED,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -53,6 +56,9 @@ def build_problem(
         of the cost.
     max_tuples : int
         The most candidate tuples that may be made.
+    speed : float or sequence of float
+        Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
+        against; without a sensor that measures range rate it has no effect.
 
     Returns
     -------
@@ -77,7 +83,7 @@ def build_problem(
         probability = math.nan
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
-    one = _scan(scene, scan)
+    one = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
@@ -85,7 +91,7 @@ def build_problem(
     measured, index = scan_arrays(sensors, one, reach, least)
     limits = {"number": one.index, "max_tuples": int(max_tuples)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
 

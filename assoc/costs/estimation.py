@@ -23,7 +23,9 @@ from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
 from assoc.costs.residuals import normal
-from assoc.costs.symmetric import Six, inverse, solve
+from assoc.costs.symmetric import inverse, solve
+from assoc.sensors.codes import BEARING, RADAR2D
+from assoc.sensors.kernels.records import Six
 
 # a position is undetermined along a direction if the measurements tell less of it than this times the prior
 _WEAK = 1.0
@@ -94,7 +96,7 @@ def _start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) 
     last = members[0]
     for n in members:
         s = scan.owner[n]
-        if sensors.code[s] == 3 or (full and not sensors.full[s]):
+        if sensors.code[s] == BEARING or (full and not sensors.full[s]):
             continue
         i, c = scan.information[n], scan.centre[n]
         a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
@@ -224,8 +226,8 @@ def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[fl
     for n in members:
         s = scan.owner[n]
         full_ones += 1 if sensors.full[s] else 0
-        tall_ones += 1 if sensors.full[s] or sensors.code[s] == 2 else 0
-        located_ones += 1 if sensors.code[s] != 3 else 0
+        tall_ones += 1 if sensors.full[s] or sensors.code[s] == RADAR2D else 0
+        located_ones += 1 if sensors.code[s] != BEARING else 0
     full, flat = full_ones > 0, tall_ones == 0
     if located_ones == 0:
         crossing, ahead = _bearing_starts(sensors, scan, members)

@@ -11,10 +11,11 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
-from assoc.costs.arrays import BEARING, ScanArrays, SensorArrays
+from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
 from assoc.costs.gating import Gates
 from assoc.costs.limits import refuse, too_many
+from assoc.sensors.codes import BEARING, POSITION
 
 # up to so many combinations looking at each is quicker than a tree
 _BRUTE = 100_000
@@ -60,10 +61,10 @@ def _may_cross(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: f
 def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
     """Whether two measurements may pass a gate of `limit`; errs only towards True."""
     s, t = scan.owner[n], scan.owner[m]
-    if sensors.code[s] == 3 or sensors.code[t] == 3:
+    if sensors.code[s] == BEARING or sensors.code[t] == BEARING:
         if sensors.code[s] == sensors.code[t]:
             return _may_cross(sensors, scan, n, m, limit)
-        if sensors.code[s] == 3:
+        if sensors.code[s] == BEARING:
             n, m, t = m, n, s
         dx, dy = scan.centre[n, 0] - sensors.place[t, 0], scan.centre[n, 1] - sensors.place[t, 1]
         ball = 2.0 * limit * (scan.spread[n, 0] + scan.spread[n, 3])
@@ -76,7 +77,7 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
             2.0 * limit * sensors.covariance[t, 0, 0]
         )
     # for bent measurement models the two ellipsoids are added up, not their covariances
-    if sensors.code[s] != 0 or sensors.code[t] != 0:
+    if sensors.code[s] != POSITION or sensors.code[t] != POSITION:
         limit *= 2.0
     dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
     c0, c1, c3 = (
@@ -124,7 +125,7 @@ def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, 
         x, y, size = centre[n, 0], centre[n, 1], spread[n, 0] + spread[n, 3]
         for m in range(scan.start[s + 1], total):
             t = owner[m]
-            if code[s] != 3 and code[t] != 3:
+            if code[s] != BEARING and code[t] != BEARING:
                 dx, dy = centre[m, 0] - x, centre[m, 1] - y
                 if dx * dx + dy * dy > 2.0 * limits[s, t] * (size + spread[m, 0] + spread[m, 3]):
                     continue
@@ -241,7 +242,7 @@ def _by_tree(
     a, b = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
     if a.start == a.stop or b.start == b.stop:
         return
-    if sensors.code[s] != 0 or sensors.code[t] != 0:
+    if sensors.code[s] != POSITION or sensors.code[t] != POSITION:
         limit *= 2.0
     radius = np.sqrt(limit * (_widest(scan.spread[a], axes) + _widest(scan.spread[b], axes).max())) * (
         1 + 1e-9

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.arrays import POSITION, SensorArrays, scan_arrays, sensor_arrays
+from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
+from assoc.costs.range_rates import SPEED, prices, range_rates
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors.codes import POSITION
 
 
-def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
+def tuple_costs(
+    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
+) -> Array:
     """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
 
     Parameters
@@ -23,6 +28,8 @@ def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
         See `build_problem`.
     tuples : array_like of int (K, S)
         1-based measurement of each sensor, 0 where it missed the target.
+    speed : float or sequence of float
+        See `build_problem`.
 
     Returns
     -------
@@ -34,7 +41,11 @@ def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array) -> Array:
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
     sensors = sensor_arrays(scene)
-    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
+    rows, chi, positions, _ = _fit_tuples(scene, scan, tuples)
+    rates = range_rates(scene, scan_of(scene, scan), speed)
+    if rates is not None:
+        flat, _ = scan_arrays(sensors, scan_of(scene, scan), 1.0, 1.0)
+        chi = chi + prices(sensors, flat, rates, rows, positions)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)
@@ -108,12 +119,13 @@ def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array
     return positions, covariances
 
 
-def _scan(scene: Scene, scan: int | Scan) -> Scan:
+def scan_of(scene: Scene, scan: int | Scan) -> Scan:
+    """Scan of that number, or the scan itself."""
     return scan if isinstance(scan, Scan) else scene.scan(scan)
 
 
 def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
-    one = _scan(scene, scan)
+    one = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
     measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
     count, sizes = len(scene.sensors), one.sizes

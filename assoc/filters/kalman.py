@@ -7,8 +7,7 @@ from assoc.filters.kernels.gaussian import LINEAR
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
-
-_POSITION = 0
+from assoc.sensors.codes import POSITION
 
 
 class KalmanFilter(GaussianFilter):
@@ -35,7 +34,7 @@ class KalmanFilter(GaussianFilter):
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
         o = super().observe(sensor)
-        if o.code not in (LINEAR, _POSITION):
+        if o.code not in (LINEAR, POSITION):
             self._seen = (None, None)
             raise InvalidInputError(
                 f"sensor must be linear for a Kalman filter, got {type(sensor).__name__}; use ExtendedKalmanFilter"

@@ -13,7 +13,7 @@ from assoc.filters.kernels.gaussian import GIVEN, LINEAR
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import finite, positive_definite
 from assoc.sensors.base import Sensor
-from assoc.sensors.kernels import CODES
+from assoc.sensors.codes import CODES, POSITION
 
 _NO_MATRIX = np.zeros((0, 0))
 _NO_PLACE = np.zeros(3)
@@ -113,17 +113,26 @@ class _SensorAsFunction(FunctionMeasurement):
         self.dim, self.covariance = sensor.dim, np.array(sensor.covariance)
         self.sensor, self.position, self.states = sensor, position, dim
 
-    def _places(self, states: Array) -> Array:
-        places = np.zeros((len(states), 3))
-        places[:, : len(self.position)] = states[:, self.position]
-        return places
+    def _places(self, states: Array) -> tuple[Array, ...]:
+        """Positions and, if the sensor measures a velocity, velocities, each (m, 3)."""
+        if not self.sensor.measures_velocity:
+            places = np.zeros((len(states), 3))
+            places[:, : len(self.position)] = states[:, self.position]
+            return (places,)
+        both = np.zeros((len(states), 2, 3))
+        axes = len(self.position) // 2
+        both[:, :, :axes] = states[:, self.position].reshape(-1, 2, axes)
+        return both[:, 0], both[:, 1]
 
     def measure(self, states: Array) -> Array:
-        return finite(self.sensor.measure(self._places(states)), "the sensor's measure", 2)
+        return finite(self.sensor.measure(*self._places(states)), "the sensor's measure", 2)
 
     def jacobian(self, states: Array) -> Array:
         H = np.zeros((len(states), self.dim, self.states))
-        slopes = self.sensor.jacobian(self._places(states))
+        slopes = self.sensor.jacobian(*self._places(states))
+        if self.sensor.measures_velocity:
+            axes = len(self.position) // 2
+            slopes = slopes.reshape(len(states), self.dim, 2, 3)[..., :axes].reshape(len(states), self.dim, -1)
         H[:, :, self.position] = slopes[:, :, : len(self.position)]
         return H
 
@@ -132,6 +141,17 @@ class _SensorAsFunction(FunctionMeasurement):
 
 
 _NO_MODEL: Any = None
+
+
+def _velocity_columns(motion: Motion) -> Array:
+    """Where the velocities stand in a state: after the positions, in their order."""
+    position = np.array(motion.position, dtype=np.int64)
+    columns = position + len(position)
+    if len(position) < 2 or columns.max() >= motion.dim or np.isin(columns, position).any():
+        raise InvalidInputError(
+            f"sensor measures range rate, but the states of {type(motion).__name__} have no velocity of each coordinate"
+        )
+    return columns
 
 
 def _observation(
@@ -147,10 +167,12 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
     if isinstance(measurement, Sensor):
         columns = np.array(motion.position, dtype=np.int64)
         code = CODES.get(type(measurement))
-        if code == 0 and measurement.dim > len(columns):
+        if code == POSITION and measurement.dim > len(columns):
             raise InvalidInputError(
                 f"sensor measures {measurement.dim} coordinates, the motion model has {len(columns)}"
             )
+        if measurement.measures_velocity:
+            columns = np.concatenate([columns, _velocity_columns(motion)])
         if code is not None:
             R = np.ascontiguousarray(measurement.covariance)[None].copy()
             place = np.array(measurement.position)

@@ -13,8 +13,7 @@ from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 from assoc.sensors.base import wrap_angle
-
-_RADAR = 1
+from assoc.sensors.codes import RADAR3D
 
 
 class ModifiedEKF(GaussianFilter):
@@ -44,8 +43,10 @@ class ModifiedEKF(GaussianFilter):
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
         o = super().observe(sensor)
-        if o.code != _RADAR:
+        if o.code != RADAR3D:
             raise InvalidInputError(f"sensor must be a Radar3D for a modified EKF, got {type(sensor).__name__}")
+        if o.dim != 3:
+            raise InvalidInputError("sensor: a modified EKF takes no range rate; use ExtendedKalmanFilter")
         if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
         return o

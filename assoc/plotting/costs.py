@@ -126,7 +126,9 @@ def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
         rows = np.flatnonzero(one.targets[:, s])
         if not rows.size or one.positions is None:
             continue
-        nu = sensor.residual(scan.measurements[s][one.targets[rows, s] - 1], sensor.measure(one.positions[rows]))
+        sensor = sensor.position_part
+        measured = scan.measurements[s][one.targets[rows, s] - 1][:, : sensor.dim]
+        nu = sensor.residual(measured, sensor.measure(one.positions[rows]))
         total[rows] += np.einsum("ni,ij,nj->n", nu, np.linalg.inv(sensor.covariance), nu)
         freedom[rows] += sensor.dim
         heights[rows] |= sensor.dim == 3

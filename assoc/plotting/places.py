@@ -63,4 +63,4 @@ def distances_to_border(sensor: Sensor, bearings: Array, region: Array) -> Array
 
 def measures_height(sensor: Sensor) -> bool:
     """Whether a measurement says how high the target is."""
-    return sensor.dim == 3
+    return sensor.dim >= 3

@@ -101,9 +101,9 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         _check_shape(arrays, name, (count,))
     _check_shape(arrays, "sensor_position", (count, 3))
     dims = arrays["sensor_dim"]
-    if dims.min() < 1 or dims.max() > 3:
+    if dims.min() < 1 or dims.max() > 4:
         raise InvalidInputError(
-            f"the field 'sensor_dim' must hold 1, 2 or 3, got {dims.min()} to {dims.max()}"
+            f"the field 'sensor_dim' must hold 1 to 4, got {dims.min()} to {dims.max()}"
         )
     _check_shape(arrays, "sensor_covariance", (int((dims**2).sum()),))
     _check_shape(arrays, "sensor_field_of_view", (int(dims.sum()), 2))

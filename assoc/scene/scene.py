@@ -184,13 +184,13 @@ class Scene:
 
     def _repr_html_(self) -> str:
         """Return what notebooks and reports show: one row a sensor."""
-        rows = []
+        rows, units = [], {"range rate": "m/s"}
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
             place = ", ".join(f"{x:g}" for x in sensor.position)
             sigmas = np.sqrt(np.diagonal(sensor.covariance))
             noise = ", ".join(
-                f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} m"
+                f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} {units.get(name, 'm')}"
                 for name, sigma in zip(sensor.components, sigmas, strict=False)
             )
             rows.append(

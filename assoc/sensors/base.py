@@ -14,7 +14,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 
 ANGLES = ("azimuth", "elevation")
-"""Components that are angles, in radians; all others are lengths, in metres."""
+"""Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
 
 LARGEST = 1e12
 """Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
@@ -169,14 +169,26 @@ class Sensor(ABC):
         """Volume V of the field of view in measurement space (m, rad and their products)."""
         return float(np.prod(self.field_of_view[:, 1] - self.field_of_view[:, 0]))
 
+    @property
+    def measures_velocity(self) -> bool:
+        """Whether a measurement depends on the target's velocity, too: `measure` then asks for velocities."""
+        return False
+
+    @property
+    def position_part(self) -> Sensor:
+        """The same sensor without the components that depend on a velocity."""
+        return self
+
     @abstractmethod
-    def measure(self, positions: Array) -> Array:
+    def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free measurements of targets.
 
         Parameters
         ----------
         positions : ndarray (n, 3)
             Metres.
+        velocities : ndarray (n, 3), optional
+            m/s; only sensors that measure a velocity need them.
 
         Returns
         -------
@@ -184,10 +196,11 @@ class Sensor(ABC):
         """
 
     @abstractmethod
-    def jacobian(self, positions: Array) -> Array:
+    def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives of `measure` by the position, shape (n, d, 3).
 
-        At the sensor's own place, where angles have no derivative, the distance is taken as 1e-9 m.
+        Of a sensor that measures a velocity, by position and velocity, shape (n, d, 6). At the sensor's own
+        place, where angles have no derivative, the distance is taken as 1e-9 m.
         """
 
     def residual(self, measured: Array, predicted: Array) -> Array:

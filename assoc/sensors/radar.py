@@ -1,12 +1,14 @@
-"""Radars: range, azimuth and elevation, or range and azimuth."""
+"""Radars: range, azimuth and elevation, with or without range rate, or range and azimuth."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from assoc._types import Array
+from assoc.errors import InvalidInputError
 from assoc.sensors.base import Sensor
 
 # closer than this to the sensor an angle has no useful derivative (metres)
@@ -15,38 +17,67 @@ NEAREST = 1e-9
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Radar3D(Sensor):
-    """A radar that measures slant range (m), azimuth and elevation (rad).
+    """A radar that measures slant range (m), azimuth and elevation (rad), and on request range rate (m/s).
 
-    Azimuth is counted from +x towards +y, elevation from the horizontal plane up. See `Sensor` for the
-    parameters; the components of `noise` and `field_of_view` are range, azimuth, elevation.
+    Azimuth is counted from +x towards +y, elevation from the horizontal plane up; the range rate is positive
+    when the target recedes. See `Sensor` for the parameters; the components of `noise` and `field_of_view` are
+    range, azimuth, elevation and, with a fourth, range rate.
     """
 
     kind = "radar3d"
-    components = ("range", "azimuth", "elevation")
+    components = ("range", "azimuth", "elevation", "range rate")
     # elevation ends at the poles: differences of two elevations need no wrapping
-    angular = (False, True, False)
+    angular = (False, True, False, False)
 
-    def measure(self, positions: Array) -> Array:
-        """Noise-free range, azimuth, elevation, shape (n, 3); see `Sensor.measure`."""
+    @classmethod
+    def _allowed_dims(cls) -> tuple[int, ...]:
+        return (3, 4)
+
+    @property
+    def measures_velocity(self) -> bool:
+        """Whether it measures range rate."""
+        return self.dim == 4
+
+    @cached_property
+    def _without_range_rate(self) -> Radar3D:
+        return replace(self, noise=self.covariance[:3, :3], field_of_view=self.field_of_view[:3])
+
+    @property
+    def position_part(self) -> Sensor:
+        """The same radar without range rate."""
+        return self._without_range_rate if self.measures_velocity else self
+
+    def measure(self, positions: Array, velocities: Array | None = None) -> Array:
+        """Noise-free range, azimuth, elevation (and range rate), shape (n, d); see `Sensor.measure`."""
         d = np.asarray(positions, dtype=np.float64) - self.position
         ground = np.hypot(d[:, 0], d[:, 1])
-        return np.stack(
-            [np.hypot(ground, d[:, 2]), np.arctan2(d[:, 1], d[:, 0]), np.arctan2(d[:, 2], ground)], axis=1
-        )
+        found = [np.hypot(ground, d[:, 2]), np.arctan2(d[:, 1], d[:, 0]), np.arctan2(d[:, 2], ground)]
+        if self.measures_velocity:
+            found.append((d * self._velocities(velocities)).sum(axis=1) / np.maximum(found[0], NEAREST))
+        return np.stack(found, axis=1)
 
-    def jacobian(self, positions: Array) -> Array:
-        """Derivatives by the position, shape (n, 3, 3); see `Sensor.jacobian`."""
+    def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
+        """Derivatives by the position, (n, 3, 3), with range rate by the velocity, too, (n, 4, 6)."""
         d = np.asarray(positions, dtype=np.float64) - self.position
         ground = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST)
         slant = np.hypot(ground, d[:, 2])
-        result = np.zeros((len(d), 3, 3))
-        result[:, 0] = d / slant[:, None]
+        result = np.zeros((len(d), self.dim, 6 if self.measures_velocity else 3))
+        result[:, 0, :3] = d / slant[:, None]
         result[:, 1, 0] = -d[:, 1] / ground**2
         result[:, 1, 1] = d[:, 0] / ground**2
         result[:, 2, 0] = -d[:, 0] * d[:, 2] / (ground * slant**2)
         result[:, 2, 1] = -d[:, 1] * d[:, 2] / (ground * slant**2)
         result[:, 2, 2] = ground / slant**2
+        if self.measures_velocity:
+            v, u = self._velocities(velocities), result[:, 0, :3]
+            result[:, 3, :3] = (v - (u * v).sum(axis=1, keepdims=True) * u) / slant[:, None]
+            result[:, 3, 3:] = u
         return result
+
+    def _velocities(self, velocities: Array | None) -> Array:
+        if velocities is None:
+            raise InvalidInputError(f"{self._label}: a range rate needs the targets' velocities")
+        return np.asarray(velocities, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -61,13 +92,13 @@ class Radar2D(Sensor):
     components = ("range", "azimuth")
     angular = (False, True)
 
-    def measure(self, positions: Array) -> Array:
+    def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free range, azimuth, shape (n, 2); see `Sensor.measure`."""
         d = np.asarray(positions, dtype=np.float64) - self.position
         slant = np.hypot(np.hypot(d[:, 0], d[:, 1]), d[:, 2])
         return np.stack([slant, np.arctan2(d[:, 1], d[:, 0])], axis=1)
 
-    def jacobian(self, positions: Array) -> Array:
+    def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, shape (n, 2, 3); see `Sensor.jacobian`."""
         d = np.asarray(positions, dtype=np.float64) - self.position
         ground = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST)

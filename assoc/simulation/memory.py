@@ -11,7 +11,7 @@ _REPORT, _MEASUREMENT, _PLACE, _SENSOR = 1_000, 90, 150, 2_000
 MOST = 10_000_000
 
 
-def require_room(scans: float, sensors: float, targets: float, false_alarms: float, names: str) -> None:
+def require_scene_memory(scans: float, sensors: float, targets: float, false_alarms: float, names: str) -> None:
     """Refuse a scene that would take more memory than there is.
 
     Parameters

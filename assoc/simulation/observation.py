@@ -10,7 +10,7 @@ from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
 from assoc.sensors.base import Sensor, wrap_angle
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 
 
 def observe(
@@ -22,6 +22,7 @@ def observe(
     *,
     region: Array | None = None,
     name: str = "",
+    velocities: Sequence[Array] | None = None,
 ) -> Scene:
     """Let sensors observe targets.
 
@@ -41,6 +42,9 @@ def observe(
         The only source of randomness.
     region, name
         As in `assoc.Scene`.
+    velocities : sequence over scans of arrays (T_k, 3), optional
+        Of the targets, m/s, for sensors that measure range rate. Left out, they are differences of a target's
+        positions from scan to scan, 0 of one that is seen in a single scan.
 
     Returns
     -------
@@ -54,20 +58,60 @@ def observe(
     """
     rate = max((float(sensor.false_alarm_rate) for sensor in sensors), default=0.0)
     present = max((len(ids) for ids in target_ids), default=0)
-    require_room(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
+    require_scene_memory(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
     measurements: list[list[Array]] = []
     sources: list[list[Array]] = []
-    for ids, places in zip(target_ids, positions, strict=True):
-        scan = [_report(sensor, np.asarray(ids), np.asarray(places), rng) for sensor in sensors]
+    if velocities is None and any(sensor.measures_velocity for sensor in sensors):
+        velocities = velocities_from(times, target_ids, positions)
+    moving = velocities if velocities is not None else [np.zeros((len(ids), 3)) for ids in target_ids]
+    for ids, places, speeds in zip(target_ids, positions, moving, strict=True):
+        scan = [_report(sensor, np.asarray(ids), np.asarray(places), np.asarray(speeds), rng) for sensor in sensors]
         measurements.append([values for values, _ in scan])
         sources.append([source for _, source in scan])
     truth = Truth(target_ids, positions, sources)
     return Scene(sensors, times, measurements, region, truth, name)  # type: ignore[arg-type]
 
 
-def _report(sensor: Sensor, ids: Array, positions: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequence[Array]) -> list[Array]:
+    """Velocities of targets whose positions alone are known, by differences from scan to scan.
+
+    Central differences between neighbouring scans, one-sided at the ends of a target's presence.
+
+    Parameters
+    ----------
+    times : array (K,)
+        Seconds.
+    target_ids, positions
+        As for `observe`.
+
+    Returns
+    -------
+    list over scans of arrays (T_k, 3), m/s
+    """
+    scan = np.repeat(np.arange(len(times)), [len(ids) for ids in target_ids])
+    if not len(scan):
+        return [np.zeros((0, 3)) for _ in times]
+    target = np.concatenate([np.asarray(ids) for ids in target_ids])
+    place = np.concatenate([np.reshape(one, (-1, 3)) for one in positions])
+    when = np.asarray(times, dtype=np.float64)[scan]
+    order = np.lexsort((scan, target))
+    # of a target's rows, side by side in time, the neighbours; the row itself where there is none
+    same = target[order][1:] == target[order][:-1]
+    before, after = order.copy(), order.copy()
+    before[1:][same], after[:-1][same] = order[:-1][same], order[1:][same]
+    apart = when[after] - when[before]
+    rate = (place[after] - place[before]) / np.where(apart > 0, apart, 1.0)[:, None]
+    velocity = np.zeros_like(place)
+    velocity[order] = np.where(apart[:, None] > 0, rate, 0.0)
+    return np.split(velocity, np.cumsum([len(ids) for ids in target_ids])[:-1])
+
+
+def _report(
+    sensor: Sensor, ids: Array, positions: Array, velocities: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
     """Measurements (n, d) of one sensor in one scan, and the source (n,) of each."""
-    exact = sensor.measure(positions.reshape(-1, 3))
+    places = positions.reshape(-1, 3)
+    exact = sensor.measure(places, velocities.reshape(-1, 3)) if sensor.measures_velocity else sensor.measure(places)
     detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.in_view(exact)
     factor = np.linalg.cholesky(sensor.covariance)
     hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T

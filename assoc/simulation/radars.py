@@ -83,8 +83,10 @@ def radar_over(
     detection_probability: float,
     false_alarm_rate: float,
     name: str,
+    range_rate_noise: float = 0.0,
+    fastest: float = 0.0,
 ) -> Sensor:
-    """Make a radar (range, azimuth, elevation) whose field of view is the smallest box that covers a region.
+    """Make a radar (range, azimuth, elevation, range rate on request) whose field of view just covers a region.
 
     Parameters
     ----------
@@ -96,15 +98,23 @@ def radar_over(
         Standard deviations in metres, and in radians for azimuth and elevation alike.
     detection_probability, false_alarm_rate, name
         As in `assoc.sensors.Sensor`.
+    range_rate_noise : float
+        Standard deviation of the range rate, m/s; 0: the radar measures none.
+    fastest : float
+        Largest speed of a target, m/s.
     """
+    noise = [range_noise, angle_noise, angle_noise]
     view = [
         padded(range_interval(position, region), range_noise, 0.0, math.inf),
         padded_azimuth(azimuth_interval(position, region), angle_noise),
         padded(elevation_interval(position, region), angle_noise, -math.pi / 2, math.pi / 2),
     ]
+    if range_rate_noise > 0:
+        noise.append(range_rate_noise)
+        view.append(padded((-fastest, fastest), range_rate_noise, -math.inf, math.inf))
     return Radar3D(
         position=position,
-        noise=np.array([range_noise, angle_noise, angle_noise]),
+        noise=np.array(noise),
         detection_probability=detection_probability,
         false_alarm_rate=false_alarm_rate,
         field_of_view=np.array(view),

@@ -1,4 +1,7 @@
-"""What is read from a file of a saved tracker is looked at before it is believed: kernels do not check indices."""
+"""A tracker's state in a file: saved, checked, restored.
+
+What is read is checked before it is used: kernels do not check indices.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,36 @@ import copy
 import json
 import math
 import os
+from abc import ABC
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from assoc._files.npz import Field, load_npz, save_npz
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import gaussian
+from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
+from assoc.tracking.initiation import Initiation
+from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.track_batch import TrackBatch
+
+FORMAT = "assoc.tracker"
+VERSION = 1
+
+PREFIX = "bank."
+"""What the names of the tracks' fields begin with in a file; files of version 1 have it."""
 
 MOST = 10_000_000
 """Measurements of a sensor in a scan, and scans, at the most."""
 
 
-def demand(good: object, name: str, expected: str) -> None:
+def require_field(good: object, name: str, expected: str) -> None:
     """Refuse a field of a saved tracker by name."""
     if not bool(good):
         raise InvalidInputError(f"the field {name!r} is not that of a saved tracker: expected {expected}")
@@ -30,16 +46,16 @@ def demand(good: object, name: str, expected: str) -> None:
 
 def check_progress(arrays: Mapping[str, Array], tracks: int) -> None:
     """Time, number of scans and ids."""
-    demand(1 <= int(arrays["next_id"]) < 2**62, "next_id", "a whole number above 0")
+    require_field(1 <= int(arrays["next_id"]) < 2**62, "next_id", "a whole number above 0")
     time, scan, pace = float(arrays["time"]), int(arrays["scan"]), float(arrays["pace"])
-    demand(not math.isinf(time), "time", "seconds")
-    demand(0 <= scan < 2**62, "scan", "a whole number >= 0")
-    demand(math.isfinite(pace) and pace >= 0, "pace", "seconds >= 0")
+    require_field(not math.isinf(time), "time", "seconds")
+    require_field(0 <= scan < 2**62, "scan", "a whole number >= 0")
+    require_field(math.isfinite(pace) and pace >= 0, "pace", "seconds >= 0")
     if math.isnan(time):
-        demand(scan == 0 and tracks == 0, "time", "seconds, since there have been scans or tracks")
+        require_field(scan == 0 and tracks == 0, "time", "seconds, since there have been scans or tracks")
 
 
-def check_bank(arrays: Mapping[str, Array], filter: Filter[Any], widest: int, prefix: str = "bank.") -> None:
+def check_tracks(arrays: Mapping[str, Array], filter: Filter[Any], widest: int, prefix: str = PREFIX) -> None:
     """Tracks: all arrays of one length, ids that were given, states of the filter's shape.
 
     Parameters
@@ -49,40 +65,42 @@ def check_bank(arrays: Mapping[str, Array], filter: Filter[Any], widest: int, pr
     widest : int
         The most components of a measurement.
     prefix : str
-        Of the names of a bank's arrays.
+        Of the names of a batch's arrays.
     """
     ids = arrays[f"{prefix}track_id"]
     for name, value in arrays.items():
         if name.startswith(prefix):
-            demand(value.ndim and len(value) == len(ids), name, f"{len(ids)} rows, as many as ids")
+            require_field(value.ndim and len(value) == len(ids), name, f"{len(ids)} rows, as many as ids")
             if value.dtype.kind == "f":
-                demand(np.isfinite(value).all(), name, "finite numbers")
-    demand(((ids >= 1) & (ids < int(arrays["next_id"]))).all(), f"{prefix}track_id", "ids from 1 up to the next one")
+                require_field(np.isfinite(value).all(), name, "finite numbers")
+    given = (ids >= 1) & (ids < int(arrays["next_id"]))
+    require_field(given.all(), f"{prefix}track_id", "ids from 1 up to the next one")
     for name in ("detections", "missed", "hits"):
-        demand((arrays[f"{prefix}{name}"] >= 0).all(), f"{prefix}{name}", "whole numbers >= 0")
+        require_field((arrays[f"{prefix}{name}"] >= 0).all(), f"{prefix}{name}", "whole numbers >= 0")
     n = filter.motion.dim
     for name, model in arrays_of(filter.start(gaussian(np.zeros((1, n)), np.eye(n)[None]))).items():
         key = f"{prefix}state.{name}"
         found = arrays[key].shape[1:]
         # what a filter keeps of measurements has no width before the first one
         same = [a == b or (b == 0 and a <= widest) for a, b in zip(found, model.shape[1:], strict=True)]
-        demand(all(same), key, f"rows of the shape {model.shape[1:]}")
+        require_field(all(same), key, f"rows of the shape {model.shape[1:]}")
         if name == "weights":
             near = np.abs(arrays[key].sum(axis=-1) - 1.0) < 1e-6
-            demand(near.all() and (arrays[key] >= 0).all(), key, "probabilities")
+            require_field(near.all() and (arrays[key] >= 0).all(), key, "probabilities")
 
 
 def check_window(arrays: Mapping[str, Array], tracks: int, sensors: int, depth: int) -> None:
     """Scans that are not final, and each branch's measurements in them."""
     times, sizes, history = arrays["window_times"], arrays["window_sizes"], arrays["history"]
-    demand(len(times) < max(depth, 1) or len(times) == 0, "window_times", f"fewer than {depth} scans")
-    demand(np.isfinite(times).all(), "window_times", "finite numbers")
-    demand(sizes.shape == (len(times), sensors), "window_sizes", f"the shape {(len(times), sensors)}")
-    demand(((sizes >= 0) & (sizes <= MOST)).all(), "window_sizes", "numbers of measurements")
-    demand(history.shape == (tracks, depth * sensors), "history", f"the shape {(tracks, depth * sensors)}")
+    require_field(len(times) < max(depth, 1) or len(times) == 0, "window_times", f"fewer than {depth} scans")
+    require_field(np.isfinite(times).all(), "window_times", "finite numbers")
+    require_field(sizes.shape == (len(times), sensors), "window_sizes", f"the shape {(len(times), sensors)}")
+    require_field(((sizes >= 0) & (sizes <= MOST)).all(), "window_sizes", "numbers of measurements")
+    require_field(history.shape == (tracks, depth * sensors), "history", f"the shape {(tracks, depth * sensors)}")
     most = np.full(depth * sensors, MOST)
     most[: sizes.size] = sizes.ravel()
-    demand(((history >= 0) & (history <= most)).all(), "history", "numbers of measurements of the scans in the window")
+    known = (history >= 0) & (history <= most)
+    require_field(known.all(), "history", "numbers of measurements of the scans in the window")
 
 
 def rng_state(rng: np.random.Generator, text: str) -> Any:
@@ -95,7 +113,7 @@ def rng_state(rng: np.random.Generator, text: str) -> Any:
     return state
 
 
-def difference(saved: str, own: str) -> str:
+def changed_setting(saved: str, own: str) -> str:
     """Say which setting of a tracker differs from a saved one's."""
     now = json.loads(own)
     try:
@@ -129,3 +147,100 @@ def described(thing: object) -> str:
         return f"[{', '.join(described(one) for one in thing)}]"
     plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
     return repr(thing) if plain else type(thing).__name__
+
+
+class Checkpoint(ABC):
+    """What makes a tracker savable: its settings, its state as arrays, and how they are checked and taken over.
+
+    Children with a state of their own extend `_settings`, `_arrays`, `_check` and `_take`.
+    """
+
+    name: ClassVar[str]
+    sensors: tuple[Sensor, ...]
+    filter: Filter[Any]
+    solver: str
+    solver_parameters: dict[str, Any]
+    seed: int
+    life_cycle: LifeCycle
+    initiation: Initiation
+    gate_probability: float
+    _place: Scene
+    _time: float | None
+    _pace: float
+    _scan: int
+    _next_id: int
+    _batch: TrackBatch
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole state as an npz file of format "assoc.tracker"; whole or not at all."""
+        save_npz(path, FORMAT, VERSION, self._arrays())
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Read the state that a tracker with the same settings has saved; the future is the same, bit for bit.
+
+        Raises
+        ------
+        InvalidInputError
+            The file is not a saved tracker, or damaged, or that of a tracker with other settings. The tracker
+            is then as it was.
+        """
+        own = self._arrays()
+        kinds = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
+        spec = {name: Field(kinds[value.dtype.kind], value.ndim) for name, value in own.items()}
+        found = load_npz(path, FORMAT, VERSION, {"settings": spec["settings"]})
+        if str(found["settings"]) != str(own["settings"]):
+            raise InvalidInputError(
+                f"{path}: was saved by a tracker with other settings: "
+                f"{changed_setting(str(found['settings']), str(own['settings']))}"
+            )
+        arrays = load_npz(path, FORMAT, VERSION, spec)
+        try:
+            self._check(arrays)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{path}: {error}") from None
+        self._take(arrays)
+
+    def _settings(self) -> dict[str, str]:
+        """What a saved state depends on, as texts."""
+        return {
+            "tracker": self.name,
+            "filter": described(self.filter),
+            "sensors": "; ".join(f"{sensor!r}" for sensor in self.sensors),
+            "region": str(self._place.region.tolist()),
+            "solver": f"{self.solver} {sorted(self.solver_parameters.items())}",
+            "seed": str(self.seed),
+            "life_cycle": repr(self.life_cycle),
+            "initiation": repr(self.initiation),
+            "gate_probability": repr(self.gate_probability),
+        }
+
+    def _arrays(self) -> dict[str, Array]:
+        rng = getattr(self.filter, "rng", None)
+        return {
+            "settings": np.array(json.dumps(self._settings())),
+            "time": np.array(math.nan if self._time is None else self._time),
+            "scan": np.array(self._scan),
+            "pace": np.array(self._pace),
+            "next_id": np.array(self._next_id),
+            "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
+            **self._batch.arrays(PREFIX),
+        }
+
+    def _check(self, arrays: dict[str, Array]) -> None:
+        """Refuse arrays that no tracker of these settings has saved."""
+        check_progress(arrays, len(arrays[f"{PREFIX}track_id"]))
+        check_tracks(arrays, self.filter, max(sensor.dim for sensor in self.sensors))
+        rng = getattr(self.filter, "rng", None)
+        if rng is not None and str(arrays["filter_rng"]):
+            rng_state(rng, str(arrays["filter_rng"]))
+
+    def _take(self, arrays: dict[str, Array]) -> None:
+        """Take over checked arrays."""
+        when = float(arrays["time"])
+        self._time = None if math.isnan(when) else when
+        self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
+        self._pace = float(arrays["pace"])
+        rng = getattr(self.filter, "rng", None)
+        if rng is not None and str(arrays["filter_rng"]):
+            rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))
+        self._batch = self._batch.restored(arrays, PREFIX)

@@ -1,4 +1,4 @@
-"""Filters by name, for programs and experiments."""
+"""Filters by name, and the one that trackers take where none is given."""
 
 from __future__ import annotations
 
@@ -11,15 +11,44 @@ from assoc import filters
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Radar3D, Sensor
-from assoc.tracking.defaults import MANOEUVRE_NOISE, PROCESS_NOISE, two_speeds
+
+PROCESS_NOISE = 30.0
+"""Process noise of filters with one motion model: root of the acceleration's spectral density, m/s^1.5."""
+
+MANOEUVRE_NOISE = 50.0
+"""Process noise of the manoeuvring model of `two_speeds`: turns of 5 g at a scan a second."""
+
+# imm-cv: the quiet model's share of the process noise, and the probability that a model gives way in a scan
+_QUIET = 0.1
+_CHANGE = 0.1
 
 _TURN_NOISE = 0.03
 """Standard deviation of a turn rate's increment in a step, rad/s."""
 
 
+def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[Any]:
+    """Interacting multiple models: nearly constant velocity, and manoeuvres.
+
+    A target that flies straight is tracked with a tenth of the process noise; either model gives way to the
+    other every ten scans on average.
+
+    Parameters
+    ----------
+    noise : float
+        Process noise of the manoeuvring model, m/s^1.5.
+    dimensions : int
+        2 or 3.
+    """
+    modes: list[Any] = [
+        filters.ExtendedKalmanFilter(filters.ConstantVelocity(share * noise, dimensions=dimensions, kind="continuous"))
+        for share in (_QUIET, 1.0)
+    ]
+    return filters.InteractingMultipleModel(modes, np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]]))
+
+
 def planar(sensors: Sequence[Sensor]) -> bool:
     """Whether no sensor tells a height, so that states of two dimensions are enough."""
-    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim == 3 for one in sensors)
+    return not any(isinstance(one, (Radar3D, PositionSensor)) and one.dim >= 3 for one in sensors)
 
 
 def _velocity(noise: float, flat: bool) -> filters.ConstantVelocity:

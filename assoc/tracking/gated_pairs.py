@@ -13,7 +13,7 @@ from assoc.filters.batches import concatenate
 from assoc.sensors import Sensor
 
 
-class Frame(NamedTuple):
+class GatedPairs(NamedTuple):
     """What a sensor's measurements may mean to B tracks."""
 
     predicted: Any
@@ -24,7 +24,7 @@ class Frame(NamedTuple):
     """Time of the measurement of each pair, seconds."""
 
 
-def look(
+def gated_pairs(
     filter: Filter[Any],
     states: Any,
     before: float,
@@ -33,7 +33,7 @@ def look(
     stamps: Array | None,
     sensor: Sensor,
     gate_probability: float,
-) -> Frame:
+) -> GatedPairs:
     """Predict tracks, gate measurements and correct every pair.
 
     Parameters
@@ -53,7 +53,7 @@ def look(
     predicted = _later(filter, states, time - before)
     if stamps is None:
         pairs = track_pairs(filter, predicted, measurements, sensor, gate)
-        return Frame(predicted, pairs, np.full(len(pairs.track), time))
+        return GatedPairs(predicted, pairs, np.full(len(pairs.track), time))
     parts, when = [], []
     for stamp in np.unique(stamps):
         numbers = np.flatnonzero(stamps == stamp)
@@ -65,14 +65,14 @@ def look(
         when.append(np.full(len(found.track), stamp))
     if not parts:
         nothing = np.zeros(0, dtype=np.int64)
-        return Frame(predicted, TrackPairs(nothing, nothing, np.zeros(0), predicted[nothing]), np.zeros(0))
+        return GatedPairs(predicted, TrackPairs(nothing, nothing, np.zeros(0), predicted[nothing]), np.zeros(0))
     joined = TrackPairs(
         np.concatenate([part.track for part in parts]),
         np.concatenate([part.measurement for part in parts]),
         np.concatenate([part.log_likelihood for part in parts]),
         concatenate([part.states for part in parts]),
     )
-    return Frame(predicted, joined, np.concatenate(when))
+    return GatedPairs(predicted, joined, np.concatenate(when))
 
 
 def _later(filter: Filter[Any], states: Any, dt: float) -> Any:

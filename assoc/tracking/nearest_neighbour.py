@@ -11,9 +11,9 @@ from assoc.costs.tracks.scores import doubted_gain
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
-from assoc.tracking.gated_pairs import Frame, look
+from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
 from assoc.tracking.track import Step, decision
-from assoc.tracking.track_batch import Bank
+from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 Rule = Literal["greedy", "assignment"]
@@ -47,15 +47,15 @@ class NearestNeighbourTracker(Tracker):
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        bank, before = self._bank, time if self._time is None else self._time
-        seen = np.zeros(len(bank), dtype=np.bool_)
+        batch, before = self._batch, time if self._time is None else self._time
+        seen = np.zeros(len(batch), dtype=np.bool_)
         assigned = []
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
             stamps = None if times is None else times[s]
-            frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
+            gated = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
             before = time
-            chosen = self._choose(frame, s, bank.score, len(z))
-            bank, hit, ids = self._take_in(bank, frame, chosen, s, len(z))
+            chosen = self._choose(gated, s, batch.score, len(z))
+            batch, hit, ids = self._take_in(batch, gated, chosen, s, len(z))
             free = np.flatnonzero(ids == 0)
             states, fit, positions = self._singles(s, z[free])
             free = free[fit]
@@ -65,19 +65,19 @@ class NearestNeighbourTracker(Tracker):
             ids[free[order]] = new
             score = np.full(len(free), self._birth[s])
             aged = predict_each(self.filter, states[order], (time - when)[order])
-            bank = Bank.concatenate([bank, Bank.new(aged, new, score, when[order])])
+            batch = TrackBatch.concatenate([batch, TrackBatch.new(aged, new, score, when[order])])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
-        bank = bank.counted(seen).confirm(self.life_cycle)
-        now = decision(self._scan, time, assigned, bank.track_id[bank.confirmed])
-        gone = self._doomed(bank, time)
-        self._bank = bank[~gone]
-        ended = np.sort(bank.track_id[gone & bank.confirmed])
+        batch = batch.counted(seen).confirm(self.life_cycle)
+        now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
+        gone = self._to_delete(batch, time)
+        self._batch = batch[~gone]
+        ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
-    def _choose(self, frame: Frame, s: int, scores: Array, count: int) -> Array:
+    def _choose(self, gated: GatedPairs, s: int, scores: Array, count: int) -> Array:
         """Rows of the pairs that are taken."""
-        pairs, tracks = frame.pairs, len(scores)
+        pairs, tracks = gated.pairs, len(scores)
         own = scores[pairs.track]
         seen = doubted_gain(own, self.terms.detection[s] + pairs.log_likelihood)
         if self.rule == "assignment":
@@ -94,21 +94,23 @@ class NearestNeighbourTracker(Tracker):
                 taken.append(row)
         return np.array(taken, dtype=np.int64)
 
-    def _take_in(self, bank: Bank, frame: Frame, chosen: Array, s: int, count: int) -> tuple[Bank, Array, Array]:
+    def _take_in(
+        self, batch: TrackBatch, gated: GatedPairs, chosen: Array, s: int, count: int
+    ) -> tuple[TrackBatch, Array, Array]:
         """Tracks after a sensor's scan, which were detected, and each measurement's track."""
-        pairs = frame.pairs
+        pairs = gated.pairs
         track = pairs.track[chosen]
-        hit = np.zeros(len(bank), dtype=np.bool_)
+        hit = np.zeros(len(batch), dtype=np.bool_)
         hit[track] = True
-        gain, when = np.full(len(bank), self.terms.miss[s]), np.full(len(bank), np.nan)
+        gain, when = np.full(len(batch), self.terms.miss[s]), np.full(len(batch), np.nan)
         gain[track] = self.terms.detection[s] + pairs.log_likelihood[chosen]
-        when[track] = frame.when[chosen]
+        when[track] = gated.when[chosen]
         rest = np.flatnonzero(~hit)
         back = np.argsort(np.concatenate([track, rest]), kind="stable")
-        states = concatenate([pairs.states[chosen], frame.predicted[rest]])[back] if len(bank) else frame.predicted
+        states = concatenate([pairs.states[chosen], gated.predicted[rest]])[back] if len(batch) else gated.predicted
         ids = np.zeros(count, dtype=np.int64)
-        ids[pairs.measurement[chosen]] = bank.track_id[track]
-        return bank.scored(states, gain, when), hit, ids
+        ids[pairs.measurement[chosen]] = batch.track_id[track]
+        return batch.scored(states, gain, when), hit, ids
 
     def _settings(self) -> dict[str, str]:
         return super()._settings() | {"rule": self.rule}

@@ -20,16 +20,16 @@ MASK = (1 << HISTORY) - 1
 
 
 SCORE, BEST, STARTED, LAST = 0, 1, 2, 3
-"""Columns of the numbers of a bank."""
+"""Columns of the numbers of a batch."""
 ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
-"""Columns of the counts of a bank."""
+"""Columns of the counts of a batch."""
 
 _NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST}
 _COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
 _HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection")
 
 
-class Bank:
+class TrackBatch:
     """T tracks (or branches of tracks).
 
     Two tables hold all but the states: a tracker with few tracks spends its time on calls, not on numbers.
@@ -97,34 +97,34 @@ class Bank:
     def __len__(self) -> int:
         return len(self.counts)
 
-    def __getitem__(self, rows: Any) -> Bank:
+    def __getitem__(self, rows: Any) -> TrackBatch:
         """Return the tracks that an index array, mask or slice selects."""
-        return Bank(self.states[rows], self.numbers[rows], self.counts[rows])
+        return TrackBatch(self.states[rows], self.numbers[rows], self.counts[rows])
 
     @staticmethod
-    def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> Bank:
+    def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> TrackBatch:
         """Tracks that begin now, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
         numbers, counts = np.empty((count, 4)), np.zeros((count, 5), dtype=np.int64)
         numbers[:, SCORE] = numbers[:, BEST] = score
         numbers[:, STARTED] = numbers[:, LAST] = when
         counts[:, ID] = track_id
-        return Bank(states, numbers, counts)
+        return TrackBatch(states, numbers, counts)
 
     @staticmethod
-    def concatenate(parts: Sequence[Bank]) -> Bank:
-        """Return one bank with the tracks of several."""
-        return Bank(
+    def concatenate(parts: Sequence[TrackBatch]) -> TrackBatch:
+        """Return one batch with the tracks of several."""
+        return TrackBatch(
             concatenate([part.states for part in parts]),
             np.concatenate([part.numbers for part in parts]),
             np.concatenate([part.counts for part in parts]),
         )
 
-    def moved(self, states: Any) -> Bank:
+    def moved(self, states: Any) -> TrackBatch:
         """The same tracks with other states."""
-        return Bank(states, self.numbers, self.counts)
+        return TrackBatch(states, self.numbers, self.counts)
 
-    def scored(self, states: Any, gain: Array | float, detected_at: Array | None = None) -> Bank:
+    def scored(self, states: Any, gain: Array | float, detected_at: Array | None = None) -> TrackBatch:
         """Tracks after a scan of one sensor, or of all: states, what the score gains, and detections.
 
         Parameters
@@ -139,28 +139,28 @@ class Bank:
         np.maximum(numbers[:, BEST], numbers[:, SCORE], out=numbers[:, BEST])
         if detected_at is not None:
             np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
-        return Bank(states, numbers, self.counts)
+        return TrackBatch(states, numbers, self.counts)
 
-    def counted(self, detected: Array) -> Bank:
+    def counted(self, detected: Array) -> TrackBatch:
         """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor."""
         counts = self.counts.copy()
         counts[:, BITS] = ((counts[:, BITS] << np.int64(1)) & MASK) | detected
         counts[:, MISSED] += 1
         counts[detected, MISSED] = 0
         counts[:, HITS] += detected
-        return Bank(self.states, self.numbers, counts)
+        return TrackBatch(self.states, self.numbers, counts)
 
-    def sure(self, confirmed: Array | bool) -> Bank:
+    def with_confirmed(self, confirmed: Array | bool) -> TrackBatch:
         """The same tracks, those in the mask confirmed, and no others."""
         counts = self.counts.copy()
         counts[:, SURE] = confirmed
-        return Bank(self.states, self.numbers, counts)
+        return TrackBatch(self.states, self.numbers, counts)
 
-    def confirm(self, life_cycle: LifeCycle) -> Bank:
+    def confirm(self, life_cycle: LifeCycle) -> TrackBatch:
         """Confirm the tracks whose time has come."""
-        return self.sure(self.confirmed | life_cycle.confirms(self.score, self.detections))
+        return self.with_confirmed(self.confirmed | life_cycle.confirms(self.score, self.detections))
 
-    def doomed(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
+    def to_delete(self, life_cycle: LifeCycle, time: float, patience: float) -> Array:
         """Which tracks are to be deleted; see `LifeCycle.deletes`."""
         silent = time - self.last_detection
         return life_cycle.deletes(self.confirmed, self.score, self.best, silent, self.missed, patience)
@@ -170,12 +170,12 @@ class Bank:
         found = {f"{prefix}{name}": value for name, value in self._columns().items()}
         return found | {f"{prefix}state.{name}": value for name, value in arrays_of(self.states).items()}
 
-    def restored(self, arrays: dict[str, Array], prefix: str = "") -> Bank:
-        """A bank of the kind of this one, made of the arrays of another."""
+    def restored(self, arrays: dict[str, Array], prefix: str = "") -> TrackBatch:
+        """A batch of the kind of this one, made of the arrays of another."""
         numbers = np.stack([arrays[f"{prefix}{name}"] for name in _NUMBERS], axis=1)
         counts = np.stack([arrays[f"{prefix}{name}"].astype(np.int64) for name in _COUNTS], axis=1)
         state = {name: arrays[f"{prefix}state.{name}"] for name in arrays_of(self.states)}
-        return Bank(state_from(type(self.states), state), numbers, counts)
+        return TrackBatch(state_from(type(self.states), state), numbers, counts)
 
     def _columns(self) -> dict[str, Array]:
         return {name: getattr(self, name) for name in (*_NUMBERS, *_COUNTS)}
@@ -195,9 +195,9 @@ class Bank:
         ]
 
 
-def empty_bank(filter: Filter[Any]) -> Bank:
+def empty_batch(filter: Filter[Any]) -> TrackBatch:
     """No tracks, with states of the filter's kind."""
     n = filter.motion.dim
     one = filter.start(gaussian(np.zeros((1, n)), np.eye(n)[None]))
     nothing = np.zeros(0, dtype=np.int64)
-    return Bank.new(one[nothing], nothing, np.zeros(0), np.zeros(0))
+    return TrackBatch.new(one[nothing], nothing, np.zeros(0), np.zeros(0))

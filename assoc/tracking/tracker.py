@@ -1,17 +1,14 @@
-"""What all trackers have in common: sensors, filter, settings, checked input, saved state."""
+"""What all trackers have in common: sensors, filter, settings, checked input."""
 
 from __future__ import annotations
 
-import json
 import math
-import os
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from assoc._files.npz import Field, load_npz, save_npz
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
@@ -30,15 +27,12 @@ from assoc.sensors.base import finite_array
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
-from assoc.tracking.checkpoint import check_bank, check_progress, described, difference, rng_state
-from assoc.tracking.defaults import two_speeds
+from assoc.tracking.checkpoint import Checkpoint
+from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track
-from assoc.tracking.track_batch import Bank, empty_bank
-
-FORMAT = "assoc.tracker"
-VERSION = 1
+from assoc.tracking.track_batch import TrackBatch, empty_batch
 
 # what the exact solver may do on one scan where the user says nothing of it: visits of tuples in branch and bound,
 # and nodes at the least; counted, so that the answer does not depend on the machine
@@ -46,7 +40,7 @@ _VISITS, _LEAST_NODES = 500_000, 10
 _FORGETTING = 0.05
 
 
-class Tracker(ABC):
+class Tracker(Checkpoint):
     """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
 
     Parameters
@@ -54,7 +48,7 @@ class Tracker(ABC):
     sensors : sequence of Sensor
     filter : Filter, optional
         Any filter of `assoc.filters`; by default interacting multiple models, quiet flight and manoeuvres
-        (`assoc.tracking.defaults.two_speeds`).
+        (`assoc.tracking.filter_choice.two_speeds`).
     region : array_like (3, 2), optional
         Bounds of x, y, z in metres, where targets are; see `assoc.Scene`.
     solver : str
@@ -126,7 +120,7 @@ class Tracker(ABC):
         self._pace = 0.0
         self._scan = 0
         self._next_id = 1
-        self._bank = empty_bank(self.filter)
+        self._batch = empty_batch(self.filter)
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
@@ -150,8 +144,8 @@ class Tracker(ABC):
             return []
         return self._current().tracks(self.filter, self._time)
 
-    def _current(self) -> Bank:
-        return self._bank
+    def _current(self) -> TrackBatch:
+        return self._batch
 
     def begin(self, time: float, tracks: Gaussian, score: float = 20.0) -> Array:
         """Take over targets that are known, from another system or a plan, before the first step.
@@ -178,13 +172,13 @@ class Tracker(ABC):
         if self._time is not None:
             raise InvalidInputError("begin: the tracker has begun already")
         when, states = self._checked_time(time), self.filter.start(tracks)
-        bank = Bank.new(states, self._new_ids(len(tracks)), np.full(len(tracks), float(score)), when)
+        batch = TrackBatch.new(states, self._new_ids(len(tracks)), np.full(len(tracks), float(score)), when)
         self._time = when
-        self._adopt(bank.sure(True))
-        return bank.track_id
+        self._adopt(batch.with_confirmed(True))
+        return batch.track_id
 
-    def _adopt(self, bank: Bank) -> None:
-        self._bank = bank
+    def _adopt(self, batch: TrackBatch) -> None:
+        self._batch = batch
 
     def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
         """Take one scan in.
@@ -288,18 +282,18 @@ class Tracker(ABC):
     def _elapsed(self, time: float) -> float:
         return 0.0 if self._time is None else time - self._time
 
-    def _predicted(self, bank: Bank, dt: float) -> Bank:
-        if dt == 0.0 or not len(bank):
-            return bank
-        return bank.moved(predict_each(self.filter, bank.states, np.full(len(bank), dt)))
+    def _predicted(self, batch: TrackBatch, dt: float) -> TrackBatch:
+        if dt == 0.0 or not len(batch):
+            return batch
+        return batch.moved(predict_each(self.filter, batch.states, np.full(len(batch), dt)))
 
     def _new_ids(self, count: int) -> Array:
         ids = np.arange(self._next_id, self._next_id + count)
         self._next_id += count
         return ids
 
-    def _doomed(self, bank: Bank, time: float) -> Array:
-        return bank.doomed(self.life_cycle, time, self.life_cycle.patience(self.terms.miss, self._pace))
+    def _to_delete(self, batch: TrackBatch, time: float) -> Array:
+        return batch.to_delete(self.life_cycle, time, self.life_cycle.patience(self.terms.miss, self._pace))
 
     def _scan_of(self, time: float, measurements: Sequence[Array]) -> Scan:
         return Scan(index=self._scan, time=time, measurements=tuple(measurements))
@@ -323,79 +317,6 @@ class Tracker(ABC):
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
         return self.initiation.start(self.filter, positions, covariances), fit, positions
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the whole state as an npz file of format "assoc.tracker"; whole or not at all."""
-        save_npz(path, FORMAT, VERSION, self._arrays())
-
-    def restore(self, path: str | os.PathLike[str]) -> None:
-        """Read the state that a tracker with the same settings has saved; the future is the same, bit for bit.
-
-        Raises
-        ------
-        InvalidInputError
-            The file is not a saved tracker, or damaged, or that of a tracker with other settings. The tracker
-            is then as it was.
-        """
-        own = self._arrays()
-        kinds = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
-        spec = {name: Field(kinds[value.dtype.kind], value.ndim) for name, value in own.items()}
-        found = load_npz(path, FORMAT, VERSION, {"settings": spec["settings"]})
-        if str(found["settings"]) != str(own["settings"]):
-            raise InvalidInputError(
-                f"{path}: was saved by a tracker with other settings: "
-                f"{difference(str(found['settings']), str(own['settings']))}"
-            )
-        arrays = load_npz(path, FORMAT, VERSION, spec)
-        try:
-            self._check(arrays)
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{path}: {error}") from None
-        self._take(arrays)
-
-    def _settings(self) -> dict[str, str]:
-        """What a saved state depends on, as texts."""
-        return {
-            "tracker": self.name,
-            "filter": described(self.filter),
-            "sensors": "; ".join(f"{sensor!r}" for sensor in self.sensors),
-            "region": str(self._place.region.tolist()),
-            "solver": f"{self.solver} {sorted(self.solver_parameters.items())}",
-            "seed": str(self.seed),
-            "life_cycle": repr(self.life_cycle),
-            "initiation": repr(self.initiation),
-            "gate_probability": repr(self.gate_probability),
-        }
-
-    def _arrays(self) -> dict[str, Array]:
-        rng = getattr(self.filter, "rng", None)
-        return {
-            "settings": np.array(json.dumps(self._settings())),
-            "time": np.array(math.nan if self._time is None else self._time),
-            "scan": np.array(self._scan),
-            "pace": np.array(self._pace),
-            "next_id": np.array(self._next_id),
-            "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
-            **self._bank.arrays("bank."),
-        }
-
-    def _check(self, arrays: dict[str, Array]) -> None:
-        """Refuse arrays that no tracker of these settings has saved."""
-        check_progress(arrays, len(arrays["bank.track_id"]))
-        check_bank(arrays, self.filter, max(sensor.dim for sensor in self.sensors))
-        rng = getattr(self.filter, "rng", None)
-        if rng is not None and str(arrays["filter_rng"]):
-            rng_state(rng, str(arrays["filter_rng"]))
-
-    def _take(self, arrays: dict[str, Array]) -> None:
-        when = float(arrays["time"])
-        self._time = None if math.isnan(when) else when
-        self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
-        self._pace = float(arrays["pace"])
-        rng = getattr(self.filter, "rng", None)
-        if rng is not None and str(arrays["filter_rng"]):
-            rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))
-        self._bank = self._bank.restored(arrays, "bank.")
 
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"

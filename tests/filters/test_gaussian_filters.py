@@ -23,7 +23,8 @@ from assoc.filters import (
     UnscentedKalmanFilter,
     paper_rules,
 )
-from assoc.sensors.kernels import CODES, linearise, measure, wrap
+from assoc.sensors.codes import CODES
+from assoc.sensors.kernels.dispatch import linearise, measure, wrap
 from tests.filters.common import BEARING, MOTION, PLACE, RADAR, SENSORS, kalman_update, random_state
 
 

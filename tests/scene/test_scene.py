@@ -162,7 +162,7 @@ def test_bad_files_name_path_and_field(tmp_path):
         good = dict(file)
     changes = {
         "sensor_kind": (np.array(["sonar"] * 4), "'sonar' for sensor 0, expected one of radar3d"),
-        "sensor_dim": (np.array([3, 2, 1, 9]), "'sensor_dim' must hold 1, 2 or 3"),
+        "sensor_dim": (np.array([3, 2, 1, 9]), "'sensor_dim' must hold 1 to 4"),
         "sensor_name": (np.array(["x"]), "'sensor_name' has shape"),
         "sensor_position": (np.zeros((4, 2)), "'sensor_position' has shape"),
         "sensor_covariance": (-good["sensor_covariance"], "sensor 0: .* positive definite"),

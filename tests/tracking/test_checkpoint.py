@@ -11,8 +11,8 @@ from assoc._files.npz import save_npz
 from assoc.errors import AssocError, InvalidInputError
 from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
 from assoc.tracking import TRACKERS
-from assoc.tracking.defaults import two_speeds
-from assoc.tracking.tracker import FORMAT, VERSION
+from assoc.tracking.checkpoint import FORMAT, VERSION
+from assoc.tracking.filter_choice import two_speeds
 from tests.reliability.mutations import MARKER, spoil
 
 SCENE = simulation.simulate("three-radar", 4, scans=7)

@@ -87,9 +87,9 @@ def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
         final += own.step(time, [z]).final
         for rows in own._members:
             # every hypothesis agrees with the best on the scan before
-            column = {(int(own._bank.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
+            column = {(int(own._batch.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
             best = {
-                (int(own._bank.track_id[r]), int(own._history[r, 1])) for r in own._members[0] if own._history[r, 1]
+                (int(own._batch.track_id[r]), int(own._history[r, 1])) for r in own._members[0] if own._history[r, 1]
             }
             assert column == best
     assert [decision.scan for decision in final + list(own.flush())] == [0, 1, 2]

@@ -9,7 +9,7 @@ import pytest
 from assoc import simulation
 from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
 from assoc.tracking import tracker as module
-from assoc.tracking.defaults import two_speeds
+from assoc.tracking.filter_choice import two_speeds
 
 
 @pytest.fixture

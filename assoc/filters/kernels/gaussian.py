@@ -14,7 +14,7 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels import linearise, wrap
+from assoc.sensors.kernels.dispatch import linearise_state, wrap
 
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""
@@ -241,8 +241,7 @@ def update_one(
                 H[a, p] = matrix[a, p]
             v[a] = z[a] - total
     else:
-        height = m[columns[2]] if c > 2 else 0.0
-        linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
+        linearise_state(code, d, place, m, columns, h, H)
         for a in range(d):
             v[a] = z[a] - h[a]
         wrap(code, v)
@@ -285,7 +284,8 @@ def update(
     place : (3,)
         The sensor's.
     columns : (c,)
-        Components of the state that the model reads; for sensors those of x, y (and z).
+        Components of the state that the model reads; for sensors those of x, y (and z), with a range rate
+        their velocities after them.
     matrix : (d, c)
         Of a linear model.
     R : (B or 1, d, d)

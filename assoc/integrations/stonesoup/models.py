@@ -76,6 +76,8 @@ def measurement_model(sensor: Sensor, ndim_state: int = 6, mapping: Sequence[int
         return Cartesian2DToBearing(mapping=tuple(mapping[:2]), translation_offset=place[:2], **common)
     common.update(mapping=tuple(mapping), translation_offset=place, noise_covar=sensor.covariance[::-1, ::-1])
     if isinstance(sensor, Radar3D):
+        if sensor.measures_velocity:
+            raise InvalidInputError("Radar3D: range rate is not handed to Stone Soup; leave the fourth component out")
         return CartesianToElevationBearingRange(**common)
     if isinstance(sensor, Radar2D):
         return CartesianToSlantRangeBearing(**common)

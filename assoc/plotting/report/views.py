@@ -62,8 +62,8 @@ def source_view(source: Source, file: str) -> dict[str, Any]:
             {
                 "name": sensor.name or f"sensor {s + 1}",
                 "place": plain_numbers(sensor.position, 1),
-                "components": list(sensor.components[: sensor.dim]),
-                "angles": [name in ANGLES for name in sensor.components[: sensor.dim]],
+                "components": list(sensor.components[: sensor.position_part.dim]),
+                "angles": [name in ANGLES for name in sensor.components[: sensor.position_part.dim]],
                 "sigma": np.sqrt(np.diagonal(sensor.covariance)).tolist(),
                 "ray": isinstance(sensor, BearingSensor),
             }
@@ -132,7 +132,8 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
     spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
     measured, residuals = [], []
     for s, (at, label) in enumerate(measured_places(scene, one)):
-        sensor, z = scene.sensors[s], scan.measurements[s]
+        sensor = scene.sensors[s].position_part
+        z = scan.measurements[s][:, : sensor.dim]
         entry: dict[str, Any] = {"at": plain_numbers(at, decimals), "target": label.tolist()}
         if scan.sources is not None:
             entry["source"] = scan.sources[s].tolist()

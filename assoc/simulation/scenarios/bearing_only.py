@@ -10,7 +10,7 @@ from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.sensors.bearing import BearingSensor
-from assoc.simulation.memory import MOST, require_room
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
 from assoc.simulation.scenarios.crowd import horizontal_velocities
@@ -59,7 +59,7 @@ def places(parameters: BearingOnlyParameters) -> Array:
 def simulate(parameters: BearingOnlyParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
-    require_room(p.scans, p.sensors, p.targets, p.false_alarms, "scans sensors targets false_alarms")
+    require_scene_memory(p.scans, p.sensors, p.targets, p.false_alarms, "scans sensors targets false_alarms")
     region = np.array([[0.0, p.width], [0.0, p.width], [0.0, HEIGHT]])
     start = rng.uniform(region[:, 0], region[:, 1], size=(p.targets, 3))
     velocity = horizontal_velocities(p.targets, p.speed, rng)

@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
-from assoc.simulation.memory import MOST, require_room
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import MARGIN, on_circle, radar_over
 
@@ -52,21 +52,26 @@ class CrowdParameters(Parameters):
     false_alarms_per_target: float = field(
         default=0.1, metadata={"help": "mean false alarms per sensor and scan, for each target"}
     )
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", "sensors", most=MOST)
         self._number("interval", "width", "height", "noise", "false_alarms_per_target", above=0.0)
-        self._number("speed", least=0.0)
+        self._number("speed", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
         if self.sensor not in ("position", "radar"):
             raise InvalidInputError(f"sensor: expected 'position' or 'radar', got {self.sensor!r}")
+        if self.range_rate_noise > 0 and self.sensor != "radar":
+            raise InvalidInputError("range_rate_noise: only radars measure range rate, set sensor to 'radar'")
 
 
 def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
     rate = p.false_alarms_per_target * p.targets
-    require_room(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
+    require_scene_memory(p.scans, p.sensors, p.targets, rate, "scans sensors targets false_alarms_per_target")
     width = p.width * (np.sqrt(p.targets / REFERENCE_TARGETS) if p.constant_density else 1.0)
     box = np.array([[0.0, width], [0.0, width], [0.0, p.height]])
     start = rng.uniform(box[:, 0], box[:, 1], size=(p.targets, 3))
@@ -76,7 +81,9 @@ def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -
     # nobody leaves the region, however long the scene lasts
     region = box + p.speed * times[-1] * np.array([[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     ids = [np.arange(p.targets)] * p.scans
-    return observe(_sensors(p, region), times, ids, paths, rng, region=region, name=name)
+    return observe(
+        _sensors(p, region), times, ids, paths, rng, region=region, name=name, velocities=[velocity] * p.scans
+    )
 
 
 def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
@@ -94,6 +101,8 @@ def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
                 detection_probability=p.detection_probability,
                 false_alarm_rate=rate,
                 name=f"radar {number}",
+                range_rate_noise=p.range_rate_noise,
+                fastest=p.speed,
             )
             for number, place in enumerate(places, start=1)
         ]

@@ -17,7 +17,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
-from assoc.simulation.memory import require_room
+from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 
@@ -45,6 +45,9 @@ class DubinsParameters(Parameters):
     )
     detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
     false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("targets", "radars", most=10_000)
@@ -53,7 +56,7 @@ class DubinsParameters(Parameters):
             "interval", "speed", "turning_radius", "obstacle_radius", "width", "height", "noise", "false_alarms",
             above=0.0,
         )  # fmt: skip
-        self._number("margin", least=0.0)
+        self._number("margin", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
         if self.width < 4 * self.turning_radius:
             raise InvalidInputError(f"width: expected at least four turning radii, got {self.width!r}")
@@ -66,7 +69,7 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
     flights = [_flight(p, zones, rng) for _ in range(p.targets)]
     beats = max(path.length for path in flights) / p.speed / p.interval + 1
     names = "1/interval radars targets false_alarms"
-    require_room(beats, p.radars, p.targets, p.false_alarms, names)
+    require_scene_memory(beats, p.radars, p.targets, p.false_alarms, names)
     heights = rng.uniform(p.height / 3, p.height, p.targets)
     tracks = [path.sample(p.speed, p.interval)[1] for path in flights]
     scans = max(len(track) for track in tracks)
@@ -90,6 +93,8 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
             detection_probability=p.detection_probability,
             false_alarm_rate=p.false_alarms,
             name=f"radar {number}",
+            range_rate_noise=p.range_rate_noise,
+            fastest=p.speed,
         )
         for number, place in enumerate(on_circle(region.mean(axis=1), distance, p.radars), start=1)
     ]

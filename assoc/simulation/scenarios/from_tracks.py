@@ -18,8 +18,8 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.scene import Scene
 from assoc.simulation.geodesy import east_north_up
-from assoc.simulation.memory import MOST, require_room
-from assoc.simulation.observation import observe
+from assoc.simulation.memory import MOST, require_scene_memory
+from assoc.simulation.observation import observe, velocities_from
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 
@@ -75,13 +75,16 @@ class FromTracksParameters(Parameters):
     )
     detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
     false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("radars", most=MOST)
         if self.scans is not None:
             self._whole("scans", most=MAX_SCANS)
         self._number("interval", "max_gap", "noise", "false_alarms", above=0.0)
-        self._number("spread", least=0.0)
+        self._number("spread", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
 
 
@@ -104,8 +107,10 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     reports = east_north_up(recording.latitude, recording.longitude, recording.height, origin)
     times = _epochs(p, recording)
     targets = len(np.unique(recording.target))
-    require_room(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
+    require_scene_memory(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
     ids, positions = resample(recording, reports, times, p.max_gap)
+    velocities = velocities_from(times, ids, positions)
+    fastest = max(float(np.linalg.norm(one, axis=1).max(initial=0.0)) for one in velocities)
     region = around(reports, 0.01)
     diagonal = float(np.hypot(*(region[:2, 1] - region[:2, 0])))
     places = on_circle(np.zeros(3), p.spread * diagonal, p.radars)
@@ -120,10 +125,12 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
             detection_probability=p.detection_probability,
             false_alarm_rate=p.false_alarms,
             name=f"radar {number}",
+            range_rate_noise=p.range_rate_noise,
+            fastest=fastest,
         )
         for number, place in enumerate(places, start=1)
     ]
-    return observe(sensors, times, ids, positions, rng, region=region, name=name)
+    return observe(sensors, times, ids, positions, rng, region=region, name=name, velocities=velocities)
 
 
 def read(parameters: FromTracksParameters) -> Recording:

@@ -15,7 +15,7 @@ import numpy as np
 from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.scene.scene import Scene
-from assoc.simulation.memory import MOST, require_room
+from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
@@ -54,11 +54,14 @@ class ThreeRadarParameters(Parameters):
     margin: float = field(
         default=0.1, metadata={"help": "how far the region reaches past the trajectories, as a share of them"}
     )
+    range_rate_noise: float = field(
+        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
+    )
 
     def __post_init__(self) -> None:
         self._whole("scans", "radars", most=MOST)
         self._number("interval", "noise", "false_alarms", above=0.0)
-        self._number("radar_distance", "margin", least=0.0)
+        self._number("radar_distance", "margin", "range_rate_noise", least=0.0)
         self._probability("detection_probability")
 
 
@@ -69,9 +72,11 @@ REFERENCE_RANGE = 50_000.0
 def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: str) -> Scene:
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
-    require_room(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
+    require_scene_memory(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
     times = parameters.interval * np.arange(parameters.scans)
     paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
+    speeds = np.stack([trajectory.velocities(times) for trajectory in TRAJECTORIES], axis=1)
+    fastest = float(np.linalg.norm(speeds, axis=2).max())
     region = around(paths, parameters.margin)
     places = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
     sensors = [
@@ -83,11 +88,13 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
             detection_probability=parameters.detection_probability,
             false_alarm_rate=parameters.false_alarms,
             name=f"radar {number}",
+            range_rate_noise=parameters.range_rate_noise,
+            fastest=fastest,
         )
         for number, place in enumerate(places, start=1)
     ]
     ids = [np.arange(len(TRAJECTORIES))] * parameters.scans
-    return observe(sensors, times, ids, list(paths), rng, region=region, name=name)
+    return observe(sensors, times, ids, list(paths), rng, region=region, name=name, velocities=list(speeds))
 
 
 def around(positions: Array, margin: float) -> Array:

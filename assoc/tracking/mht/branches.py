@@ -12,12 +12,12 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
-from assoc.tracking.mht.pruning import _keep_best
+from assoc.tracking.mht.pruning import keep_best
 from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
 
 class Tables(NamedTuple):
-    """Branches without their states; see `Bank` and `TrackOrientedMHT`."""
+    """Branches without their states; see `TrackBatch` and `TrackOrientedMHT`."""
 
     numbers: Array
     counts: Array
@@ -84,7 +84,7 @@ def _extend(
         tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
     for i in range(ids.size):
         tree[old + hits + i], score[old + hits + i] = ids[i], first
-    kept = _keep_best(tree, score, most, drop)
+    kept = keep_best(tree, score, most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):

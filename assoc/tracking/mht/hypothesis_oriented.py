@@ -30,11 +30,11 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
-from assoc.tracking.checkpoint import check_window, demand
-from assoc.tracking.defaults import MOST_SCANS
-from assoc.tracking.gated_pairs import look
+from assoc.tracking.checkpoint import PREFIX, check_window, require_field
+from assoc.tracking.gated_pairs import gated_pairs
+from assoc.tracking.mht.pruning import MOST_SCANS
 from assoc.tracking.track import Decision, Step, decision
-from assoc.tracking.track_batch import Bank
+from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
@@ -72,7 +72,7 @@ class HypothesisOrientedMHT(Tracker):
         self.max_hypotheses, self.depth = int(max_hypotheses), int(depth)
         self.hypothesis_drop = float(hypothesis_drop)
         self._members: list[Array] = [np.zeros(0, dtype=np.int64)]
-        """Rows of the bank that each hypothesis believes in, the best hypothesis first."""
+        """Rows of the batch that each hypothesis believes in, the best hypothesis first."""
         self._weight = np.zeros(1)
         """Log-probability of each hypothesis, up to a constant."""
         self._line = np.zeros((1, self.depth), dtype=np.int64)
@@ -80,9 +80,9 @@ class HypothesisOrientedMHT(Tracker):
         self._history = np.zeros((0, self.depth * len(self.sensors)), dtype=np.int32)
         self._window: list[tuple[float, Array]] = []
 
-    def _current(self) -> Bank:
+    def _current(self) -> TrackBatch:
         rows = self._members[0]
-        return self._bank[rows[np.argsort(self._bank.track_id[rows], kind="stable")]]
+        return self._batch[rows[np.argsort(self._batch.track_id[rows], kind="stable")]]
 
     @property
     def probabilities(self) -> Array:
@@ -90,10 +90,10 @@ class HypothesisOrientedMHT(Tracker):
         p = np.exp(self._weight - self._weight.max())
         return np.asarray(p / p.sum())
 
-    def _adopt(self, bank: Bank) -> None:
-        super()._adopt(bank)
-        self._history = np.zeros((len(bank), self._history.shape[1]), dtype=np.int32)
-        self._members = [np.arange(len(bank))]
+    def _adopt(self, batch: TrackBatch) -> None:
+        super()._adopt(batch)
+        self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
+        self._members = [np.arange(len(batch))]
 
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
@@ -108,38 +108,38 @@ class HypothesisOrientedMHT(Tracker):
             parent = parent[self._generate(s, z, time, before, None if times is None else times[s])]
             before = time
         self._line = np.column_stack([parent, self._line[parent][:, : self.depth - 1]])
-        self._bank = self._bank.counted(np.asarray((self._history[:, :count] > 0).any(axis=1)))
+        self._batch = self._batch.counted(np.asarray((self._history[:, :count] > 0).any(axis=1)))
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
         self._confirm()
-        now = self._opinion(0)
+        now = self._decision(0)
         final: tuple[Decision, ...] = ()
         if len(self._window) == self.depth:
             # hypotheses that disagree with the best about the oldest scan end here
             ancestor = self._line[:, self.depth - 2]
             self._keep(np.flatnonzero(ancestor == ancestor[0]) if self.depth > 1 else np.arange(1))
-            final = (self._opinion(self.depth - 1),)
+            final = (self._decision(self.depth - 1),)
             self._window.pop()
-        ended = self._end(time)
+        ended = self._delete_tracks(time)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
     def _generate(self, s: int, z: Array, time: float, before: float, stamps: Array | None) -> Array:
         """Children of all hypotheses by one sensor's measurements; returns the parent of each that is kept."""
-        bank, history = self._bank, self._history
+        batch, history = self._batch, self._history
         sensor = self.sensors[s]
-        frame = look(self.filter, bank.states, before, time, z, stamps, sensor, self.gate_probability)
-        pairs = frame.pairs
+        gated = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
+        pairs = gated.pairs
         gain = pairs.log_likelihood + self.terms.detection[s]
         roots, root_history, numbers = self._roots(s, z, time, stamps)
-        missed = bank.scored(frame.predicted, self.terms.miss[s])
-        hit = bank[pairs.track].scored(pairs.states, gain, frame.when)
+        missed = batch.scored(gated.predicted, self.terms.miss[s])
+        hit = batch[pairs.track].scored(pairs.states, gain, gated.when)
         hit_history = history[pairs.track]
         hit_history[:, s] = pairs.measurement + 1
-        # rows of the next bank: missed branches, detected branches, new targets
-        self._bank = Bank.concatenate([missed, hit, roots])
+        # rows of the next batch: missed branches, detected branches, new targets
+        self._batch = TrackBatch.concatenate([missed, hit, roots])
         self._history = np.concatenate([history, hit_history, root_history])
-        offsets = (len(bank), len(bank) + len(pairs.track))
+        offsets = (len(batch), len(batch) + len(pairs.track))
         # no branch gains more than this
-        most = np.full(len(bank), self.terms.miss[s])
+        most = np.full(len(batch), self.terms.miss[s])
         np.maximum.at(most, pairs.track, gain)
         births = len(z) * max(self._birth[s], 0.0)
         children: list[tuple[float, int, int, Array]] = []
@@ -173,7 +173,7 @@ class HypothesisOrientedMHT(Tracker):
     def _ranked(
         self, h: int, s: int, pairs: TrackPairs, gain: Array, numbers: Array, count: int, offsets: tuple[int, int]
     ) -> list[tuple[float, Array]]:
-        """The m best children of a hypothesis: log-probabilities and rows of the next bank."""
+        """The m best children of a hypothesis: log-probabilities and rows of the next batch."""
         own = self._members[h]
         place = np.full(offsets[0], -1, dtype=np.int64)
         place[own] = np.arange(len(own))
@@ -193,7 +193,7 @@ class HypothesisOrientedMHT(Tracker):
             found.append((float(self._weight[h]) - solution.cost, np.sort(meaning[used])))
         return found
 
-    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Bank, Array, Array]:
+    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array, Array]:
         numbers = np.arange(len(z))
         states, fit, positions = self._singles(s, z)
         numbers = numbers[fit]
@@ -203,7 +203,7 @@ class HypothesisOrientedMHT(Tracker):
         score = np.full(len(numbers), self._birth[s])
         history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
         history[:, s] = numbers + 1
-        return Bank.new(predict_each(self.filter, states, time - when), ids, score, when), history, numbers
+        return TrackBatch.new(predict_each(self.filter, states, time - when), ids, score, when), history, numbers
 
     def _keep(self, hypotheses: Array, weights: Array | None = None) -> None:
         self._members = [self._members[h] for h in hypotheses]
@@ -215,9 +215,9 @@ class HypothesisOrientedMHT(Tracker):
     def _forget(self) -> None:
         """Drop the branches that no hypothesis believes in."""
         used = np.unique(np.concatenate(self._members)) if self._members else np.zeros(0, dtype=np.int64)
-        place = np.zeros(len(self._bank), dtype=np.int64)
+        place = np.zeros(len(self._batch), dtype=np.int64)
         place[used] = np.arange(len(used))
-        self._bank, self._history = self._bank[used], self._history[used]
+        self._batch, self._history = self._batch[used], self._history[used]
         self._members = [place[rows] for rows in self._members]
 
     def _merge(self) -> None:
@@ -233,36 +233,36 @@ class HypothesisOrientedMHT(Tracker):
         self._keep(np.array([firsts[i] for i in order], dtype=np.int64), np.array([weights[i] for i in order]))
 
     def _confirm(self) -> None:
-        bank, rows = self._bank, self._members[0]
-        good = bank.track_id[rows[bank.confirm(self.life_cycle).confirmed[rows]]]
-        self._bank = bank.sure(bank.confirmed | np.isin(bank.track_id, good))
+        batch, rows = self._batch, self._members[0]
+        good = batch.track_id[rows[batch.confirm(self.life_cycle).confirmed[rows]]]
+        self._batch = batch.with_confirmed(batch.confirmed | np.isin(batch.track_id, good))
 
-    def _opinion(self, age: int) -> Decision:
+    def _decision(self, age: int) -> Decision:
         count = len(self.sensors)
         time, sizes = self._window[age]
         rows = self._members[0]
         assigned = []
         for s in range(count):
             ids = np.zeros(int(sizes[s]) + 1, dtype=np.int64)
-            ids[self._history[rows, age * count + s]] = self._bank.track_id[rows]
+            ids[self._history[rows, age * count + s]] = self._batch.track_id[rows]
             assigned.append(ids[1:])
-        bank = self._bank[rows]
-        return decision(self._scan - age, time, assigned, bank.track_id[bank.confirmed])
+        batch = self._batch[rows]
+        return decision(self._scan - age, time, assigned, batch.track_id[batch.confirmed])
 
-    def _end(self, time: float) -> Array:
-        before = np.unique(self._bank.track_id[self._bank.confirmed])
-        gone = self._doomed(self._bank, time)
+    def _delete_tracks(self, time: float) -> Array:
+        before = np.unique(self._batch.track_id[self._batch.confirmed])
+        gone = self._to_delete(self._batch, time)
         if gone.any():
             self._members = [rows[~gone[rows]] for rows in self._members]
             self._forget()
             self._merge()
-        return np.setdiff1d(before, self._bank.track_id)
+        return np.setdiff1d(before, self._batch.track_id)
 
     def flush(self) -> tuple[Decision, ...]:
         """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
         self._scan -= 1
         try:
-            return tuple(self._opinion(age) for age in reversed(range(len(self._window))))
+            return tuple(self._decision(age) for age in reversed(range(len(self._window))))
         finally:
             self._scan += 1
 
@@ -281,16 +281,17 @@ class HypothesisOrientedMHT(Tracker):
 
     def _check(self, arrays: dict[str, Array]) -> None:
         super()._check(arrays)
-        count = len(arrays["bank.track_id"])
+        count = len(arrays[f"{PREFIX}track_id"])
         check_window(arrays, count, len(self.sensors), self.depth)
         members, lengths, weight, line = (arrays[name] for name in ("members", "lengths", "weight", "line"))
-        demand(1 <= len(lengths) <= self.max_hypotheses, "lengths", f"1 to {self.max_hypotheses} hypotheses")
-        demand((lengths >= 0).all() and (lengths <= count).all(), "lengths", "numbers of branches")
-        demand(int(lengths.sum()) == len(members), "members", "as many branches as the lengths say")
-        demand(((members >= 0) & (members < count)).all(), "members", "numbers of branches")
-        demand(weight.shape == lengths.shape and np.isfinite(weight).all(), "weight", "a number for each hypothesis")
-        demand(line.shape == (len(lengths), self.depth), "line", f"the shape {(len(lengths), self.depth)}")
-        demand((line >= 0).all(), "line", "numbers of hypotheses")
+        require_field(1 <= len(lengths) <= self.max_hypotheses, "lengths", f"1 to {self.max_hypotheses} hypotheses")
+        require_field((lengths >= 0).all() and (lengths <= count).all(), "lengths", "numbers of branches")
+        require_field(int(lengths.sum()) == len(members), "members", "as many branches as the lengths say")
+        require_field(((members >= 0) & (members < count)).all(), "members", "numbers of branches")
+        weighed = weight.shape == lengths.shape and np.isfinite(weight).all()
+        require_field(weighed, "weight", "a number for each hypothesis")
+        require_field(line.shape == (len(lengths), self.depth), "line", f"the shape {(len(lengths), self.depth)}")
+        require_field((line >= 0).all(), "line", "numbers of hypotheses")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)

@@ -9,7 +9,11 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 
+MOST_SCANS = 1000
+"""The most scans that a decision may be put off: every branch carries its history with it."""
 
+
+@njit
 def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
     """Rows of the best branches of each tree, ordered by tree, then score.
 
@@ -21,11 +25,6 @@ def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
     drop : float
         Branches further than this below their tree's best are cut.
     """
-    return np.asarray(_keep_best(tree, score, most, drop))
-
-
-@njit
-def _keep_best(tree: Any, score: Any, most: int, drop: float) -> Any:
     order = np.argsort(tree, kind="mergesort")
     kept = np.empty(order.size, np.int64)
     count, begin = 0, 0

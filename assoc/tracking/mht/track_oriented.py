@@ -24,14 +24,13 @@ from assoc.costs.tracks.tuples import require_states
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
-from assoc.tracking.checkpoint import check_window, demand
-from assoc.tracking.defaults import MOST_SCANS
-from assoc.tracking.gated_pairs import look
+from assoc.tracking.checkpoint import PREFIX, check_window, require_field
+from assoc.tracking.gated_pairs import gated_pairs
 from assoc.tracking.mht.best_hypothesis import choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
-from assoc.tracking.mht.pruning import decide, same_tree
+from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import Bank
+from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
@@ -76,14 +75,14 @@ class TrackOrientedMHT(Tracker):
         self._window: list[tuple[float, Array]] = []
         """Times and sizes of the scans that are not yet final, the last one first."""
 
-    def _current(self) -> Bank:
+    def _current(self) -> TrackBatch:
         rows = np.flatnonzero(self._chosen)
-        return self._bank[rows[np.argsort(self._bank.track_id[rows], kind="stable")]]
+        return self._batch[rows[np.argsort(self._batch.track_id[rows], kind="stable")]]
 
-    def _adopt(self, bank: Bank) -> None:
-        super()._adopt(bank)
-        self._history = np.zeros((len(bank), self._history.shape[1]), dtype=np.int32)
-        self._born, self._chosen = np.full(len(bank), -1), np.ones(len(bank), dtype=np.bool_)
+    def _adopt(self, batch: TrackBatch) -> None:
+        super()._adopt(batch)
+        self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
+        self._born, self._chosen = np.full(len(batch), -1), np.ones(len(batch), dtype=np.bool_)
 
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
@@ -92,30 +91,30 @@ class TrackOrientedMHT(Tracker):
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
         self._chosen = self._best_hypothesis()
         self._confirm()
-        now = self._opinion(0, self._chosen)
+        now = self._decision(0, self._chosen)
         final, kept = self._prune() if len(self._window) == self.depth else ((), None)
-        ended = self._end(time, kept)
+        ended = self._delete_tracks(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
     def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
         """Grow every branch by the measurements in its gate and by misses, and start trees."""
         count = len(self.sensors)
-        bank, before = self._bank, time if self._time is None else self._time
+        batch, before = self._batch, time if self._time is None else self._time
         history = np.zeros_like(self._history)
         history[:, count:] = self._history[:, : history.shape[1] - count]
-        states, tables = bank.states, Tables(bank.numbers, bank.counts, history, self._born)
+        states, tables = batch.states, Tables(batch.numbers, batch.counts, history, self._born)
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
             stamps = None if times is None else times[s]
-            frame = look(self.filter, states, before, time, z, stamps, sensor, self.gate_probability)
-            pairs = frame.pairs
+            gated = gated_pairs(self.filter, states, before, time, z, stamps, sensor, self.gate_probability)
+            pairs = gated.pairs
             gain = pairs.log_likelihood + self.terms.detection[s]
             begun, roots = self._roots(s, z, time, stamps)
             kept, tables = extend(
-                tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, frame.when), roots,
+                tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, gated.when), roots,
                 s, self._scan, self.max_branches, self.branch_drop,
             )  # fmt: skip
             require_states(states, len(kept))
-            states = concatenate([frame.predicted, pairs.states, begun])[kept]
+            states = concatenate([gated.predicted, pairs.states, begun])[kept]
             before = time
             if len(kept) > self.max_tuples:
                 raise LimitExceededError(
@@ -123,7 +122,7 @@ class TrackOrientedMHT(Tracker):
                     "lower gate_probability, depth or max_branches, or raise max_tuples"
                 )
         count_scan(tables.counts, tables.history, count)
-        self._bank = Bank(states, tables.numbers, tables.counts)
+        self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born = tables.history, tables.born
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Any, Roots]:
@@ -144,12 +143,12 @@ class TrackOrientedMHT(Tracker):
 
     def _best_hypothesis(self) -> Array:
         """Branches of the best global hypothesis, as a mask."""
-        score, track_id = self._bank.score.copy(), self._bank.track_id.copy()
+        score, track_id = self._batch.score.copy(), self._batch.track_id.copy()
         if self.solver == "exact" and not self.solver_parameters:
             easy = choose(track_id, score, self._history)
             if easy is not None:
                 return easy
-        chosen = np.zeros(len(self._bank), dtype=np.bool_)
+        chosen = np.zeros(len(self._batch), dtype=np.bool_)
         # a branch of no positive score is better left to false alarms
         rows = np.flatnonzero(score > 0)
         if not len(rows):
@@ -174,20 +173,20 @@ class TrackOrientedMHT(Tracker):
         return chosen
 
     def _confirm(self) -> None:
-        bank = self._bank
-        before = bank.confirmed
+        batch = self._batch
+        before = batch.confirmed
         new = self._chosen & ~before
-        new &= self.life_cycle.confirms(bank.score, bank.detections)
+        new &= self.life_cycle.confirms(batch.score, batch.detections)
         if new.any():
-            self._bank = bank.sure(before | same_tree(bank.track_id.copy(), new))
+            self._batch = batch.with_confirmed(before | same_tree(batch.track_id.copy(), new))
 
-    def _opinion(self, age: int, rows: Array) -> Decision:
+    def _decision(self, age: int, rows: Array) -> Decision:
         """Which tracks the measurements of the scan `age` scans ago went to, by these branches."""
         count = len(self.sensors)
         time, sizes = self._window[age]
         if rows.dtype == np.bool_:
             rows = np.flatnonzero(rows)
-        ids, sure = self._bank.track_id[rows], self._bank.confirmed[rows]
+        ids, sure = self._batch.track_id[rows], self._batch.confirmed[rows]
         history = self._history[rows]
         assigned, confirmed = [], []
         for s in range(count):
@@ -203,27 +202,27 @@ class TrackOrientedMHT(Tracker):
         count = len(self.sensors)
         oldest = np.ascontiguousarray(self._history[:, -count:])
         kept, speakers = decide(
-            self._bank.track_id.copy(),
-            self._bank.score.copy(),
+            self._batch.track_id.copy(),
+            self._batch.score.copy(),
             self._chosen,
             self._born <= self._scan - self.depth + 1,
             oldest,
             self._window[-1][1],
         )
-        final = self._opinion(self.depth - 1, speakers)
+        final = self._decision(self.depth - 1, speakers)
         self._window.pop()
         return (final,), kept
 
-    def _end(self, time: float, kept: Array | None) -> Array:
+    def _delete_tracks(self, time: float, kept: Array | None) -> Array:
         """Cut all branches but these and delete tracks; the ids of confirmed ones that are gone."""
-        stay = ~self._doomed(self._bank, time)
+        stay = ~self._to_delete(self._batch, time)
         if kept is not None:
             stay &= kept
         if stay.all():
             return np.zeros(0, dtype=np.int64)
-        ids = self._bank.track_id.copy()
-        lost = ids[self._bank.confirmed & ~same_tree(ids, stay)]
-        self._bank, self._history = self._bank[stay], self._history[stay]
+        ids = self._batch.track_id.copy()
+        lost = ids[self._batch.confirmed & ~same_tree(ids, stay)]
+        self._batch, self._history = self._batch[stay], self._history[stay]
         self._born, self._chosen = self._born[stay], self._chosen[stay]
         return np.unique(lost) if len(lost) else lost
 
@@ -231,7 +230,7 @@ class TrackOrientedMHT(Tracker):
         """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
         self._scan -= 1
         try:
-            return tuple(self._opinion(age, self._chosen) for age in reversed(range(len(self._window))))
+            return tuple(self._decision(age, self._chosen) for age in reversed(range(len(self._window))))
         finally:
             self._scan += 1
 
@@ -248,12 +247,12 @@ class TrackOrientedMHT(Tracker):
 
     def _check(self, arrays: dict[str, Array]) -> None:
         super()._check(arrays)
-        ids = arrays["bank.track_id"]
+        ids = arrays[f"{PREFIX}track_id"]
         check_window(arrays, len(ids), len(self.sensors), self.depth)
-        demand((np.diff(ids) >= 0).all(), "bank.track_id", "the branches of one tree side by side")
+        require_field((np.diff(ids) >= 0).all(), f"{PREFIX}track_id", "the branches of one tree side by side")
         born = arrays["born"]
-        demand(born.shape == ids.shape and (born <= int(arrays["scan"])).all(), "born", "a scan for each branch")
-        demand(arrays["chosen"].shape == ids.shape, "chosen", "a mark for each branch")
+        require_field(born.shape == ids.shape and (born <= int(arrays["scan"])).all(), "born", "a scan for each branch")
+        require_field(arrays["chosen"].shape == ids.shape, "chosen", "a mark for each branch")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)

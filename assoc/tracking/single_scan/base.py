@@ -8,15 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.scores import log_birth
+from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
-from assoc.tracking.track_batch import Bank
+from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
-class Outcome(NamedTuple):
+class ScanOutcome(NamedTuple):
     """How a scan was associated with T tracks."""
 
     states: Any
@@ -35,23 +37,30 @@ class SingleScanTracker(Tracker):
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         self._instant(times)
         scan = self._scan_of(time, measurements)
-        bank = self._predicted(self._bank, self._elapsed(time))
-        outcome = self._associate(scan, bank.states, bank.score)
+        batch = self._predicted(self._batch, self._elapsed(time))
+        outcome = self._associate(scan, batch.states, batch.score)
         seen = outcome.rows.any(axis=1)
-        bank = bank.scored(outcome.states, outcome.gain, np.where(seen, time, np.nan))
+        batch = batch.scored(outcome.states, outcome.gain, np.where(seen, time, np.nan))
         new, rows = self._begin(scan, outcome.born)
-        bank = Bank.concatenate([bank, new]).counted(np.concatenate([seen, np.ones(len(new), dtype=np.bool_)]))
+        batch = TrackBatch.concatenate([batch, new]).counted(np.concatenate([seen, np.ones(len(new), dtype=np.bool_)]))
         rows = np.concatenate([outcome.rows, rows])
-        bank = bank.confirm(self.life_cycle)
-        now = self._said(scan, bank, rows)
-        gone = self._doomed(bank, time)
-        self._bank = bank[~gone]
-        ended = np.sort(bank.track_id[gone & bank.confirmed])
+        batch = batch.confirm(self.life_cycle)
+        now = self._decision(scan, batch, rows)
+        gone = self._to_delete(batch, time)
+        self._batch = batch[~gone]
+        ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
     @abstractmethod
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         """Associate a scan with predicted tracks of these scores."""
+
+    def _problem(self, scan: Scan) -> AssignmentProblem:
+        """Which measurements of a scan may be a target, whether there is a track of it or not."""
+        return build_problem(
+            self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples,
+            speed=self.initiation.speed,
+        )  # fmt: skip
 
     @property
     def _volume(self) -> float:
@@ -59,11 +68,11 @@ class SingleScanTracker(Tracker):
         region = self._place.region
         return float(np.prod(region[:, 1] - region[:, 0]))
 
-    def _begin(self, scan: Scan, tuples: Array) -> tuple[Bank, Array]:
+    def _begin(self, scan: Scan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
         tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
         if not len(tuples):
-            return self._bank[:0], tuples
+            return self._batch[:0], tuples
         positions, covariances, fit = self._fused(scan, tuples)
         order = np.flatnonzero(fit)
         order = order[np.lexsort(positions[order].T)]
@@ -71,10 +80,9 @@ class SingleScanTracker(Tracker):
         states = self.initiation.start(self.filter, positions, covariances)
         seen = rows > 0
         several = log_birth(covariances, self._volume, self.initiation.birth_rate)
-        score = np.where(
-            seen.sum(axis=1) == 1, self._single_scores(rows), several - tuple_costs(self._place, scan, rows)
-        )
-        return Bank.new(states, self._new_ids(len(order)), score, scan.time), rows
+        costs = tuple_costs(self._place, scan, rows, speed=self.initiation.speed)
+        score = np.where(seen.sum(axis=1) == 1, self._single_scores(rows), several - costs)
+        return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
 
     def _single_scores(self, rows: Array) -> Array:
         """Scores of new tracks of single measurements, (K, S), that all other sensors missed."""
@@ -82,10 +90,10 @@ class SingleScanTracker(Tracker):
         scores: Array = seen @ self.terms.birth + ~seen @ self.terms.miss
         return scores
 
-    def _said(self, scan: Scan, bank: Bank, rows: Array) -> Decision:
+    def _decision(self, scan: Scan, batch: TrackBatch, rows: Array) -> Decision:
         assigned = []
         for s, size in enumerate(scan.sizes.tolist()):
             ids = np.zeros(size + 1, dtype=np.int64)
-            ids[rows[:, s]] = bank.track_id
+            ids[rows[:, s]] = batch.track_id
             assigned.append(ids[1:])
-        return decision(scan.index, scan.time, assigned, bank.track_id[bank.confirmed])
+        return decision(scan.index, scan.time, assigned, batch.track_id[batch.confirmed])

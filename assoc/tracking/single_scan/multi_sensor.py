@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.build import build_problem
 from assoc.costs.tracks.scores import doubted_gain, log_birth
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
+from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
 class MultiSensorTracker(SingleScanTracker):
@@ -36,7 +35,7 @@ class MultiSensorTracker(SingleScanTracker):
 
     name = "multi-sensor"
 
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         measurements = list(scan.measurements)
         tuples = grow_track_tuples(
             self.filter, states, measurements, self.sensors, self.terms,
@@ -52,11 +51,11 @@ class MultiSensorTracker(SingleScanTracker):
         solution = self._assign(problem)
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
-        return Outcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
+        return ScanOutcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""
-        problem = build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
+        problem = self._problem(scan)
         rows, costs = problem.tuples, np.array(problem.costs)
         several = np.count_nonzero(rows, axis=1) > 1
         # where false alarms are rarer than new targets a single measurement is one, too

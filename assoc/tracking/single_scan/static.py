@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.build import build_problem
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
 from assoc.costs.tracks.scores import doubted_gain
@@ -15,7 +14,7 @@ from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.single_scan.base import Outcome, SingleScanTracker
+from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
 class StaticFusionTracker(SingleScanTracker):
@@ -33,10 +32,8 @@ class StaticFusionTracker(SingleScanTracker):
 
     name = "static"
 
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> Outcome:
-        fused = self._assign(
-            build_problem(self._place, scan, gate_probability=self.gate_probability, max_tuples=self.max_tuples)
-        ).tuples
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
+        fused = self._assign(self._problem(scan)).tuples
         track, which, costs, corrected = self._pairs(scan, states, fused)
         count, alone = len(states), -float(self.terms.miss.sum())
         # every track may be missed: (track, 0), with the state as predicted
@@ -53,7 +50,7 @@ class StaticFusionTracker(SingleScanTracker):
         free = np.ones(len(fused) + 1, dtype=np.bool_)
         free[chosen] = False
         after = concatenate([corrected, states])[kept]
-        return Outcome(after, gain[kept], rows, fused[free[1:]])
+        return ScanOutcome(after, gain[kept], rows, fused[free[1:]])
 
     def _pairs(self, scan: Scan, states: Any, fused: Array) -> tuple[Array, Array, Array, Any]:
         """Tracks and tuples within the gates: rows of both, costs, and the corrected states."""

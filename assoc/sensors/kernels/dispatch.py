@@ -1,0 +1,159 @@
+"""Compiled measurement models of all kinds of sensors: one place, one state or one measurement at a time.
+
+They follow `measure`, `jacobian` and `residual` of the sensors line by line; a test holds them together for
+every kind in the registry. A new kind is a file beside this one and a branch in each of these functions.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assoc._system.compiled import njit
+from assoc._types import Array
+from assoc.sensors.codes import BEARING, POSITION, RADAR2D, RADAR3D
+from assoc.sensors.kernels.bearing import add_bearing, linearise_bearing, measure_bearing
+from assoc.sensors.kernels.position import add_position, convert_position, linearise_position, measure_position
+from assoc.sensors.kernels.radar import (
+    add_radar2d,
+    add_radar3d,
+    convert_radar2d,
+    convert_radar3d,
+    linearise_radar3d,
+    linearise_range_azimuth,
+    linearise_range_rate,
+    measure_range_azimuth,
+)
+from assoc.sensors.kernels.records import TURN, Information, Six, Three
+from assoc.sensors.radar import NEAREST
+
+
+@njit
+def linearise(code: int, dim: int, place: Array, x: float, y: float, z: float, h: Array, H: Array) -> None:
+    """Write the noise-free measurement of a position into h (d,) and its derivatives into H (d, 3)."""
+    H[:dim, :3] = 0.0
+    if code == POSITION:
+        linearise_position(dim, x, y, z, h, H)
+        return
+    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    if code == BEARING:
+        linearise_bearing(dx, dy, h, H)
+    elif code == RADAR3D:
+        linearise_radar3d(dx, dy, dz, h, H)
+    else:
+        linearise_range_azimuth(dx, dy, dz, h, H)
+
+
+@njit
+def measure(code: int, dim: int, place: Array, x: float, y: float, z: float, h: Array) -> None:
+    """Write the noise-free measurement of a position into h (d,)."""
+    if code == POSITION:
+        measure_position(dim, x, y, z, h)
+        return
+    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    if code == BEARING:
+        measure_bearing(dx, dy, h)
+        return
+    flat = measure_range_azimuth(dx, dy, dz, h)
+    if code == RADAR3D:
+        h[2] = math.atan2(dz, flat)
+
+
+@njit
+def measure_state(code: int, dim: int, place: Array, state: Array, columns: Array, h: Array) -> None:
+    """Write the noise-free measurement of a state into h (d,).
+
+    `columns` says where x, y (and z) stand in the state and, for a range rate, after them their velocities.
+    """
+    if code == RADAR3D and dim == 4:
+        deep = len(columns) > 4
+        axes = 3 if deep else 2
+        dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
+        dz = (state[columns[2]] if deep else 0.0) - place[2]
+        flat = measure_range_azimuth(dx, dy, dz, h)
+        h[2] = math.atan2(dz, flat)
+        along = dx * state[columns[axes]] + dy * state[columns[axes + 1]]
+        if deep:
+            along += dz * state[columns[5]]
+        h[3] = along / max(h[0], NEAREST)
+        return
+    height = state[columns[2]] if len(columns) > 2 else 0.0
+    measure(code, dim, place, state[columns[0]], state[columns[1]], height, h)
+
+
+@njit
+def linearise_state(code: int, dim: int, place: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
+    """Write the noise-free measurement of a state into h (d,), and its derivatives by the columns into H (d, c or 3).
+
+    `columns` is as for `measure_state`.
+    """
+    c = len(columns)
+    if code == RADAR3D and dim == 4:
+        axes = c // 2
+        dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
+        dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
+        H[:dim, :] = 0.0
+        linearise_radar3d(dx, dy, dz, h, H)
+        if axes == 2:
+            # the third column is a velocity's
+            H[:3, 2] = 0.0
+        vz = state[columns[5]] if axes == 3 else 0.0
+        h[3] = linearise_range_rate(dx, dy, dz, (state[columns[axes]], state[columns[axes + 1]], vz), H, axes)
+        return
+    height = state[columns[2]] if c > 2 else 0.0
+    linearise(code, dim, place, state[columns[0]], state[columns[1]], height, h, H)
+
+
+@njit
+def wrap(code: int, v: Array) -> None:
+    """Bring the azimuth of a residual (d,) into (-pi, pi]."""
+    if code == BEARING:
+        v[0] -= TURN * math.ceil(v[0] / TURN - 0.5)
+    elif code == RADAR3D or code == RADAR2D:
+        v[1] -= TURN * math.ceil(v[1] / TURN - 0.5)
+
+
+@njit
+def add_information(
+    code: int, dim: int, W: Six, place: Three, measured: Three, at: Three, sums: Information
+) -> Information:
+    """Add one measurement's chi-square, gradient and information at a position to those of others.
+
+    Parameters
+    ----------
+    code, dim : int
+    W
+        Inverse of the measurement covariance, padded with zeros.
+    place, measured, at
+        The sensor's place, the measurement, and the position it is held against.
+    sums
+        Of the measurements before.
+    """
+    if code == POSITION:
+        return add_position(dim, W, measured, at, sums)
+    if code == BEARING:
+        return add_bearing(W, place, measured, at, sums)
+    if code == RADAR2D:
+        return add_radar2d(W, place, measured, at, sums)
+    return add_radar3d(W, place, measured, at, sums)
+
+
+@njit
+def convert_one(
+    code: int, dim: int, z: Array, place: Array, R: Array, heights: Three, reach: float, least: float,
+    centre: Array, c: Array,
+) -> None:  # fmt: skip
+    """Write the position a measurement points at, and its covariance (xx, xy, xz, yy, yz, zz), widened.
+
+    Parameters
+    ----------
+    heights
+        Lowest, middle and highest that are sought where the measurement leaves the height open.
+    reach, least
+        The covariance's ellipsoid of chi-square value `least` holds all positions within `reach`.
+    """
+    if code == POSITION:
+        convert_position(dim, z, R, heights[1], centre, c)
+    elif code == RADAR3D:
+        convert_radar3d(z, place, R, reach, least, centre, c)
+    else:
+        convert_radar2d(z, place, R, heights, reach, least, centre, c)

@@ -1,0 +1,193 @@
+"""The compiled models of radars; see `assoc.sensors.radar`."""
+
+from __future__ import annotations
+
+import math
+
+from assoc._system.compiled import njit
+from assoc._types import Array
+from assoc.sensors.kernels.records import TURN, Information, Six, Three
+from assoc.sensors.radar import NEAREST
+
+START_REACH = 10.0
+"""Squared Mahalanobis distance that a converted measurement covers where a search for a position starts."""
+
+
+@njit
+def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
+    """Write range and azimuth of a place, relative to the radar, into h; return the ground range."""
+    flat = math.hypot(dx, dy)
+    h[0], h[1] = math.hypot(flat, dz), math.atan2(dy, dx)
+    return flat
+
+
+@njit
+def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array) -> tuple[float, float]:
+    """Write range, azimuth and their derivatives; return ground range and slant range, kept above zero."""
+    ground = max(measure_range_azimuth(dx, dy, dz, h), NEAREST)
+    slant = math.hypot(ground, dz)
+    H[0, 0], H[0, 1], H[0, 2] = dx / slant, dy / slant, dz / slant
+    H[1, 0], H[1, 1] = -dy / (ground * ground), dx / (ground * ground)
+    return ground, slant
+
+
+@njit
+def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> None:
+    """Write range, azimuth and elevation into h and their derivatives into H, which holds zeros."""
+    ground, slant = linearise_range_azimuth(dx, dy, dz, h, H)
+    h[2] = math.atan2(dz, math.hypot(dx, dy))
+    H[2, 0] = -dx * dz / (ground * slant * slant)
+    H[2, 1] = -dy * dz / (ground * slant * slant)
+    H[2, 2] = ground / (slant * slant)
+
+
+@njit
+def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Array, columns: int) -> float:
+    """Write the range rate's derivatives by position and, from `columns` on, by velocity into H[3]; return it."""
+    slant = math.hypot(max(math.hypot(dx, dy), NEAREST), dz)
+    u = (dx / slant, dy / slant, dz / slant)
+    rate = u[0] * velocity[0] + u[1] * velocity[1] + u[2] * velocity[2]
+    for i in range(columns):
+        H[3, i] = (velocity[i] - rate * u[i]) / slant
+        H[3, columns + i] = u[i]
+    return rate
+
+
+@njit
+def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
+    """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
+    dx, dy, dz = at[0] - place[0], at[1] - place[1], at[2] - place[2]
+    flat2 = dx * dx + dy * dy
+    turn = math.atan2(dy, dx)
+    flat = math.sqrt(flat2)
+    slant2 = flat2 + dz * dz
+    slant = math.sqrt(slant2)
+    v0 = measured[0] - slant
+    v1 = measured[1] - turn
+    v1 -= TURN * round(v1 / TURN)
+    # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
+    # taken if they help
+    slant = max(slant, NEAREST)
+    flat = max(flat, 1e-5 * slant, NEAREST)
+    r0, r1, r2 = dx / slant, dy / slant, dz / slant
+    t0, t1 = -dy / (flat * flat), dx / (flat * flat)
+    v2 = measured[2] - math.atan2(dz, math.sqrt(flat2))
+    e0 = -dx * dz / (flat * slant * slant)
+    e1 = -dy * dz / (flat * slant * slant)
+    e2 = flat / (slant * slant)
+    w0 = W[0] * v0 + W[1] * v1 + W[2] * v2
+    w1 = W[1] * v0 + W[3] * v1 + W[4] * v2
+    w2 = W[2] * v0 + W[4] * v1 + W[5] * v2
+    chi += v0 * w0 + v1 * w1 + v2 * w2
+    g0, g1 = g0 + r0 * w0 + t0 * w1 + e0 * w2, g1 + r1 * w0 + t1 * w1 + e1 * w2
+    g2 += r2 * w0 + e2 * w2
+    p0 = W[0] * r0 + W[1] * t0 + W[2] * e0
+    p1 = W[0] * r1 + W[1] * t1 + W[2] * e1
+    p2 = W[0] * r2 + W[2] * e2
+    q0 = W[1] * r0 + W[3] * t0 + W[4] * e0
+    q1 = W[1] * r1 + W[3] * t1 + W[4] * e1
+    q2 = W[1] * r2 + W[4] * e2
+    u0 = W[2] * r0 + W[4] * t0 + W[5] * e0
+    u1 = W[2] * r1 + W[4] * t1 + W[5] * e1
+    u2 = W[2] * r2 + W[5] * e2
+    a0 += r0 * p0 + t0 * q0 + e0 * u0
+    a1 += r0 * p1 + t0 * q1 + e0 * u1
+    a2 += r0 * p2 + t0 * q2 + e0 * u2
+    a3 += r1 * p1 + t1 * q1 + e1 * u1
+    a4 += r1 * p2 + t1 * q2 + e1 * u2
+    a5 += r2 * p2 + e2 * u2
+    return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
+
+
+@njit
+def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
+    """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
+    dx, dy, dz = at[0] - place[0], at[1] - place[1], at[2] - place[2]
+    flat2 = dx * dx + dy * dy
+    turn = math.atan2(dy, dx)
+    flat = math.sqrt(flat2)
+    slant2 = flat2 + dz * dz
+    slant = math.sqrt(slant2)
+    v0 = measured[0] - slant
+    v1 = measured[1] - turn
+    v1 -= TURN * round(v1 / TURN)
+    # straight above a radar the azimuth has no derivative; a bounded one serves, steps are only
+    # taken if they help
+    slant = max(slant, NEAREST)
+    flat = max(flat, 1e-5 * slant, NEAREST)
+    r0, r1, r2 = dx / slant, dy / slant, dz / slant
+    t0, t1 = -dy / (flat * flat), dx / (flat * flat)
+    w0, w1 = W[0] * v0 + W[1] * v1, W[1] * v0 + W[3] * v1
+    chi += v0 * w0 + v1 * w1
+    g0, g1, g2 = g0 + r0 * w0 + t0 * w1, g1 + r1 * w0 + t1 * w1, g2 + r2 * w0
+    p0, p1, p2 = W[0] * r0 + W[1] * t0, W[0] * r1 + W[1] * t1, W[0] * r2
+    q0, q1, q2 = W[1] * r0 + W[3] * t0, W[1] * r1 + W[3] * t1, W[1] * r2
+    a0, a1, a2 = a0 + r0 * p0 + t0 * q0, a1 + r0 * p1 + t0 * q1, a2 + r0 * p2 + t0 * q2
+    a3, a4, a5 = a3 + r1 * p1 + t1 * q1, a4 + r1 * p2 + t1 * q2, a5 + r2 * p2
+    return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
+
+
+@njit
+def convert_radar3d(z: Array, place: Array, R: Array, reach: float, least: float, centre: Array, c: Array) -> None:
+    """Range, azimuth, elevation; see `assoc.sensors.kernels.dispatch.convert_one`."""
+    slant = max(z[0], 0.0)
+    ca, sa, ce, se = math.cos(z[1]), math.sin(z[1]), math.cos(z[2]), math.sin(z[2])
+    # the target may be a sigma farther than measured; and near the zenith the azimuth opens up
+    arm = max(slant, math.sqrt(R[0, 0]))
+    tilt = arm * max(abs(ce), math.sqrt(R[2, 2]))
+    axes = (
+        (ca * ce, -tilt * sa, -arm * ca * se),
+        (sa * ce, tilt * ca, -arm * sa * se),
+        (se, 0.0, arm * ce),
+    )
+    bend = 0.5 * reach * arm * (R[1, 1] * ce * ce + R[2, 2])
+    wide = 4.0 * arm * arm if reach * max(R[1, 1], R[2, 2]) > 1.0 else 0.0
+    entry = 0
+    for i in range(3):
+        a = axes[i]
+        centre[i] = place[i] + slant * a[0]
+        for j in range(i, 3):
+            b = axes[j]
+            total = 2.0 * bend * bend / least * a[0] * b[0] + (wide if i == j else 0.0)
+            for k in range(3):
+                total += a[k] * (R[k, 0] * b[0] + R[k, 1] * b[1] + R[k, 2] * b[2])
+            c[entry] = total
+            entry += 1
+
+
+@njit
+def convert_radar2d(
+    z: Array,
+    place: Array,
+    R: Array,
+    heights: Three,
+    reach: float,
+    least: float,
+    centre: Array,
+    c: Array,
+) -> None:
+    """Range and azimuth: the ground ranges that the heights (lowest, middle, highest) allow make it long."""
+    low, high = heights[0] - place[2], heights[2] - place[2]
+    lowest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    most = max(abs(low), abs(high))
+    slack = math.sqrt(START_REACH * R[0, 0])
+    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    ground = 0.5 * (farthest + nearest)
+    slack = math.sqrt(reach * R[0, 0])
+    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    bend = 0.5 * reach * R[1, 1] * farthest
+    wide = 4.0 * farthest**2 if reach * R[1, 1] > 1.0 else 0.0
+    # a box, not an ellipse: twice, for the target may be at the end of the range and of the azimuth at once
+    along = 2.0 * (max(farthest - ground, ground - nearest, slack) + bend) ** 2 / least + wide
+    across = 2.0 * max(farthest * farthest, R[0, 0]) * R[1, 1] * reach / least + wide
+    ca, sa = math.cos(z[1]), math.sin(z[1])
+    centre[0], centre[1], centre[2] = place[0] + ground * ca, place[1] + ground * sa, heights[1]
+    c[0], c[1], c[3] = (
+        ca * ca * along + sa * sa * across,
+        ca * sa * (along - across),
+        sa * sa * along + ca * ca * across,
+    )

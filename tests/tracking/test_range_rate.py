@@ -1,0 +1,73 @@
+"""Range rates: smaller errors of the velocity in all trackers, and crossing targets that keep their tracks."""
+
+import numpy as np
+import pytest
+
+from assoc import simulation
+from assoc.sensors import Radar3D
+from assoc.simulation.observation import observe
+from assoc.simulation.scenarios.three_radar import TRAJECTORIES
+from assoc.tracking import TRACKERS
+
+SCANS = 20
+
+
+def velocity_errors(name, noise):
+    scene = simulation.simulate("three-radar", 5, scans=SCANS, range_rate_noise=noise)
+    tracker, errors = TRACKERS[name].for_scene(scene), []
+    for k in range(SCANS):
+        scan = scene.scan(k)
+        tracker.step(scan.time, scan.measurements)
+        places, speeds = (
+            np.concatenate([getattr(one, what)([scan.time]) for one in TRAJECTORIES])
+            for what in ("positions", "velocities")
+        )
+        for track in tracker.tracks if k >= 5 else ():
+            if track.confirmed:
+                own = int(np.argmin(np.linalg.norm(places - track.position, axis=1)))
+                errors.append(float(np.linalg.norm(speeds[own] - track.velocity)))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("name", TRACKERS)
+def test_velocities_are_better(name):
+    plain, doppler = velocity_errors(name, 0.0), velocity_errors(name, 0.5)
+    assert len(doppler) >= 0.95 * len(plain) > 3 * 10
+    assert np.median(doppler) < 0.5 * np.median(plain)
+
+
+def crossing(doppler, seed):
+    """Two targets fly through each other head-on, closer than the noise; one radar looks along their path."""
+    view = [[0, 2e5], [-4, 2], [-1, 1.5], [-400, 400]]
+    radar = Radar3D(
+        position=[0, 0, 0], noise=[150, 8e-3, 8e-3, 1.0], field_of_view=view, false_alarm_rate=0.5,
+        detection_probability=0.8,
+    )  # fmt: skip
+    radar = radar if doppler else radar.position_part
+    times = np.arange(30.0)
+    start, velocity = np.array([[20e3, 0, 2e3], [26e3, 100, 2e3]]), np.array([[200.0, 0, 0], [-200.0, 0, 0]])
+    places, speeds = [start + t * velocity for t in times], [velocity] * len(times)
+    rng = np.random.default_rng(seed)
+    return observe([radar], times, [np.arange(2)] * len(times), places, rng, velocities=speeds)
+
+
+def kept(doppler, seed, name):
+    """How many measurements of targets went to a track that had the other target's measurements before."""
+    scene = crossing(doppler, seed)
+    tracker, owner, wrong, total = TRACKERS[name].for_scene(scene), {}, 0, 0
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        step = tracker.step(scan.time, scan.measurements)
+        for decided in step.final:
+            source = scene.scan(decided.scan).sources[0]
+            for track, target in zip(decided.assigned[0].tolist(), source.tolist(), strict=True):
+                if track and target >= 0:
+                    total += 1
+                    wrong += owner.setdefault(track, target) != target
+    return wrong / max(total, 1)
+
+
+@pytest.mark.parametrize("name", ["nearest-neighbour", "mht", "multi-sensor"])
+def test_crossing_targets_keep_their_tracks(name):
+    plain, doppler = (np.mean([kept(on, seed, name) for seed in range(6)]) for on in (False, True))
+    assert doppler < 0.03 and doppler <= plain
