@@ -7,7 +7,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from assoc.sensors.codes import RADAR3D
-from assoc.sensors.kernels.dispatch import linearise_state, measure_state, wrap
+from assoc.sensors.kernels.dispatch import linearise_moving, measure_moving, wrap
 
 VIEW = [[0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2], [-500, 500]]
 RADAR = Radar3D(position=[100, -200, 30], noise=[50, 1e-3, 2e-3, 0.5], field_of_view=VIEW)
@@ -44,11 +44,11 @@ def test_compiled_model_is_the_sensor(axes):
     h, H = np.zeros(4), np.ones((4, 2 * axes))
     slopes = RADAR.jacobian(x[:, :3], x[:, 3:])[:, :, read]
     for state, z, slope in zip(x, RADAR.measure(x[:, :3], x[:, 3:]), slopes, strict=True):
-        linearise_state(RADAR3D, 4, RADAR.position, state[read][order], columns, h, H)
+        linearise_moving(RADAR.position, state[read][order], columns, h, H)
         np.testing.assert_allclose(h, z, rtol=1e-14, atol=1e-12)
         np.testing.assert_allclose(H, slope, rtol=1e-12, atol=1e-15)
         h[:] = 0
-        measure_state(RADAR3D, 4, RADAR.position, state[read][order], columns, h)
+        measure_moving(RADAR.position, state[read][order], columns, h)
         np.testing.assert_allclose(h, z, rtol=1e-14, atol=1e-12)
     v = np.array([1.0, 4.0, 5.0, 6.0])
     wrap(RADAR3D, v)

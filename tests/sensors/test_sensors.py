@@ -121,7 +121,7 @@ def test_sensors_are_values():
         ({"false_alarm_rate": float("inf")}, "false_alarm_rate"),
         ({"noise": [50, -1e-3, 1e-3]}, "noise must be positive"),
         ({"noise": [50, 0, 1e-3]}, "noise must be positive"),
-        ({"noise": [50, 1e-3]}, r"noise must have shape \(3,\) or \(3, 3\), got \(2,\)"),
+        ({"noise": [50, 1e-3]}, r"noise must have shape \(3,\) or \(3, 3\) or \(4,\) or \(4, 4\), got \(2,\)"),
         ({"noise": [50, float("nan"), 1e-3]}, "noise must be finite"),
         ({"noise": np.diag([1, 1, -1])}, "positive definite"),
         ({"noise": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "positive definite"),

@@ -10,7 +10,7 @@ from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, GOOD, LINEAR, LOG_TURN, PLAIN, STATUSES, modify
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels.dispatch import linearise_state, wrap
+from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
 
 
 @njit
@@ -60,8 +60,11 @@ def expect(
                     total += matrix[a, p] * m[columns[p]]
                     H[a, p] = matrix[a, p]
                 h[a] = total
+        elif c > 3:
+            linearise_moving(place, m, columns, h, H)
         else:
-            linearise_state(code, d, place, m, columns, h, H)
+            height = m[columns[2]] if c > 2 else 0.0
+            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
         for a in range(d):
             hs[b, a] = h[a]
             for e in range(d):

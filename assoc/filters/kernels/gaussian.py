@@ -14,7 +14,7 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels.dispatch import linearise_state, wrap
+from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
 
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""
@@ -241,7 +241,11 @@ def update_one(
                 H[a, p] = matrix[a, p]
             v[a] = z[a] - total
     else:
-        linearise_state(code, d, place, m, columns, h, H)
+        if c > 3:
+            linearise_moving(place, m, columns, h, H)
+        else:
+            height = m[columns[2]] if c > 2 else 0.0
+            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
         for a in range(d):
             v[a] = z[a] - h[a]
         wrap(code, v)

@@ -20,7 +20,7 @@ from assoc.filters.kernels.gaussian import (
 )
 from assoc.filters.kernels.gaussian import correct as correct_one
 from assoc.filters.kernels.linear_algebra import factor, solve_in_place
-from assoc.sensors.kernels.dispatch import measure_state, wrap
+from assoc.sensors.kernels.dispatch import measure, measure_moving, wrap
 
 
 @njit
@@ -32,8 +32,11 @@ def observe_point(x: Array, code: int, d: int, place: Array, columns: Array, mat
             for p in range(len(columns)):
                 total += matrix[a, p] * x[columns[p]]
             h[a] = total
+    elif len(columns) > 3:
+        measure_moving(place, x, columns, h)
     else:
-        measure_state(code, d, place, x, columns, h)
+        height = x[columns[2]] if len(columns) > 2 else 0.0
+        measure(code, d, place, x[columns[0]], x[columns[1]], height, h)
 
 
 @njit

@@ -59,48 +59,38 @@ def measure(code: int, dim: int, place: Array, x: float, y: float, z: float, h: 
 
 
 @njit
-def measure_state(code: int, dim: int, place: Array, state: Array, columns: Array, h: Array) -> None:
-    """Write the noise-free measurement of a state into h (d,).
+def measure_moving(place: Array, state: Array, columns: Array, h: Array) -> None:
+    """Write range, azimuth, elevation and range rate of a state into h (4,).
 
-    `columns` says where x, y (and z) stand in the state and, for a range rate, after them their velocities.
+    `columns` says where x, y (and z) stand in the state, and after them their velocities.
     """
-    if code == RADAR3D and dim == 4:
-        deep = len(columns) > 4
-        axes = 3 if deep else 2
-        dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
-        dz = (state[columns[2]] if deep else 0.0) - place[2]
-        flat = measure_range_azimuth(dx, dy, dz, h)
-        h[2] = math.atan2(dz, flat)
-        along = dx * state[columns[axes]] + dy * state[columns[axes + 1]]
-        if deep:
-            along += dz * state[columns[5]]
-        h[3] = along / max(h[0], NEAREST)
-        return
-    height = state[columns[2]] if len(columns) > 2 else 0.0
-    measure(code, dim, place, state[columns[0]], state[columns[1]], height, h)
+    axes = len(columns) // 2
+    dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
+    dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
+    flat = measure_range_azimuth(dx, dy, dz, h)
+    h[2] = math.atan2(dz, flat)
+    along = dx * state[columns[axes]] + dy * state[columns[axes + 1]]
+    if axes == 3:
+        along += dz * state[columns[5]]
+    h[3] = along / max(h[0], NEAREST)
 
 
 @njit
-def linearise_state(code: int, dim: int, place: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
-    """Write the noise-free measurement of a state into h (d,), and its derivatives by the columns into H (d, c or 3).
+def linearise_moving(place: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
+    """Write range, azimuth, elevation and range rate into h (4,), and their derivatives by the columns into H (4, c).
 
-    `columns` is as for `measure_state`.
+    `columns` is as for `measure_moving`.
     """
-    c = len(columns)
-    if code == RADAR3D and dim == 4:
-        axes = c // 2
-        dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
-        dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
-        H[:dim, :] = 0.0
-        linearise_radar3d(dx, dy, dz, h, H)
-        if axes == 2:
-            # the third column is a velocity's
-            H[:3, 2] = 0.0
-        vz = state[columns[5]] if axes == 3 else 0.0
-        h[3] = linearise_range_rate(dx, dy, dz, (state[columns[axes]], state[columns[axes + 1]], vz), H, axes)
-        return
-    height = state[columns[2]] if c > 2 else 0.0
-    linearise(code, dim, place, state[columns[0]], state[columns[1]], height, h, H)
+    axes = len(columns) // 2
+    dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
+    dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
+    H[:] = 0.0
+    linearise_radar3d(dx, dy, dz, h, H)
+    if axes == 2:
+        # the third column is a velocity's
+        H[:3, 2] = 0.0
+    vz = state[columns[5]] if axes == 3 else 0.0
+    h[3] = linearise_range_rate(dx, dy, dz, (state[columns[axes]], state[columns[axes + 1]], vz), H, axes)
 
 
 @njit

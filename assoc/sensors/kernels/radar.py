@@ -22,20 +22,21 @@ def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
 
 
 @njit
-def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array) -> tuple[float, float]:
-    """Write range, azimuth and their derivatives; return ground range and slant range, kept above zero."""
-    ground = max(measure_range_azimuth(dx, dy, dz, h), NEAREST)
+def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array) -> Three:
+    """Write range, azimuth and their derivatives; return the ground range, and it and the slant range above zero."""
+    flat = measure_range_azimuth(dx, dy, dz, h)
+    ground = max(flat, NEAREST)
     slant = math.hypot(ground, dz)
     H[0, 0], H[0, 1], H[0, 2] = dx / slant, dy / slant, dz / slant
     H[1, 0], H[1, 1] = -dy / (ground * ground), dx / (ground * ground)
-    return ground, slant
+    return flat, ground, slant
 
 
 @njit
 def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> None:
     """Write range, azimuth and elevation into h and their derivatives into H, which holds zeros."""
-    ground, slant = linearise_range_azimuth(dx, dy, dz, h, H)
-    h[2] = math.atan2(dz, math.hypot(dx, dy))
+    flat, ground, slant = linearise_range_azimuth(dx, dy, dz, h, H)
+    h[2] = math.atan2(dz, flat)
     H[2, 0] = -dx * dz / (ground * slant * slant)
     H[2, 1] = -dy * dz / (ground * slant * slant)
     H[2, 2] = ground / (slant * slant)
