@@ -90,7 +90,7 @@ def test_losses_of_trees_that_share_nothing_are_differences_of_scores():
 
 
 def test_losses_know_who_needs_a_measurement_more():
-    # the first tree is 6 better with measurement 1, the second 2 better: the first has it. The other way costs 4 in all;
+    # the first tree is 6 better with measurement 1, the second 2 better: the first has it. The other way costs 4;
     # the price of the measurement says how the two trees share that
     tree, score = np.array([1, 1, 2, 2]), np.array([16.0, 10.0, 22.0, 20.0])
     history = np.array([[1], [0], [1], [0]], dtype=np.int32)

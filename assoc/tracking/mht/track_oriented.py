@@ -4,7 +4,7 @@ Every measurement may start a tree; every branch grows by each measurement in it
 global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
 an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
 of the oldest scan of the window is then final (N-scan pruning). After each sensor the branches are cut by what
-they cost the best global hypothesis (`assoc.tracking.mht.losses`), not by their tree's own scores: where targets are close,
+they cost the best global hypothesis (`assoc.tracking.mht.losses`), not by their tree's own scores: of close targets
 the best branches of one tree may all want measurements that the others need more.
 
 References
