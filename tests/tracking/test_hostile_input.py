@@ -50,3 +50,19 @@ def test_a_scan_that_is_refused_changes_nothing(name, filter):
     for a, b in zip(own.tracks, other.tracks, strict=True):
         np.testing.assert_array_equal(a.mean, b.mean)
         assert a.track_id == b.track_id
+
+
+@pytest.mark.parametrize("name", ["mht", "mht-hypothesis"])
+def test_the_order_of_the_measurements_of_a_scan_does_not_matter(name):
+    scene = simulation.simulate("three-radar", 0, scans=6, false_alarms=8.0)
+    found = []
+    for shuffle in range(3):
+        rng, own = np.random.default_rng(shuffle), TRACKERS[name].for_scene(scene)
+        decided = []
+        for k in range(6):
+            orders = [rng.permutation(len(z)) if shuffle else np.arange(len(z)) for z in scene.scan(k).measurements]
+            z = [one[order] for one, order in zip(scene.scan(k).measurements, orders, strict=True)]
+            step = own.step(scene.times[k], z)
+            decided.append([ids[np.argsort(o)].tolist() for ids, o in zip(step.assigned, orders, strict=True)])
+        found.append(([(t.track_id, t.score, *t.mean.tolist()) for t in own.tracks], decided))
+    assert found[0] == found[1] == found[2]
