@@ -8,7 +8,7 @@ from assoc.filters.ensemble import Ensemble, EnsembleKalmanFilter
 from assoc.filters.fuzzy.filter import Alarm, FuzzyAdaptiveEKF
 from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
 from assoc.filters.fuzzy.rules import paper_rules, tuned_data
-from assoc.filters.imm import InteractingMultipleModel, Mixture
+from assoc.filters.imm import InteractingMultipleModel, Mixture, transition_from_sojourns
 from assoc.filters.kalman import ExtendedKalmanFilter, KalmanFilter
 from assoc.filters.measurement import FunctionMeasurement, LinearMeasurement, Measurement
 from assoc.filters.modified_ekf import ModifiedEKF
@@ -61,5 +61,6 @@ __all__ = [
     "bounds",
     "nees",
     "paper_rules",
+    "transition_from_sojourns",
     "tuned_data",
 ]

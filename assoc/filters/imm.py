@@ -1,4 +1,8 @@
-"""The interacting multiple model filter: several filters side by side, mixed at each step."""
+"""The interacting multiple model filter: several filters side by side, mixed at each step.
+
+The modes are a continuous-time Markov chain: over dt seconds the probabilities of a change are those of the matrix
+exp(Q dt), Q the rates per second, so that four seconds are four seconds, in one prediction or in sixteen.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm, logm
 
+from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension
@@ -54,6 +60,61 @@ class Mixture:
         return gaussian(np.ascontiguousarray(self.means[:, j]), np.ascontiguousarray(self.covariances[:, j]))
 
 
+# time steps whose transitions are remembered
+_MOST_STEPS = 64
+
+
+def transition_rates(transition: Array, interval: float) -> Array:
+    """Rates per second of the continuous-time Markov chain with these probabilities over `interval` seconds.
+
+    Parameters
+    ----------
+    transition : array (m, m)
+        Rows of probabilities.
+    interval : float
+
+    Raises
+    ------
+    InvalidInputError
+        There is no such chain: a mode would be left and come back to faster than at random.
+    """
+    # away from a negative or zero eigenvalue the logarithm is real
+    values = np.linalg.eigvals(transition)
+    good = bool((np.abs(values) > 1e-12).all() and not ((np.abs(values.imag) < 1e-12) & (values.real < 0)).any())
+    rates = np.real(logm(transition)) if good else np.full(transition.shape, -1.0)
+    off = rates - np.diag(np.diagonal(rates))
+    if not good or (off < -1e-9).any() or np.abs(expm(rates) - transition).max() > 1e-9:
+        raise InvalidInputError(
+            f"transition: {transition.tolist()} are not the probabilities of a chain in continuous time "
+            "(modes must tend to stay: with two, the diagonal sums to more than 1)"
+        )
+    off = np.maximum(off, 0.0) / interval
+    return np.asarray(off - np.diag(off.sum(axis=1)))
+
+
+def transition_from_sojourns(seconds: Sequence[float], interval: float = 1.0) -> Array:
+    """Transition probabilities of modes that last for these mean times, each change as likely to any other mode.
+
+    Parameters
+    ----------
+    seconds : sequence of m floats
+        Mean time that a target stays in each mode, seconds.
+    interval : float
+        Seconds over which the probabilities are wanted.
+
+    Returns
+    -------
+    array (m, m)
+    """
+    leave = 1.0 / np.array([positive(one, "seconds") for one in seconds])
+    m = len(leave)
+    if m < 2:
+        raise InvalidInputError(f"seconds: expected at least 2 modes, got {m}")
+    rates = np.repeat(leave[:, None] / (m - 1), m, axis=1)
+    np.fill_diagonal(rates, -leave)
+    return np.asarray(expm(rates * positive(interval, "interval")))
+
+
 class InteractingMultipleModel(Filter[Mixture]):
     """The interacting multiple model filter.
 
@@ -62,9 +123,18 @@ class InteractingMultipleModel(Filter[Mixture]):
     filters : sequence of filters with Gaussian states
         Their motion models share one state; see `assoc.filters.Padded`.
     transition : array_like (m, m)
-        Probability that a target in mode i is in mode j one step later; rows sum to 1.
+        Probability that a target in mode i is in mode j `interval` seconds later; rows sum to 1. It must be one that
+        a continuous-time Markov chain can have; with two modes that asks for a diagonal that sums to more than 1.
+        `transition_from_sojourns` makes it of mean times.
     weights : array_like (m,), optional
         Probabilities of the modes at the start; without it the stationary ones of `transition`.
+    interval : float
+        Seconds to which `transition` belongs; 1 by default, which makes it a probability per second.
+
+    Attributes
+    ----------
+    rates : array (m, m)
+        Rates of the changes per second, Q; its rows sum to 0, and -1 / Q_ii is the mean time spent in mode i.
 
     References
     ----------
@@ -76,6 +146,8 @@ class InteractingMultipleModel(Filter[Mixture]):
         filters: Sequence[GaussianFilter | UnscentedKalmanFilter],
         transition: Array,
         weights: Array | None = None,
+        *,
+        interval: float = 1.0,
     ) -> None:
         if len(filters) < 2:
             raise InvalidInputError(f"filters must be at least 2, got {len(filters)}")
@@ -90,6 +162,9 @@ class InteractingMultipleModel(Filter[Mixture]):
             raise InvalidInputError(f"transition must have shape {(m, m)}, got {self.transition.shape}")
         if (self.transition < 0).any() or np.abs(self.transition.sum(axis=1) - 1).max() > 1e-9:
             raise InvalidInputError("transition must have probabilities in its rows that sum to 1")
+        self.interval = positive(interval, "interval")
+        self.rates = transition_rates(self.transition, self.interval)
+        self._known = {self.interval: self.transition}
         if weights is None:
             values, vectors = np.linalg.eig(self.transition.T)
             stationary = np.abs(vectors[:, np.argmax(values.real)].real)
@@ -108,6 +183,15 @@ class InteractingMultipleModel(Filter[Mixture]):
             np.broadcast_to(self.weights, (B, m)).copy(),
         )
 
+    def transition_over(self, dt: float) -> Array:
+        """Probability that a target in mode i is in mode j dt seconds later, (m, m)."""
+        known = self._known.get(dt)
+        if known is None:
+            if len(self._known) > _MOST_STEPS:
+                self._known = {self.interval: self.transition}
+            known = self._known[dt] = expm(self.rates * dt)
+        return known
+
     def predict(self, state: Mixture, dt: float) -> Mixture:
         """Mix the models and predict each; see `Filter.predict`."""
         return self._predict(state, dt, False)[0]
@@ -117,9 +201,10 @@ class InteractingMultipleModel(Filter[Mixture]):
         return self._predict(state, dt, True)
 
     def _predict(self, state: Mixture, dt: float, crossing: bool) -> tuple[Mixture, Array]:
-        weights = state.weights @ self.transition
+        transition = self.transition_over(dt)
+        weights = state.weights @ transition
         # share of model i in what model j starts from
-        share = state.weights[:, :, None] * self.transition / np.maximum(weights, 1e-300)[:, None, :]
+        share = state.weights[:, :, None] * transition / np.maximum(weights, 1e-300)[:, None, :]
         means = share.transpose(0, 2, 1) @ state.means
         away = state.means[:, :, None] - means[:, None]
         # sum over i of share_ij (P_i + away away')

@@ -11,6 +11,7 @@ import math
 import os
 from abc import ABC
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -138,13 +139,23 @@ def described(thing: object) -> str:
         parts = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
         parts.pop("rng", None)
         inside = [f"{name}={described(parts[name])}" for name in sorted(parts)]
-        if isinstance(thing, LinearMotion):
-            inside.append(f"noise of a second={described(thing.matrices(1.0)[1])}")
+        if isinstance(thing, Motion):
+            # what a user's function does is known by what it gives
+            somewhere = np.full((1, thing.dim), 100.0)
+            matrix = thing.matrices(1.0)[1] if isinstance(thing, LinearMotion) else thing.noise(somewhere, 1.0)
+            inside.append(f"noise of a second={described(matrix)}")
+            if not isinstance(thing, LinearMotion):
+                inside.append(f"motion of a second={described(thing.propagate(somewhere, 1.0))}")
         return f"{type(thing).__name__}({', '.join(inside)})"
     if isinstance(thing, np.ndarray):
         return str(thing.tolist())
     if isinstance(thing, (tuple, list)):
         return f"[{', '.join(described(one) for one in thing)}]"
+    if isinstance(thing, Mapping):
+        return f"{{{', '.join(f'{key}: {described(one)}' for key, one in thing.items())}}}"
+    if is_dataclass(thing) and not isinstance(thing, type):
+        inside = [f"{one.name}={described(getattr(thing, one.name))}" for one in fields(thing)]
+        return f"{type(thing).__name__}({', '.join(inside)})"
     plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
     return repr(thing) if plain else type(thing).__name__
 

@@ -18,9 +18,10 @@ PROCESS_NOISE = 30.0
 MANOEUVRE_NOISE = 50.0
 """Process noise of the manoeuvring model of `two_speeds`: turns of 5 g at a scan a second."""
 
-# imm-cv: the quiet model's share of the process noise, and the probability that a model gives way in a scan
+# imm-cv: the quiet model's share of the process noise, and the probability that a model gives way in so many seconds,
+# a turn of a radar's antenna
 _QUIET = 0.1
-_CHANGE = 0.1
+_CHANGE, _TURN = 0.1, 4.0
 
 _TURN_NOISE = 0.03
 """Standard deviation of a turn rate's increment in a step, rad/s."""
@@ -29,8 +30,8 @@ _TURN_NOISE = 0.03
 def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[Any]:
     """Interacting multiple models: nearly constant velocity, and manoeuvres.
 
-    A target that flies straight is tracked with a tenth of the process noise; either model gives way to the
-    other every ten scans on average.
+    A target that flies straight is tracked with a tenth of the process noise; either model has given way to the
+    other four seconds later with probability 0.1, and lasts for 36 seconds on average.
 
     Parameters
     ----------
@@ -43,7 +44,8 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[An
         filters.ExtendedKalmanFilter(filters.ConstantVelocity(share * noise, dimensions=dimensions, kind="continuous"))
         for share in (_QUIET, 1.0)
     ]
-    return filters.InteractingMultipleModel(modes, np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]]))
+    transition = np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]])
+    return filters.InteractingMultipleModel(modes, transition, interval=_TURN)
 
 
 def planar(sensors: Sequence[Sensor]) -> bool:

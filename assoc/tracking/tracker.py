@@ -27,6 +27,7 @@ from assoc.sensors.base import finite_array
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
+from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint
 from assoc.tracking.filter_choice import two_speeds
 from assoc.tracking.initiation import Initiation
@@ -200,20 +201,43 @@ class Tracker(Checkpoint):
         Raises
         ------
         InvalidInputError
-            The time runs backwards, or measurements have the wrong shape or are not finite.
+            The time runs backwards, or measurements have the wrong shape, are not finite, or are none that the
+            sensor can have made. Whatever the error, the tracker is as it was before the step.
         """
         when = self._checked_time(time)
-        checked = self._checked_measurements(measurements)
+        checked = checked_measurements(measurements, self.sensors)
         stamps = None if times is None else self._checked_stamps(times, checked, when)
-        dt = self._elapsed(when)
-        if dt > 0:
-            # a running mean that forgets: scans may change their pace
-            self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
-        with interruptible():
-            step = self._step(when, checked, stamps)
+        before = self._snapshot()
+        try:
+            dt = self._elapsed(when)
+            if dt > 0:
+                # a running mean that forgets: scans may change their pace
+                self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
+            with interruptible():
+                step = self._step(when, checked, stamps)
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            self._go_back(before)
+            raise InvalidInputError(
+                f"the scan at {when:g} s, {dt:g} s after the last, leads to numbers out of range ({error}); expected "
+                "seconds, metres and radians"
+            ) from error
+        except BaseException:
+            self._go_back(before)
+            raise
         self._time = when
         self._scan += 1
         return step
+
+    def _snapshot(self) -> tuple[dict[str, Any], Any]:
+        """What a step may change: arrays are replaced, not written to, lists are changed in place."""
+        rng = getattr(self.filter, "rng", None)
+        kept = {name: list(value) if isinstance(value, list) else value for name, value in vars(self).items()}
+        return kept, None if rng is None else rng.bit_generator.state
+
+    def _go_back(self, snapshot: tuple[dict[str, Any], Any]) -> None:
+        vars(self).update(snapshot[0])
+        if snapshot[1] is not None:
+            self.filter.rng.bit_generator.state = snapshot[1]  # type: ignore[attr-defined]
 
     @abstractmethod
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
@@ -232,23 +256,9 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"time must not run backwards: got {when:g} s after {self._time:g} s")
         return when
 
-    def _checked_measurements(self, measurements: Sequence[Array]) -> list[Array]:
-        if len(measurements) != len(self.sensors):
-            raise InvalidInputError(
-                f"measurements of {len(measurements)} sensors, expected {len(self.sensors)} (one array for each)"
-            )
-        checked = []
-        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
-            count = len(z) if np.ndim(z) else -1
-            array = np.zeros((0, sensor.dim)) if np.size(z) == 0 else z
-            checked.append(
-                finite_array(array, f"measurements of sensor {s}", (max(count, 0) if np.size(z) else 0, sensor.dim))
-            )
-        return checked
-
     def _checked_stamps(self, times: Sequence[Array], measurements: list[Array], when: float) -> list[Array]:
-        if len(times) != len(self.sensors):
-            raise InvalidInputError(f"times of {len(times)} sensors, expected {len(self.sensors)}")
+        if not hasattr(times, "__len__") or len(times) != len(self.sensors):
+            raise InvalidInputError(f"times must be one array for each of {len(self.sensors)} sensors")
         checked = []
         for s, (stamps, z) in enumerate(zip(times, measurements, strict=True)):
             array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, f"times of sensor {s}", (len(z),))

@@ -7,7 +7,7 @@ import pytest
 
 from assoc.tracking import NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import load_json
-from experiments.trackers import benchmark, comparison, plane
+from experiments.trackers import benchmark, close_scenes, close_targets, comparison, plane
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
 
@@ -52,3 +52,10 @@ def test_goals_of_the_three_radar_scene():
     assert found.late == found.lost == found.false == 0
     assert found.instants == 21
     assert found.best > 2 * found.multi
+
+
+def test_close_targets_and_the_oracle():
+    scene = close_scenes.simulate(close_scenes.SETTINGS["formations"], 100, 6)
+    oracle, mht = (close_targets.judge(name, scene) for name in ("oracle", "mht"))
+    assert oracle[1] == 0 and mht[1] <= 2
+    assert mht[0] == pytest.approx(oracle[0], rel=0.3)

@@ -27,6 +27,7 @@ from assoc.filters import (
     bounds,
     nees,
     paper_rules,
+    transition_from_sojourns,
 )
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
@@ -85,6 +86,47 @@ def test_an_imm_of_equal_models_is_one_model():
     np.testing.assert_allclose(b.mean, a.mean, rtol=1e-12)
     np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-8, atol=1e-6)
     assert np.array_equal(b[1:3].weights, b.weights[1:3])
+
+
+@pytest.mark.parametrize("modes", [2, 3])
+def test_four_seconds_are_four_seconds_however_they_are_cut(modes):
+    if modes == 2:
+        transition = np.array([[0.9, 0.1], [0.25, 0.75]])
+    else:
+        transition = transition_from_sojourns([20.0, 6.0, 3.0])
+    models = [KalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 5.0, 20.0)[:modes]]
+    imm = InteractingMultipleModel(models, transition, np.eye(modes)[0])
+    start = imm.start(random_state(2, np.random.default_rng(3)))
+    found = []
+    for calls in (1, 4, 16, 160):
+        state = start
+        for _ in range(calls):
+            state = imm.predict(state, 4.0 / calls)
+        found.append(state.weights)
+    wanted = np.linalg.matrix_power(transition, 4)[0]
+    np.testing.assert_allclose(found[0], np.broadcast_to(wanted, (2, modes)), rtol=1e-12)
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=0, atol=1e-12)
+    # a second is what `transition` says, to the bit
+    assert np.array_equal(imm.predict(start, 1.0).weights, start.weights @ transition)
+    np.testing.assert_array_equal(imm.predict(start, 0.0).weights, start.weights)
+
+
+def test_transitions_of_another_interval_and_of_mean_times():
+    models = [KalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
+    slow = InteractingMultipleModel(models, np.array([[0.9, 0.1], [0.1, 0.9]]), interval=4.0)
+    np.testing.assert_allclose(slow.transition_over(8.0), np.linalg.matrix_power(slow.transition, 2), rtol=1e-12)
+    made = InteractingMultipleModel(models, transition_from_sojourns([30.0, 5.0], 2.0), interval=2.0)
+    np.testing.assert_allclose(made.rates, [[-1 / 30, 1 / 30], [1 / 5, -1 / 5]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [[[0.2, 0.8], [0.9, 0.1]], [[0.5, 0.5], [0.5, 0.5]], [[0.0, 1.0], [1.0, 0.0]]])
+def test_transitions_that_no_chain_in_time_has_are_refused(wrong):
+    models = [KalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
+    with pytest.raises(InvalidInputError, match="transition: .* chain in continuous time"):
+        InteractingMultipleModel(models, wrong)
+    with pytest.raises(InvalidInputError, match="seconds"):
+        transition_from_sojourns([1.0, 0.0])
 
 
 def batch_least_squares(start, motion, sensor, measured, dt):

@@ -10,6 +10,7 @@ from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.tracking.mht import best_hypothesis
 from assoc.tracking.mht.best_hypothesis import choose
+from assoc.tracking.mht.losses import losses
 from assoc.tracking.mht.pruning import decide, keep_best, same_tree
 
 VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
@@ -53,14 +54,49 @@ def test_too_much_work_is_left_to_a_solver(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_best_branches_of_each_tree(seed):
+def test_the_branches_of_each_tree_that_cost_least(seed):
     rng = np.random.default_rng(seed)
-    tree, score = rng.integers(0, 12, 80), rng.normal(0, 8, 80).round()
+    tree, score, loss = rng.integers(0, 12, 80), rng.normal(0, 8, 80).round(), rng.exponential(8, 80).round()
     wanted = []
     for one in np.unique(tree):
-        own = sorted(np.flatnonzero(tree == one).tolist(), key=lambda b: -score[b])
-        wanted += [b for b in own[:4] if score[b] >= score[own[0]] - 9.0]
-    assert keep_best(tree, score, 4, 9.0).tolist() == wanted
+        own = sorted(np.flatnonzero(tree == one).tolist(), key=lambda b: loss[b])
+        limit = 9.0 + max(0.0, -score[own].max())
+        wanted += [b for b in own[:4] if loss[b] <= limit]
+    assert keep_best(tree, score, loss, 4, 9.0).tolist() == wanted
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_loss_is_a_bound_on_what_the_branch_costs_the_best_hypothesis(seed):
+    tree, score, history = branches(seed, trees=2 + seed % 9, measurements=4 + seed % 9)
+    loss = losses(tree, score, history)
+    best = by_solver(tree, score, history)
+    assert loss.min() >= -1e-9
+    for b in range(0, len(tree), 3):
+        # a large reward puts the branch into every best hypothesis
+        forced = score.copy()
+        forced[b] += 1e4
+        true = by_solver(tree, forced, history) + 1e4 - best
+        assert loss[b] <= true + GAP
+
+
+GAP = 1.5
+"""Between the best hypothesis of these random branches and the bound, at the most."""
+
+
+def test_losses_of_trees_that_share_nothing_are_differences_of_scores():
+    tree, score = np.array([1, 1, 2, 2, 3]), np.array([9.0, 4.0, 7.0, -1.0, -2.0])
+    history = np.array([[1, 0], [0, 0], [2, 1], [0, 0], [3, 0]], dtype=np.int32)
+    np.testing.assert_allclose(losses(tree, score, history), [0.0, 5.0, 0.0, 8.0, 2.0], atol=1e-12)
+
+
+def test_losses_know_who_needs_a_measurement_more():
+    # the first tree is 6 better with measurement 1, the second 2 better: the first has it. The other way costs 4;
+    # the price of the measurement says how the two trees share that
+    tree, score = np.array([1, 1, 2, 2]), np.array([16.0, 10.0, 22.0, 20.0])
+    history = np.array([[1], [0], [1], [0]], dtype=np.int32)
+    found = losses(tree, score, history)
+    np.testing.assert_allclose(found[[0, 3]], 0.0, atol=1e-9)
+    assert found[1] + found[2] == pytest.approx(4.0)
 
 
 def test_what_is_decided_of_the_oldest_scan():

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assoc import simulation
+from assoc import filters, simulation
 from assoc._files.npz import save_npz
 from assoc.errors import AssocError, InvalidInputError
 from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
@@ -165,3 +165,23 @@ def test_another_process_noise_is_another_setting(tmp_path):
     kind.for_scene(SCENE, two_speeds(50.0)).restore(path)
     with pytest.raises(InvalidInputError, match=r"other settings: filter was .*sigma=5\.0.*, is .*sigma=6\.0"):
         kind.for_scene(SCENE, two_speeds(60.0)).restore(path)
+
+
+@pytest.mark.parametrize("callable_noise", [False, True])
+def test_a_state_under_another_process_noise_of_a_users_model_is_refused(tmp_path, callable_noise):
+    scene = simulation.simulate("three-radar", 1, scans=2)
+
+    def tracker(q):
+        def move(x, dt):
+            return np.column_stack([x[:, :3] + dt * x[:, 3:], x[:, 3:]])
+
+        noise = (lambda x, dt: q * dt * np.eye(6)) if callable_noise else q * np.eye(6)
+        motion = filters.FunctionMotion(move, noise, 6)
+        return TRACKERS["nearest-neighbour"].for_scene(scene, filters.ExtendedKalmanFilter(motion))
+
+    one = tracker(5.0)
+    one.step(0.0, scene.scan(0).measurements)
+    one.save(tmp_path / "state.npz")
+    tracker(5.0).restore(tmp_path / "state.npz")
+    with pytest.raises(InvalidInputError, match="other settings: filter was"):
+        tracker(7.0).restore(tmp_path / "state.npz")

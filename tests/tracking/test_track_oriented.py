@@ -5,6 +5,8 @@ import pytest
 
 from assoc import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.sensors import PositionSensor
+from assoc.simulation.observation import observe
 from assoc.tracking import Initiation, LifeCycle, TrackOrientedMHT
 from tests.tracking import plain
 
@@ -96,3 +98,28 @@ def test_times_outside_the_scan_are_refused():
 def test_settings_out_of_range(wrong):
     with pytest.raises(InvalidInputError, match=next(iter(wrong))):
         tracker(**wrong)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_targets_side_by_side_keep_their_tracks(depth):
+    """Every window holds a formation that one sensor hardly resolves."""
+    rng = np.random.default_rng(1)
+    view = np.array([[-20_000.0, 20_000.0], [-20_000.0, 20_000.0], [0.0, 10_000.0]])
+    sensors = [
+        PositionSensor(
+            position=np.zeros(3), noise=np.full(3, 80.0), detection_probability=0.9, false_alarm_rate=5.0,
+            field_of_view=view,
+        )
+        for _ in range(3)
+    ]  # fmt: skip
+    abreast = np.array([[0.0, 300.0 * i, 5_000.0] for i in range(4)])
+    ids = [np.arange(4)] * 20
+    places = [abreast + [200.0 * 4.0 * k - 8_000.0, 0.0, 0.0] for k in range(20)]
+    scene = observe(sensors, 4.0 * np.arange(20), ids, places, rng, region=view)
+    own, known = TrackOrientedMHT.for_scene(scene, depth=depth), set()
+    for k in range(20):
+        own.step(scene.times[k], scene.scan(k).measurements)
+        confirmed = [track for track in own.tracks if track.confirmed]
+        known |= {track.track_id for track in confirmed}
+        assert k < 1 or len(confirmed) == 4
+    assert len(known) == 4

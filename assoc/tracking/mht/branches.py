@@ -1,7 +1,7 @@
 """The tables of a track-oriented tracker after a scan of one sensor, in one compiled call.
 
 The next branches are those before, missed, then the pairs of a branch and a measurement, then the roots of new
-trees; of these the best of each tree are kept.
+trees; of these the branches are kept that cost the best global hypothesis least.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
+from assoc.tracking.mht.losses import losses
 from assoc.tracking.mht.pruning import keep_best
 from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
@@ -46,7 +47,7 @@ class Roots(NamedTuple):
 def extend(
     tables: Tables, miss: float, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
 ) -> tuple[Array, Tables]:
-    """Next branches, cut to the best of each tree.
+    """Next branches, cut to those that matter to good global hypotheses.
 
     Parameters
     ----------
@@ -84,7 +85,15 @@ def _extend(
         tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
     for i in range(ids.size):
         tree[old + hits + i], score[old + hits + i] = ids[i], first
-    kept = keep_best(tree, score, most, drop)
+    wide = np.zeros((score.size, history.shape[1]), np.int32)
+    for i in range(old):
+        wide[i] = history[i]
+    for i in range(hits):
+        wide[old + i] = history[branch[i]]
+        wide[old + i, column] = measurement[i] + 1
+    for i in range(ids.size):
+        wide[old + hits + i, column] = number[i] + 1
+    kept = keep_best(tree, score, losses(tree, score, wide), most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):

@@ -126,6 +126,10 @@ class HypothesisOrientedMHT(Tracker):
         """Children of all hypotheses by one sensor's measurements; returns the parent of each that is kept."""
         batch, history = self._batch, self._history
         sensor = self.sensors[s]
+        # hypotheses of equal weight are kept by number: measurements are numbered by value, so that the order in which
+        # they are given does not matter
+        order = np.lexsort((*z.T[::-1], *(() if stamps is None else (stamps,))))
+        z, stamps = z[order], None if stamps is None else stamps[order]
         gated = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
         pairs = gated.pairs
         gain = pairs.log_likelihood + self.terms.detection[s]
@@ -137,6 +141,8 @@ class HypothesisOrientedMHT(Tracker):
         # rows of the next batch: missed branches, detected branches, new targets
         self._batch = TrackBatch.concatenate([missed, hit, roots])
         self._history = np.concatenate([history, hit_history, root_history])
+        given = np.concatenate([[0], order + 1]).astype(np.int32)
+        self._history[:, s] = given[self._history[:, s]]
         offsets = (len(batch), len(batch) + len(pairs.track))
         # no branch gains more than this
         most = np.full(len(batch), self.terms.miss[s])

@@ -14,16 +14,21 @@ MOST_SCANS = 1000
 
 
 @njit
-def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
-    """Rows of the best branches of each tree, ordered by tree, then score.
+def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) -> Array:
+    """Rows of the branches that matter to good global hypotheses, ordered by tree, then loss.
+
+    A tree of which every branch costs the best global hypothesis more than `drop` ends: others explain its
+    measurements so much better. What a tree in the making lacks in score of its own does not count here.
 
     Parameters
     ----------
     tree, score : arrays (B,)
+    loss : array (B,)
+        What each branch costs the best global hypothesis; see `assoc.tracking.mht.losses`.
     most : int
         The most branches of a tree.
     drop : float
-        Branches further than this below their tree's best are cut.
+        Branches with a greater loss are cut.
     """
     order = np.argsort(tree, kind="mergesort")
     kept = np.empty(order.size, np.int64)
@@ -33,9 +38,10 @@ def keep_best(tree: Array, score: Array, most: int, drop: float) -> Array:
         while end < order.size and tree[order[end]] == tree[order[begin]]:
             end += 1
         group = order[begin:end]
-        group = group[np.argsort(-score[group], kind="mergesort")]
+        group = group[np.argsort(loss[group], kind="mergesort")]
+        limit = drop + max(0.0, -score[group].max())
         for rank in range(min(most, group.size)):
-            if score[group[rank]] >= score[group[0]] - drop:
+            if loss[group[rank]] <= limit:
                 kept[count] = group[rank]
                 count += 1
         begin = end

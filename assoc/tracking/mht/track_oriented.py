@@ -3,7 +3,9 @@
 Every measurement may start a tree; every branch grows by each measurement in its gate and by a miss. The best
 global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
 an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
-of the oldest scan of the window is then final (N-scan pruning).
+of the oldest scan of the window is then final (N-scan pruning). After each sensor the branches are cut by what
+they cost the best global hypothesis (`assoc.tracking.mht.losses`), not by their tree's own scores: of close targets
+the best branches of one tree may all want measurements that the others need more.
 
 References
 ----------
@@ -47,7 +49,8 @@ class TrackOrientedMHT(Tracker):
     max_branches : int
         The most branches of a tree.
     branch_drop : float
-        A branch whose score is this far below its tree's best is cut.
+        A branch is cut if every global hypothesis that contains it scores this much less than the best one. Of
+        more than `max_branches` those stay that cost the best hypothesis least.
     **options
         As for `Tracker`.
     """

@@ -1,0 +1,70 @@
+"""What a tracker asks of the measurements that it is given, before anything is done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.sensors import Sensor
+from assoc.sensors.base import ANGLES, finite_array
+
+# noise may carry a range this many standard deviations below 0
+_NOISE = 10.0
+# metres, radians, m/s: what is beyond them is no measurement, and would leave no digits in what follows
+_LENGTH, _ANGLE, _SPEED = 1e9, 1e3, 3e8
+
+
+def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor]) -> list[Array]:
+    """Measurements as float64 arrays (n_s, d_s), all of which their sensors can have made.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the sensor and the measurement, and says what was expected.
+    """
+    known = isinstance(measurements, (list, tuple)) or (isinstance(measurements, np.ndarray) and measurements.ndim > 0)
+    if not known:
+        raise InvalidInputError(
+            f"measurements must be one array for each of {len(sensors)} sensors, got {type(measurements).__name__}"
+        )
+    if len(measurements) != len(sensors):
+        raise InvalidInputError(
+            f"measurements of {len(measurements)} sensors, expected {len(sensors)} (one array for each)"
+        )
+    return [_checked(z, s, sensor) for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True))]
+
+
+def _checked(z: Array, s: int, sensor: Sensor) -> Array:
+    what = f"measurements of sensor {s}"
+    if z is None:
+        raise InvalidInputError(f"{what} must be an array of shape (n, {sensor.dim}), got None; n may be 0")
+    try:
+        empty, count = np.size(z) == 0, len(z) if np.ndim(z) else 0
+    except ValueError:
+        expected = f"{what} must be an array of shape (n, {sensor.dim})"
+        raise InvalidInputError(f"{expected}, got rows of several lengths") from None
+    array = finite_array(np.zeros((0, sensor.dim)) if empty else z, what, (0 if empty else count, sensor.dim))
+    for axis in range(sensor.dim):
+        low, high, expected = _limits(sensor, axis)
+        wrong = (array[:, axis] < low) | (array[:, axis] > high)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            name, value = sensor.components[axis], array[row, axis]
+            raise InvalidInputError(f"measurement {row} of sensor {s}: {name} must be {expected}, got {value:g}")
+    return array
+
+
+def _limits(sensor: Sensor, axis: int) -> tuple[float, float, str]:
+    """Least and largest value of a component, and what to call them."""
+    name = sensor.components[axis] if axis < len(sensor.components) else ""
+    if name in ANGLES:
+        return -_ANGLE, _ANGLE, f"radians within +-{_ANGLE:g}"
+    if name == "range rate":
+        return -_SPEED, _SPEED, f"m/s within +-{_SPEED:g}"
+    if name == "range":
+        low = -_NOISE * float(np.sqrt(sensor.covariance[axis, axis]))
+        return low, _LENGTH, f"metres from 0 (less its noise: {low:g}) to {_LENGTH:g}"
+    return -_LENGTH, _LENGTH, f"metres within +-{_LENGTH:g}"

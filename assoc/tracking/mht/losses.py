@@ -1,0 +1,136 @@
+"""What it costs the best global hypothesis to contain a branch: the measure by which track trees are cut.
+
+A global hypothesis takes at most one branch of each tree and each measurement at most once. The score of the
+best one that contains a given branch is the branch's max-marginal; how far it lies below the best of all is
+the branch's loss. By linear programming duality the loss is at least the branch's reduced cost
+
+    loss >= sum of the prices of the trees and measurements that the branch uses - its score  (>= 0),
+
+up to the gap between the best hypothesis and the bound, which is mostly none. Prices are the multipliers of the
+assignment problem's constraints (`assoc.packing.bounds.dual_ascent`): a measurement that several trees want is dear,
+one that a single tree wants costs nothing. So a branch that is good for its own tree, but only with measurements that
+others need more, is known for what it is, and a tree keeps a branch that leaves them alone.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc.packing.bounds.dual_ascent import SmoothPoint, fill_reduced, hard_sweeps, smooth_passes
+from assoc.packing.packing import PackingArrays, assembled
+
+# temperatures of the smoothed ascent, in nats: losses are needed to a fraction of the limits they are held against
+_HOTTEST, _LEVELS, _PASSES = 4.0, 5, 15
+
+
+@njit
+def losses(tree: Any, score: Any, history: Any) -> Any:
+    """Bound from below what each branch costs the best global hypothesis that must contain it.
+
+    Parameters
+    ----------
+    tree : int64 array (B,)
+        Tree of each branch.
+    score : array (B,)
+        Log likelihood ratios; a tree without a branch in a hypothesis scores 0.
+    history : int32 array (B, C)
+        Measurements of each branch by column, 1-based, 0: missed.
+
+    Returns
+    -------
+    array (B,)
+        Losses, 0 or more, up to rounding.
+    """
+    number, trees = _numbered(tree)
+    columns = history.shape[1]
+    first = np.zeros(columns + 1, np.int64)
+    for c in range(columns):
+        top = 0
+        for b in range(tree.size):
+            top = max(top, history[b, c])
+        first[c + 1] = first[c] + top
+    # only measurements that several trees want have a price, and only the trees that want them a say in it
+    holder = np.full(first[columns], -1, np.int64)
+    contested = np.zeros(first[columns], np.bool_)
+    for b in range(tree.size):
+        if score[b] > 0.0:
+            for c in range(columns):
+                if history[b, c] > 0:
+                    m = first[c] + history[b, c] - 1
+                    contested[m] = contested[m] or (holder[m] >= 0 and holder[m] != number[b])
+                    holder[m] = number[b]
+    price = np.zeros(trees + first[columns])
+    involved = np.zeros(trees, np.bool_)
+    for b in range(tree.size):
+        if score[b] > 0.0:
+            price[number[b]] = min(price[number[b]], -score[b])
+            for c in range(columns):
+                if history[b, c] > 0 and contested[first[c] + history[b, c] - 1]:
+                    involved[number[b]] = True
+    if involved.any():
+        _price(number, score, history, first, contested, involved, price)
+    loss = np.empty(tree.size)
+    for b in range(tree.size):
+        loss[b] = -score[b] - price[number[b]]
+        for c in range(columns):
+            if history[b, c] > 0:
+                loss[b] -= price[trees + first[c] + history[b, c] - 1]
+    return loss
+
+
+@njit
+def _numbered(tree: Any) -> Any:
+    """Number the trees from 0; also how many there are."""
+    order = np.argsort(tree, kind="mergesort")
+    number = np.empty(tree.size, np.int64)
+    trees = 0
+    for k in range(tree.size):
+        if k > 0 and tree[order[k]] != tree[order[k - 1]]:
+            trees += 1
+        number[order[k]] = trees
+    return number, trees + (1 if tree.size else 0)
+
+
+@njit
+def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, involved: Any, price: Any) -> None:
+    """Fill in the prices (all <= 0, as costs) of the trees involved and of the contested measurements."""
+    trees, columns = involved.size, history.shape[1]
+    wanted = np.zeros(score.size, np.bool_)
+    count = 0
+    for b in range(score.size):
+        wanted[b] = score[b] > 0.0 and involved[number[b]]
+        count += wanted[b]
+    rows = np.full((count, 1 + columns), -1, np.int32)
+    weights = np.empty(count)
+    k = 0
+    for b in range(score.size):
+        if wanted[b]:
+            rows[k, 0] = number[b]
+            weights[k] = -score[b]
+            for c in range(columns):
+                if history[b, c] > 0:
+                    m = first[c] + history[b, c] - 1
+                    if contested[m]:
+                        rows[k, 1 + c] = trees + m
+            k += 1
+    slack = np.ones(price.size, np.bool_)
+    cols, costs, free, col_start, row_start, row_ptr, row_cols, _, row_origin = assembled(
+        rows, weights, slack, np.arange(count).astype(np.int32)
+    )
+    packing = PackingArrays(cols, costs, free, col_start, row_start, row_ptr, row_cols)
+    duals, reduced = np.zeros(free.size), np.empty(count)
+    point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
+    # trees come first in every component: they take what their best branches score, and the rest is differences
+    fill_reduced(packing, duals, reduced)
+    hard_sweeps(packing, duals, reduced, 1)
+    temperature = np.full(col_start.size - 1, _HOTTEST)
+    for _ in range(_LEVELS):
+        smooth_passes(packing, point, temperature, _PASSES, np.inf)
+        temperature *= 0.5
+    fill_reduced(packing, duals, reduced)
+    hard_sweeps(packing, duals, reduced, 2)
+    for r in range(free.size):
+        price[row_origin[r]] = min(duals[r], 0.0)

@@ -1,0 +1,75 @@
+"""A tracker that is told which measurement is whose: what no tracker with the same filter can beat by association."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.scene import Scene
+from assoc.scene.scan import Scan
+from assoc.tracking import Step
+from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
+
+
+class OracleTracker(SingleScanTracker):
+    """Tracks by the sources of the measurements, with the filter and the life of tracks of any other tracker.
+
+    Parameters
+    ----------
+    scene : Scene
+        With truth.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "oracle"
+
+    def __init__(self, scene: Scene, **options: Any) -> None:
+        super().__init__(scene.sensors, region=scene.region, **options)
+        assert scene.truth is not None and scene.truth.sources is not None
+        self._sources = scene.truth.sources
+        self._target_of: dict[int, int] = {}
+
+    def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
+        """Take one scan in; see `Tracker.step`."""
+        sources = self._sources[self._scan]
+        step = super().step(time, measurements, times)
+        for source, ids in zip(sources, step.assigned, strict=True):
+            self._target_of |= {i: t for i, t in zip(ids.tolist(), source.tolist(), strict=True) if i}
+        return step
+
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
+        sources = self._sources[scan.index]
+        known = [self._target_of[i] for i in self._batch.track_id.tolist()]
+        rows = _rows(sources, known)
+        fresh = sorted({t for source in sources for t in source.tolist() if t >= 0} - set(known))
+        gain = np.full(len(known), float(self.terms.miss.sum()))
+        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
+            seen = np.flatnonzero(rows[:, s])
+            if not len(seen):
+                continue
+            done = self.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
+            gain[seen] += done.log_likelihood + self.terms.detection[s] - self.terms.miss[s]
+            states = _with(states, seen, done.state)
+        return ScanOutcome(states, gain, rows, _rows(sources, fresh))
+
+
+def _rows(sources: Sequence[Array], targets: Sequence[int]) -> Array:
+    """1-based measurements (T, S) of these targets, 0 where missed."""
+    rows = np.zeros((len(targets), len(sources)), dtype=np.int32)
+    for s, source in enumerate(sources):
+        number = {t: m + 1 for m, t in enumerate(source.tolist()) if t >= 0}
+        rows[:, s] = [number.get(t, 0) for t in targets]
+    return rows
+
+
+def _with(states: Any, rows: Array, corrected: Any) -> Any:
+    """The states, those in `rows` replaced."""
+    from assoc.filters.batches import concatenate
+
+    rest = np.setdiff1d(np.arange(len(states)), rows)
+    back = np.argsort(np.concatenate([rows, rest]), kind="stable")
+    return concatenate([corrected, states[rest]])[back]
