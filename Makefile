@@ -20,7 +20,7 @@ OLDEST := .venv-oldest
 # tests with much behind them that are quick without a compiler
 UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tests/simulation/test_observation.py \
 	tests/solvers/test_reduction.py tests/packing/test_matching.py tests/packing/test_dimensionwise.py \
-	"tests/solvers/test_against_brute_force.py::test_small_problems[exact]" tests/tracking/test_multi_sensor.py
+	"tests/solvers/test_against_brute_force.py::test_small_problems[1.0-exact]" tests/tracking/test_multi_sensor.py
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
