@@ -187,6 +187,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         """Probability that a target in mode i is in mode j dt seconds later, (m, m)."""
         known = self._known.get(dt)
         if known is None:
+            dt = positive(dt, "dt", zero=True)
             if len(self._known) > _MOST_STEPS:
                 self._known = {self.interval: self.transition}
             known = self._known[dt] = expm(self.rates * dt)

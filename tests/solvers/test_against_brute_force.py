@@ -74,7 +74,8 @@ def test_small_problems(share, name):
         check(problem, solution, optimum)
         if name in PROVING:
             assert solution.status == "optimal"
-    assert infeasible > 0
+    # the first of them is the sixty-fourth problem
+    assert infeasible > 0 or count < 64
 
 
 @pytest.mark.parametrize("name", [name for name in installed() if name != "greedy"])
