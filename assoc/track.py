@@ -11,11 +11,21 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_outputs
+from assoc._cli.imports import HELP as IMPORT_HELP
+from assoc._cli.imports import import_modules
+from assoc._cli.inputs import check_ending, check_outputs
 from assoc._cli.lines import print_lines
-from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
-from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.options import (
+    add_common_options,
+    common_values,
+    flag_of,
+    flags_of_solvers,
+    parameter_values,
+    read_first,
+)
+from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
+from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, seconds, whole_number
 from assoc._parameters import Option, options
 from assoc._system.compile_time import compile_seconds
@@ -49,6 +59,9 @@ _RADAR = {
     "range_noise": ("range_noise", 1.0),
     "bearing_noise": ("azimuth_noise", math.pi / 180.0),
 }
+FORMATS = {".csv": "to_csv", ".parquet": "to_parquet"}
+"""Endings of the output, and which method of the table writes it."""
+
 GOSPA_CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
@@ -58,6 +71,12 @@ further options (docs/tracking.md):
   solver parameters  described by: python -m assoc.solve --solver NAME --help"""
 
 
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as a process of its own."""
+    prepare_process("assoc.track")
+    return main(arguments)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -65,29 +84,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _track(words: list[str]) -> None:
-    solver = read_first("assoc.track", words, ["solver"])["solver"] or "exact"
+    first = read_first("assoc.track", words, ["solver", "import"])
+    import_modules(first["import"])
+    solver = first["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
         _parser([]).parse_args(words)
-    from assoc.solvers import registry
     from assoc.tracking import Initiation, LifeCycle
 
-    own = options(registry.parameters(solver))
-    cycle, start = options(LifeCycle), [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
-    for one in start:
-        one.kind = float
-    parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
-    file = parsed["file"]
-    check_outputs([parsed["output"], parsed["report"]], [file])
+    own, cycle, initiation = _further(solver)
+    parser = _parser([*own, *cycle, *initiation])
+    parser.elsewhere = lambda: flags_of_solvers(solver)
+    parsed = vars(parser.parse_args(words))
+    ending = check_ending(parsed["output"], "--output", *FORMATS)
+    check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
+    check_outputs([parsed["output"], parsed["report"]], [parsed["file"]])
+    if ending == ".parquet":
+        check_extra("pyarrow", "parquet")
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
         "solver": solver,
         "solver_parameters": parameter_values(own, parsed),
         "life_cycle": LifeCycle(**parameter_values(cycle, parsed)),
-        "initiation": Initiation(**parameter_values(start, parsed)),
+        "initiation": Initiation(**parameter_values(initiation, parsed)),
         **common_values(parsed),
     }
+    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"]]):
+        _make_tracks(words, parsed, settings, ending)
+
+
+def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, Any], ending: str) -> None:
+    file = parsed["file"]
     started, compiled = time.perf_counter(), compile_seconds()
     if _is_npz(file):
         if parsed["window"] is not None:
@@ -102,15 +130,26 @@ def _track(words: list[str]) -> None:
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
+            used = {"tracker": tracker.name, "solver": tracker.solver, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
     write_all(
-        lambda: table.to_csv(parsed["output"]),
+        lambda: getattr(table, FORMATS[ending])(parsed["output"]),
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
     )
+
+
+def _further(solver: str) -> tuple[list[Option], list[Option], list[Option]]:
+    """Parameters of the solver, the life cycle of tracks, and their initiation."""
+    from assoc.solvers import registry
+    from assoc.tracking import Initiation, LifeCycle
+
+    initiation = [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
+    for one in initiation:
+        one.kind = float
+    return options(registry.parameters(solver)), options(LifeCycle), initiation
 
 
 def _field(owner: Any, name: str) -> Any:
@@ -119,17 +158,26 @@ def _field(owner: Any, name: str) -> Any:
     return next(one for one in fields(owner) if one.name == name)
 
 
+def completions() -> dict[str, Sequence[str]]:
+    """Options of the program with the values they take, for shells."""
+    from assoc.solvers import registry
+    from assoc.tracking.filter_choice import FILTERS
+
+    values = {"--tracker": [*TRACKERS], "--filter": [*FILTERS], "--window": WINDOWS, "--solver": registry.names()}
+    return {**_parser([option for group in _further("exact") for option in group]).flags(), **values}
+
+
 def _parser(further: Sequence[Option]) -> Parser:
     lines = [f"  {name:<18} {purpose}" for name, purpose in TRACKERS.items()]
     parser = Parser(
         prog="assoc.track",
-        usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
+        usage=f"{command('track')} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
         description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv)")
+    add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv or .parquet)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
     add("--tracker", metavar="NAME", help="name of the tracker, see below")
     add("--solver", metavar="NAME", help="name of the solver (default exact)")
@@ -144,6 +192,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    add("--import", metavar="MODULE", help=IMPORT_HELP)
+    add_speech_options(parser, "what the solver does in each scan")
     plots = parser.add_argument_group("options for plots")
     plots.add_argument(
         "--window",
@@ -207,7 +257,7 @@ def _of_scene(
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
-    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
     table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     return scene.num_scans, tracker, table, scene
 
@@ -241,7 +291,7 @@ def _of_plots(
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     table = TrackTable()
-    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
+    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])):
         tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
         table.add(tracks, tracker.filter.motion.position)
     return len(windows), tracker, table, None
@@ -269,5 +319,4 @@ def _report(
 
 
 if __name__ == "__main__":
-    prepare_process("assoc.track")
-    raise SystemExit(main())
+    raise SystemExit(start())

@@ -78,7 +78,7 @@ def assign(
         if solver != "greedy":
             prepare_fallback(packing, run)
         try:
-            outcome = solve(packing, chosen, run)
+            outcome = _checked(solve(packing, chosen, run), solver)
         except InfeasibleError:
             if run.fallback is None:
                 raise
@@ -86,6 +86,19 @@ def assign(
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
         return certify(problem, prepared, outcome, run, solver, chosen)
+
+
+def _checked(outcome: object, solver: str) -> Outcome:
+    """Refuse what is no outcome: solvers may be anybody's."""
+    if not isinstance(outcome, Outcome):
+        raise InvalidInputError(f"solver {solver!r}: expected it to return an Outcome, got {type(outcome).__name__}")
+    columns = np.asarray(outcome.columns)
+    if columns.ndim != 1 or not (columns.size == 0 or np.issubdtype(columns.dtype, np.integer)):
+        raise InvalidInputError(
+            f"solver {solver!r}: expected the columns of its Outcome to be a list of whole numbers, got an array of "
+            f"shape {columns.shape} and type {columns.dtype}"
+        )
+    return outcome
 
 
 def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
