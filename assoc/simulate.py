@@ -60,12 +60,12 @@ def _simulate(words: list[str]) -> None:
 
     choices = options(simulation.parameters(scenario))
     parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
-    check_ending(parsed["output"], "--output", ".csv" if scenario in _PLOTS else ".npz")
-    check_ending(parsed.get("truth"), "--truth", ".csv")
     seed = common_values(parsed).get("seed", 0)
     values = parameter_values(choices, parsed)
     inputs = [value for value in values.values() if isinstance(value, str)]
     check_outputs([parsed["output"], parsed.get("truth")], inputs)
+    check_ending(parsed["output"], "--output", ".csv" if scenario in _PLOTS else ".npz")
+    check_ending(parsed.get("truth"), "--truth", ".csv")
     with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed.get("truth")]):
         if parsed["verbose"]:
             used = {"seed": seed} | {option.name: values.get(option.name, option.default) for option in choices}

@@ -70,9 +70,9 @@ def _solve(words: list[str]) -> None:
     if "kbest" in settings and (explicit or parameters):
         raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
     files = parsed["files"]
+    check_outputs([parsed["json"], parsed["csv"], parsed["report"]], [*files, parsed["config"]])
     for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
         check_ending(parsed[option], flag_of(option), *endings, strict=False)
-    check_outputs([parsed["json"], parsed["csv"], parsed["report"]], [*files, parsed["config"]])
     if parsed["report"]:
         check_extra("plotly", "report")
 

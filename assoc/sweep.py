@@ -55,8 +55,6 @@ def _sweep(words: list[str]) -> None:
     parsed = vars(_parser().parse_args(words))
     speech = {name: parsed.pop(name) for name in ("quiet", "verbose", "import")}
     given = {name: value for name, value in parsed.items() if value is not None}
-    check_ending(given.get("csv"), "--csv", ".csv", strict=False)
-    check_ending(given.get("report"), "--report", ".html", ".htm", strict=False)
     for option, package, extra in _EXTRAS:
         if option in given:
             check_extra(package, extra)
@@ -74,6 +72,7 @@ def _run(given: dict[str, Any], speech: dict[str, Any]) -> None:
     options = read_options(given)
     inputs = [*options.values["files"], options.config]
     check_study_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
+    _check_endings(given)
     if options.tune is not None:
         _tune(options, given, speech)
         return
@@ -135,6 +134,11 @@ def _parser() -> Parser:
     return parser
 
 
+def _check_endings(given: dict[str, Any]) -> None:
+    check_ending(given.get("csv"), "--csv", ".csv", strict=False)
+    check_ending(given.get("report"), "--report", ".html", ".htm", strict=False)
+
+
 def _summary(given: dict[str, Any]) -> None:
     strange = sorted({*given} - {"summary", "csv", "plot", "report", "all", "words", "files"})
     if strange or given["files"]:
@@ -145,6 +149,7 @@ def _summary(given: dict[str, Any]) -> None:
     from assoc._cli.sweep_options import check_study_outputs
 
     check_study_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
+    _check_endings(given)
     _report(given["summary"], given, None)
 
 

@@ -27,7 +27,8 @@ from assoc._cli.program import Parser, command, prepare_process, run_program, wr
 from assoc._cli.progress import with_progress
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, seconds, whole_number
-from assoc._parameters import Option, options
+from assoc._files.output import STDOUT
+from assoc._parameters import Option, options, positive
 from assoc._system.compile_time import compile_seconds
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
@@ -62,7 +63,7 @@ _RADAR = {
 FORMATS = {".csv": "to_csv", ".parquet": "to_parquet"}
 """Endings of the output, and which method of the table writes it."""
 
-GOSPA_CUTOFF = 1_000.0
+CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
   track life cycle   --confirmation --false-probability --missed-probability --m --n \
@@ -96,9 +97,11 @@ def _track(words: list[str]) -> None:
     parser = _parser([*own, *cycle, *initiation])
     parser.elsewhere = lambda: flags_of_solvers(solver)
     parsed = vars(parser.parse_args(words))
+    given = parsed["cutoff"]
+    parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
+    check_outputs([parsed["output"], parsed["report"]], [parsed["file"]])
     ending = check_ending(parsed["output"], "--output", *FORMATS)
     check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
-    check_outputs([parsed["output"], parsed["report"]], [parsed["file"]])
     if ending == ".parquet":
         check_extra("pyarrow", "parquet")
     if parsed["report"]:
@@ -131,13 +134,14 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
             from assoc.plotting.report import write_tracking_report
 
             used = {"tracker": tracker.name, "solver": tracker.solver, "filter": parsed["filter"], "scans": count}
-            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": parsed["cutoff"], "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
     write_all(
         lambda: getattr(table, FORMATS[ending])(parsed["output"]),
         write_report,
-        lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
+        lambda: _report(parsed["output"], count, tracker, table, elapsed, compiling),
+        lambda: _compare(scene, table, parsed["cutoff"]),
     )
 
 
@@ -188,6 +192,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     )
     add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
+    text = f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})"
+    add("--cutoff", metavar="M", help=text)
     add("--all", action="store_true", help="also write tentative tracks")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
@@ -224,7 +230,6 @@ def _is_npz(file: str) -> bool:
 def _make(
     name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
 ) -> Tracker:
-    from assoc._parameters import positive
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
 
@@ -298,20 +303,25 @@ def _of_plots(
 
 
 def _report(
-    output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float, compiling: float
+    output: str, count: int, tracker: Tracker, table: TrackTable, elapsed: float, compiling: float
 ) -> None:
     _, ids, _ = table.arrays()
-    print_lines(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
+    name = "stdout" if output == STDOUT else printable(output)
+    print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {tracker.solver}: {spent}")
+
+
+def _compare(scene: Scene | None, table: TrackTable, cutoff: float) -> None:
+    """Print the metrics if the truth is known."""
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise
 
-    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), GOSPA_CUTOFF)
+    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), cutoff)
     print_lines(
-        f"against the truth (cutoff {GOSPA_CUTOFF:g} m): GOSPA {found.gospa:.4g} m "
+        f"against the truth (cutoff {cutoff:g} m): root mean square GOSPA {found.gospa:.4g} m "
         f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
         f"false {found.gospa_false:.4g}), "
         f"{found.identity.switches} identity switches"

@@ -6,7 +6,6 @@ imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the funct
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from functools import cache

@@ -147,6 +147,12 @@ class Component(Priced):
         cover.improve(self.deadline)
         self.offer(cover.owner, cover.weight)
 
+    def offer_start(self, run: Run) -> None:
+        """Offer what the run's start chooses of this component."""
+        if run.start is not None:
+            cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.origin, run.start)))
+            self.offer(cover.owner, cover.weight)
+
     def improve(
         self, owner: Owner, rng: np.random.Generator, clusters: int, moves: Sequence[Move] = NEIGHBOURHOODS
     ) -> float:

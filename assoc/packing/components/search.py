@@ -64,6 +64,7 @@ def search_components(
     deadline = run.deadline()
     for component in components:
         component.deadline = deadline
+        component.offer_start(run)
         component.offer_greedy()
         if not component.closed and not share.should_stop():
             component.sharpen(share)

@@ -12,7 +12,7 @@ import numpy as np
 from assoc._text.html import escape
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.metrics import Gospa, Trajectories, gospa_over_time
+from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.plotting.places import places
 from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
@@ -236,10 +236,11 @@ def _summary(frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: f
         whole = float(frame["time"].max() - frame["time"].min())
         content["Median life"] = (f"{middle:.4g} s", f"of {whole:.4g} s")
     if values:
-        mean = float(np.mean([one.distance for one in values]))
-        content["GOSPA"] = (f"{mean:.4g} m", f"mean over {len(values)} instants, cutoff {cutoff:g} m")
+        mean = mean_gospa(values)
+        content["GOSPA"] = (
+            f"{mean['distance']:.4g} m", f"root mean square of {len(values)} instants, cutoff {cutoff:g} m"
+        )
         notes = {"localisation": "errors of tracks", "missed": "targets without a track", "false": "tracks of nothing"}
         for part, note in notes.items():
-            value = float(np.mean([getattr(one, part) for one in values])) ** 0.5
-            content[part.capitalize()] = (f"{value:.4g} m", f"part of GOSPA: {note}")
+            content[part.capitalize()] = (f"{mean[part]:.4g} m", f"part of GOSPA: {note}")
     return cards(content)
