@@ -14,9 +14,9 @@ from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
-from assoc.costs.positions import scan_of
+from assoc.costs.positions import scan_of, tuple_costs
 from assoc.costs.range_rates import SPEED, range_rates
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -33,6 +33,7 @@ def build_problem(
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
+    all_tuples: bool = False,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -59,6 +60,9 @@ def build_problem(
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
         against; without a sensor that measures range rate it has no effect.
+    all_tuples : bool
+        Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
+        papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def build_problem(
     Raises
     ------
     LimitExceededError
-        There are more candidates than `max_tuples`; the message estimates how many.
+        There are more tuples than `max_tuples`; the message says how many, or estimates it.
     InvalidInputError
         An argument is out of range.
 
@@ -84,6 +88,8 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if all_tuples:
+        return _whole_grid(scene, one, int(max_tuples), speed)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
@@ -94,6 +100,18 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def _whole_grid(scene: Scene, one: Scan, most: int, speed: float | Sequence[float]) -> AssignmentProblem:
+    shape = [int(size) + 1 for size in one.sizes]
+    count = math.prod(shape) - 1
+    if count > most:
+        raise LimitExceededError(
+            f"scan {one.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
+        )
+    # the first of the grid is the tuple without measurements, which no problem has
+    tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
+    return AssignmentProblem(tuples, tuple_costs(scene, one, tuples, speed=speed), one.sizes)
 
 
 _known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.common.claims import load_json
-from experiments.papers import ant_colony as experiment
+from experiments.papers.ant_colony import __main__ as experiment
 
 
 def measured(cycles):
@@ -70,9 +70,9 @@ def test_a_small_run(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "288 runs (3 scans, 2 seeds)" in out and "Table 1 and its conclusions" in out
     content = json.loads((tmp_path / "c.json").read_text())
-    assert (content["format"], content["experiment"], content["seed"]) == ("assoc.claims", "aco_parameters", 0)
+    assert (content["format"], content["experiment"], content["seed"]) == ("assoc.claims", "papers.ant_colony", 0)
     claims = load_json(tmp_path / "c.json")
     assert sum("mode paper: mean cycles to convergence" in claim.quantity for claim in claims) == 24
-    for name in ("settings.csv", "claims.csv", "claims.json", "table_1.png"):
+    for name in ("settings.csv", "claims.csv", "claims.json", "table_1.png", "figure_3.png"):
         assert (tmp_path / "o" / name).stat().st_size > 500
     assert (tmp_path / "o" / "table_1.png").read_bytes().startswith(b"\x89PNG")
