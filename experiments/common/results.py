@@ -51,6 +51,8 @@ class Results:
 
 def number(value: float, digits: int = 3) -> str:
     """A number with at least so many significant digits, thousands with commas."""
+    if abs(value) < 1e-12:
+        value = 0.0
     size = abs(value)
     if size and (size < 1e-4 or size >= 1e7):
         return f"{value:.{digits - 1}e}"

@@ -47,6 +47,12 @@ def verdict(*claims: Claim) -> str:
     return NOT if good == 0 else f"holds in {good} of {judged}"
 
 
+def interval(claim: Claim) -> str:
+    """The interval of a claim in words."""
+    low, high = claim.interval or (claim.ours, claim.ours)
+    return f"95 % interval {number(low, 2)} to {number(high, 2)}"
+
+
 def test(path: str) -> str:
     """The command that runs a test file."""
     return f"`pytest {path}`"
@@ -76,6 +82,7 @@ def ant_colony() -> str:
     seen = r.starting("truth, mode paper: targets seen by 2")[0]
     greedy = r.starting("truth, greedy: scans of")[0]
     paper_solved = r.starting("truth, mode paper: scans of")[0]
+    grid = r["reading, all tuples of the grid are nodes: mean cycles"]
     return rendered([
         Row("equations 1 to 3, likelihoods and cost", "assoc/costs/", f"{HOLDS}, with clutter density r / V", costs),
         Row("equation 4, position of greatest likelihood", "assoc/costs/estimation.py", HOLDS, costs),
@@ -97,9 +104,11 @@ def ant_colony() -> str:
         Row("figure 3, measurements selected", TRUTH, "drawn", command),
         Row("table 1, mean cycles", TABLE_1,
             f"{verdict(*settings)}: {number(cycles.ours)} against {number(cycles.paper or 0.0)}; "
-            "[readings](sweeps.md) of what is left open do not explain it", command),
+            f"nearest of the [readings](sweeps.md) of what is left open: {number(grid.ours)}, all tuples as nodes",
+            command),
         Row("alpha > beta is quicker", TABLE_1,
-            f"{verdict(greater)}: {number(greater.ours, 2)} cycles, the interval holds 0", command),
+            f"{verdict(greater)}: {number(greater.ours, 2)} cycles, {interval(greater)}; from alpha = 1 alone",
+            command),
         Row("alpha > beta finds better solutions", TABLE_1,
             f"{verdict(better)}: all settings find the optimum of every scan; so does greedy on "
             f"{greedy.ours:.0f} of 100", command),
@@ -156,13 +165,13 @@ def clustering_time_window() -> str:
             f"{HOLDS} with N_d the targets detected, not the measurements", mht),
         Row("section 2.2.6, pruning, deletion after n misses", "assoc/tracking/life_cycle.py",
             f"{HOLDS}; n is not given, 3 chosen by us", mht),
-        Row("figures 3.1 to 3.4, courses of the work", "assoc/track.py", "the program follows 3.2 to 3.4",
+        Row("figures 3.1 to 3.4, courses of the work", "assoc/track.py", "the program follows them",
             test("tests/programs/test_track.py")),
         Row("equations 3.1 and 3.2, positions", TABLES_PROGRAM,
             f"{NOT}: {number(grid.ours)} % of the positions are x = 5/7 r sin b, y = -5/7 r cos b, in pixels",
             rebuild),
         Row("equations 3.3 to 3.6, distance and speed", "assoc/tracking/track_table.py",
-            "3.6 divides by a time where a difference is meant; the program gives the filter's speed",
+            "equation 3.6 divides by a time where a difference is meant; the program gives the filter's speed",
             test("tests/programs/test_track.py")),
         Row("equations 3.7 and 3.8, heading", TABLES_PROGRAM,
             f"{verdict(heading)}: {number(heading.ours, 2)} % of the printed headings", rebuild),
@@ -230,22 +239,23 @@ def modified_ekf() -> str:
                 f"{number(claims[0].paper or 0.0)}, {number(claims[1].paper or 0.0)}", command)
         )  # fmt: skip
     return rendered([
-        Row("figure 2.1, equations 2.1 to 2.6, coordinates", "assoc/sensors/", f"{HOLDS}; 2.2 prints x / y",
+        Row("figure 2.1, equations 2.1 to 2.6, coordinates", "assoc/sensors/", f"{HOLDS}; equation 2.2 prints x / y",
             sensors),
         Row("equations 2.7 to 2.13, derivatives", UNIT_RATES, HOLDS, model),
         Row("tables 2.1 and 2.2, equations 2.14 and 2.15, Kalman filter and EKF", "assoc/filters/kalman.py",
-            f"{HOLDS}; the covariance of 2.2 is A P A', not A P + P A'", filters),
+            f"{HOLDS}; the covariance of table 2.2 is A P A', not A P + P A'", filters),
         Row("equations 2.16 to 2.24, debiased measurements", "assoc/filters/kernels/gaussian.py",
-            f"{HOLDS} against a million samples, corrected: 2.17 row 3, 2.19, sigma_theta^4 in R_c", modified),
+            f"{HOLDS} against a million samples, corrected: equation 2.17 row 3, equation 2.19, sigma_theta^4 in R_c",
+            modified),
         Row("equations 2.25 and 2.26, h and H", "assoc/sensors/", f"{HOLDS}; H21 is -y / (x^2 + y^2)", sensors),
         Row("equation 2.27, J", "assoc/filters/kernels/gaussian.py", f"{HOLDS}, corrected in J12 and J23", modified),
         Row("equations 2.28 and 2.29, R_p", "assoc/filters/modified_ekf.py", f"{HOLDS}; the last entry is sigma_phi^2",
             modified),
         Row("equations 2.30 to 2.32, table 2.3, mean and correction", "assoc/filters/modified_ekf.py",
-            f"{HOLDS}; 2.32 lacks 1/2 and the tildes", modified),
+            f"{HOLDS}; equation 2.32 lacks 1/2 and the tildes", modified),
         Row("figures 3.1 to 3.3, courses of the work", "assoc/filters/modified_ekf.py", "followed", modified),
         Row("equations 4.1 to 4.12, the model", UNIT_RATES,
-            f"{HOLDS}; 4.4 prints a term twice", model),
+            f"{HOLDS}; equation 4.4 prints a term twice", model),
         Row("equations 4.13 to 4.15, forward difference and noise", UNIT_RATES, HOLDS, model),
         Row("section 4.2, Jacobian A", UNIT_RATES,
             f"{HOLDS} with dt: the rows of the velocities print dt^2", model),
@@ -269,7 +279,7 @@ def modified_ekf() -> str:
         Row("conclusion 1, the model", UNIT_RATES, HOLDS, model),
         Row("conclusion 2, the modified EKF is better", "experiments/papers/modified_ekf/__main__.py",
             f"{NOT} in the paper's setting; on B1, chosen by us: {verdict(*b1)}", command),
-        Row("conclusion 3, time of 4.577 s", "", f"{ABSENT}: of a machine that is not described", ""),
+        Row("conclusion 3, time of computation", "", f"{ABSENT}: of a machine that is not described", ""),
     ])  # fmt: skip
 
 
@@ -296,22 +306,23 @@ def fuzzy_ekf() -> str:
         Row("figure 1, course of the estimator", "assoc/filters/fuzzy/filter.py", "followed", fuzzy),
         Row("equations 1 to 5, model of constant acceleration", "assoc/filters/motion/models.py",
             f"{HOLDS}; rows 5 and 8 of F are wrong in print", filters),
-        Row("equations 6 and 7, H and R of positions", "assoc/filters/measurement.py", f"{HOLDS}; H is 3 x 9", filters),
+        Row("equations 6 and 7, H and R of positions", "assoc/filters/measurement.py", f"{HOLDS}; H is `3 x 9`",
+            filters),
         Row("figure 2, equations 8 to 12, radar", "assoc/sensors/", HOLDS, sensors),
-        Row("equations 13 to 31, EKF", "assoc/filters/kalman.py", f"{HOLDS}; 22 needs G Q G'", filters),
+        Row("equations 13 to 31, EKF", "assoc/filters/kalman.py", f"{HOLDS}; equation 22 needs G Q G'", filters),
         Row("equations 32 to 36, scaling by q and r", "assoc/filters/fuzzy/filter.py", HOLDS, fuzzy),
         Row("rules 1 to 4, Mamdani, centroid", "assoc/filters/fuzzy/inference.py", HOLDS, fuzzy),
         Row("figures 7 to 9, membership sets", figures,
             "the text has no numbers: chosen by eye, and tuned on random flights; ours are drawn", command),
         Row("equation 37, RMSE", "experiments/common/command.py", HOLDS, command),
-        Row("figures 3 and 4, flight and measurements, RMSE 0.08965", figures,
+        Row("figures 3 and 4, flight and measurements, RMSE 89.65 m (km taken as its unit)", figures,
             f"its flight is not given; ours has the same raw RMSE ({span(raw)} m)", command),
         Row("equations 38 to 40, Q_0, R_0, P_0", "experiments/papers/fuzzy_ekf/published.py",
             f"{NOT} taken literally: {span(literal)} m, worse than the raw measurements", command),
         Row("equation 41, Jacobian", "assoc/sensors/", f"{HOLDS}; row 3 lacks a square root", sensors),
-        Row("figures 5 and 6, EKF, RMSE 0.05206", figures, f"drawn; ours {span(plain)} m, the best of a grid", command),
+        Row("figures 5 and 6, EKF, RMSE 52.06 m", figures, f"drawn; ours {span(plain)} m, the best of a grid", command),
         Row("EKF 41.93 % below the raw measurements", where, f"ours {span(gained)} %", command),
-        Row("figures 10 and 11, EKF with inference, RMSE 0.0359", figures, f"drawn; ours {span(rules)} m", command),
+        Row("figures 10 and 11, EKF with inference, RMSE 35.9 m", figures, f"drawn; ours {span(rules)} m", command),
         Row("59.97 % below the raw measurements", where, f"{verdict(*below)}: ours {span(below)} %", command),
         Row("conclusion: inference improves the EKF", where,
             f"{verdict(*against)} scenarios: {span(against)} times the best fixed EKF of the same model, against 0.69",
@@ -355,7 +366,7 @@ def dubins_enkf() -> str:
         Row("equation 7, existence", "assoc/simulation/dubins/paths.py", HOLDS, dubins),
         Row("equations 8 to 13, ensemble Kalman filter", "assoc/filters/ensemble.py", HOLDS, enkf),
         Row("equations 14 to 16, length of RSL and the others", "assoc/simulation/dubins/paths.py",
-            f"{HOLDS}; 16 is not legible. The paper prints no length; ours in m: "
+            f"{HOLDS}; equation 16 is not legible. The paper prints no length; ours in m: "
             + ", ".join(f"{word} {value}" for word, value in lengths.items()), command),
         Row("figure 1, path around an obstacle", paths, "drawn with its kinks", command),
         Row("equations 17 to 19, forward difference", "assoc/filters/motion/unmanned_aircraft.py",

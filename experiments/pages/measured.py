@@ -129,6 +129,25 @@ def speed_ratios() -> str:
     return table(["", *names], rows)
 
 
+def batch() -> str:
+    """Updates in a batch."""
+    r = Results("filters.benchmark")
+    rows = [[c.quantity.split(": ")[1], _judged(c)] for c in r.starting("EKF, batch of")]
+    return table(["EKF, batch of 10,000, microseconds a track (goal: 2)", ""], rows)
+
+
+def overhead() -> str:
+    """The overhead of a run in a parameter study."""
+    r = Results("sweep_overhead")
+    parts = ("overhead a run", "processor time of the sweep, a run", "in the solver, a run")
+    rows = [
+        [f"{kind}, {backend}", *(_judged(r[f"{kind}, {backend}: {part}"], 2) for part in parts)]
+        for kind in ("greedy", "ant colony")
+        for backend in ("one process", "joblib", "dask")
+    ]
+    return table(["ms", *parts], rows)
+
+
 def traffic() -> str:
     """CT, MT and IT by grouping, clock and tracker."""
     r = Results("papers.clustering_time_window")
@@ -181,7 +200,7 @@ def ant_colony() -> str:
         ["certified optimal, alpha > beta less the others, %", "claimed, no figure",
          *(cell(mode, above, 2) for mode in ("paper", "mmas"))],
         ["rank in cycles of rho 0.3, alpha 2, beta 1 among 24", "1",
-         *(cell(mode, "rank in cycles of alpha 2 beta 1 rho 0.3 of 24", 2) for mode in ("paper", "mmas"))],
+         *(cell(mode, "rank in cycles of alpha 2 beta 1 rho 0.3 of 24") for mode in ("paper", "mmas"))],
     ]  # fmt: skip
     return table(["", "paper", "mode paper", "mode mmas"], rows)
 
@@ -211,6 +230,7 @@ FILTERS = {
     "consistency": consistency,
     "speed": speed,
     "speed-ratios": speed_ratios,
+    "batch": batch,
 }
 RECORDINGS = {"traffic": traffic}
-SWEEPS = {"ant-colony": ant_colony, "readings": readings}
+SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
