@@ -245,6 +245,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
+    if parsed["rates"] and recording.aircraft is None:
+        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
         windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
     elif window == "irregular":
@@ -253,8 +255,6 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
-    if parsed["rates"] and recording.aircraft is None:
-        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     shown = with_progress(windows, len(windows), "tracking")
     return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
 

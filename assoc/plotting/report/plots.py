@@ -19,7 +19,7 @@ def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
     places, aircraft = recording.positions, recording.aircraft
     few = len(recording) <= _MOST
     measured = [
-        {"t": round(float(end), 6), "at": plain_numbers(places[window.rows], decimals)}
+        {"t": round(float(end), 4), "at": plain_numbers(places[window.rows], decimals)}
         for end, window in zip(shown.ends, shown.windows, strict=True)
         if few
     ]

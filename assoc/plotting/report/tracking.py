@@ -31,6 +31,7 @@ GOSPA_CUTOFF = 1_000.0
 
 _NEEDED = ("track_id", "time", "x", "y")
 _INSTANTS = 300
+_DECIMALS = 4
 _MOST_POINTS = 40_000
 _MOST_MEASUREMENTS = 30_000
 
@@ -149,7 +150,8 @@ def _data(
     if scene is not None and scene.num_scans <= _INSTANTS:
         instants = np.unique(scene.times)
     elif plots is not None and len(plots.ends) <= _INSTANTS:
-        instants = np.unique(np.round(np.asarray(plots.ends, dtype=float), 6))
+        # as many decimals as the tracks' own times, so that both mean the same instant
+        instants = np.unique(np.round(plots.ends, _DECIMALS))
     elif len(frame):
         instants = np.linspace(frame["time"].min(), frame["time"].max(), min(_INSTANTS, len(frame)))
     else:
@@ -176,7 +178,7 @@ def _by_track(frame: pd.DataFrame) -> list[tuple[int, pd.DataFrame]]:
 def _path(times: Any, where: Any, decimals: int) -> dict[str, Any]:
     points = np.asarray(where, dtype=float)
     return {
-        "t": plain_numbers(np.asarray(times, dtype=float), 4),
+        "t": plain_numbers(np.asarray(times, dtype=float), _DECIMALS),
         **{axis: plain_numbers(points[:, i], decimals) for i, axis in enumerate("xyz")},
     }
 

@@ -37,13 +37,17 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
 def draw(figure: Any, shown: Any) -> None:
     """Draw the rates over time beside the paper's, and one example of each pair."""
     results, examples = shown
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 1.25))
+    upper, lower, space = figure.subfigures(3, 1, height_ratios=(1.0, 1.25, 1.25))
     _draw_rates(upper, results)
     panels = lower.subplots(1, len(examples), squeeze=False)[0]
     for panel, (name, example) in zip(panels, examples.items(), strict=True):
         _draw_pair(panel, example)
         panel.set_title(f"{name}: colours are tracks")
     panels[0].set_ylabel("north (km)")
+    deep = space.subplots(1, len(examples), squeeze=False, subplot_kw={"projection": "3d"})[0]
+    for panel, (name, example) in zip(deep, examples.items(), strict=True):
+        _draw_pair_in_space(panel, example)
+        panel.set_title(f"{name} in space, as figure {pairs.IN_SPACE[name]}")
 
 
 def _draw_rates(figure: Any, results: Any) -> None:
@@ -84,9 +88,21 @@ def _draw_pair(panel: Any, example: pairs.Example) -> None:
     panel.set_aspect("equal")
 
 
+def _draw_pair_in_space(panel: Any, example: pairs.Example) -> None:
+    recording, taken = example.recording, example.taken
+    heights = recording.trusted_altitudes[taken.rows]
+    places = recording.positions[taken.rows] / 1000.0
+    names, counts = np.unique(taken.tracks[taken.tracks >= 0], return_counts=True)
+    long = [name for name, count in zip(names, counts, strict=True) if count >= 5]
+    for number, name in enumerate(long):
+        own = (taken.tracks == name) & np.isfinite(heights)
+        panel.plot(*places[own].T, heights[own], ".-", color=f"C{number}", linewidth=0.7, markersize=4)
+    panel.set(xlabel="east (km)", ylabel="north (km)", zlabel="altitude (m)")
+
+
 def program(arguments: list[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    return main("papers.clustering_time_window", TITLE, experiment, draw, (13, 8.5), arguments, about=__doc__)
+    return main("papers.clustering_time_window", TITLE, experiment, draw, (13, 13), arguments, about=__doc__)
 
 
 if __name__ == "__main__":

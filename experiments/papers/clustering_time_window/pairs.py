@@ -19,6 +19,7 @@ TRAFFIC = ("crossing", "parallel", "head-on")
 DURATION = 600.0
 GOAL = 95.0
 FIGURES = {"crossing": "4.18", "parallel": "4.20", "head-on": "4.22"}
+IN_SPACE = {"crossing": "4.19", "parallel": "4.21", "head-on": "4.23"}
 SOURCE = "figure {}: no switch in its one pair; 95 % chosen by us"
 
 
