@@ -124,7 +124,7 @@ def observe_in_turns(
             stamps[k].append(when[mine])
             sources[k].append(source[mine])
         # clockwise: a scan ends at the smaller azimuth
-        sectors[:, s, 0] = math.pi / 2 - FULL_TURN * (edges[1:] + ahead) / turn
+        sectors[:, s, 0] = wrap_angle(math.pi / 2 - FULL_TURN * (edges[1:] + ahead) / turn)
         sectors[:, s, 1] = sectors[:, s, 0] + np.minimum(FULL_TURN * np.diff(edges) / turn, FULL_TURN)
     truth = _truth(paths, times, sources)
     return Scene(sensors, times, rows, region, truth, name, stamps, sectors)  # type: ignore[arg-type]

@@ -40,7 +40,7 @@ from assoc.tracking.track_batch import TrackBatch, empty_batch
 # and nodes at the least; counted, so that the answer does not depend on the machine
 _VISITS, _LEAST_NODES = 500_000, 10
 _FORGETTING = 0.05
-# of a turn in a scan; where no sensor looks, tracks wait for long
+# of a turn in a scan; where no sensor looks any more, tracks wait
 _LEAST_TURN = 1e-3
 
 
@@ -360,7 +360,9 @@ class Tracker(Checkpoint):
 
     def _to_delete(self, batch: TrackBatch, time: float) -> Array:
         # a look is a scan of which a sensor sees a part, the quickest sensor most
-        most = max(float(self._turns.max()), _LEAST_TURN)
+        most = float(self._turns.max())
+        if most < _LEAST_TURN:
+            return np.zeros(len(batch), dtype=np.bool_)
         patience = self.life_cycle.patience(self.terms.miss * (self._turns / most), self._pace / most)
         return batch.to_delete(self.life_cycle, time, patience)
 

@@ -53,7 +53,7 @@ def test_tracks_are_those_of_measurements_in_order(scene, kind):
         for i, mean in states(late.tracks).items():
             assert i not in known or np.linalg.norm(known[i][:2] - mean[:2]) < 1_500.0
             known[i] = mean
-    assert late.late > 50 and late.refused == 0
+    assert late.late > 20 and late.refused == 0
     expected, found = states(plain.tracks), states(late.tracks)
     assert len(found) == len(expected) == 4
     for mean in expected.values():
@@ -97,7 +97,7 @@ def test_what_is_too_old_is_refused_and_counted(scene):
 
 
 def test_a_step_that_fails_leaves_all_as_it_was(scene):
-    late = LatePlots(TRACKERS["multi-sensor"].for_scene(scene, max_tuples=2_000))
+    late = LatePlots(TRACKERS["multi-sensor"].for_scene(scene, max_tuples=200))
     for k in range(6):
         scan = scene.scan(k)
         late.step(scan.time, scan.measurements, scan.times, scan.sectors)

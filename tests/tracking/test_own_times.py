@@ -142,9 +142,7 @@ def test_scores_are_the_logarithms_of_the_predictive_densities():
     tracker.step(1.0, z, [np.array([t]) for t in times])
     now = 0.0
     for s in np.argsort(times):
-        mean, cov, density = plain.correct(
-            *plain.predict(mean, cov, times[s] - now), z[s][0], SENSORS[s].covariance
-        )
+        mean, cov, density = plain.correct(*plain.predict(mean, cov, times[s] - now), z[s][0], SENSORS[s].covariance)
         now = times[s]
         one = SENSORS[s]
         expected += density + math.log(one.detection_probability * one.volume / one.false_alarm_rate)
@@ -152,19 +150,21 @@ def test_scores_are_the_logarithms_of_the_predictive_densities():
 
 
 def test_a_bearing_before_the_radar_that_begins_the_track_is_used():
-    radar = Radar3D(
-        position=[0, 0, 0], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], [-math.pi, math.pi], [0, 1.5]]
-    )
+    radar = Radar3D(position=[0, 0, 0], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], [-math.pi, math.pi], [0, 1.5]])
     bearing = BearingSensor(position=[0, 0, 0], noise=[1e-4])
     place = np.array([[20_000.0, 20_000.0, 5_000.0]])
     tracker = TRACKERS["multi-sensor"]([bearing, radar])
     truth = bearing.measure(place), radar.measure(place) + [0.0, 1e-3, 0.0]
     step = tracker.step(2.0, list(truth), [np.array([1.0]), np.array([1.5])])
     assert step.assigned[0].tolist() == step.assigned[1].tolist() == [1]
-    # the bearing is ten times as exact across
+    # across the line of sight: the radar's place p at 1.5 s, and the bearing's half a second before, by p - v / 2
+    ground = math.hypot(*place[0, :2])
+    rows = np.array([[1.0, 0.0], [1.0, -0.5], [0.0, 1.0]]) / np.array([[1e-3 * ground], [1e-4 * ground], [300.0]])
+    p, v = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0]), rcond=None)[0]
     (track,) = tracker.tracks
-    off = track.position - place[0]
-    assert abs(off @ [-1, 1, 0]) / math.sqrt(2) < 10.0
+    across = (track.position - place[0]) @ [-1, 1, 0] / math.sqrt(2)
+    assert across == pytest.approx(p + v / 2, rel=0.02)
+    assert len(tracker.tracks) == 1 and track.time == 2.0
 
 
 def test_all_trackers_follow_rotating_radars_like_the_oracle():

@@ -33,7 +33,7 @@ from assoc.tracking.mht.best_hypothesis import choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
@@ -147,6 +147,8 @@ class TrackOrientedMHT(Tracker):
         rows = tables.history[:, :count]
         followed = timed.follow(parent_row, rows)
         states = timed.at(followed, np.arange(len(rows)), scan.time)
+        new = np.flatnonzero(parent_row < 0)
+        tables.numbers[new, STARTED] = followed.first[new]
         count_scan(tables.counts, tables.history, count, looked[anchor].any(axis=1))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born = tables.history, tables.born
