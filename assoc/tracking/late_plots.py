@@ -207,8 +207,8 @@ class LatePlots:
             self._kept[k] = kept = replace(kept, before=self.tracker.remember())
             step = self.tracker.step(kept.time, kept.measurements, kept.times, kept.sectors)
             steps.append(step)
-            for inner, outer in zip(step.assigned, kept.assigned, strict=True):
-                votes.update(zip(inner[: len(outer)].tolist(), outer.tolist(), strict=True))
+            for new, old in zip(step.assigned, kept.assigned, strict=True):
+                votes.update(zip(new[: len(old)].tolist(), old.tolist(), strict=True))
         taken = set(names.values())
         for (inner, outer), _ in sorted(votes.items(), key=lambda one: (-one[1], one[0])):
             if inner and outer and inner not in names and outer not in taken:

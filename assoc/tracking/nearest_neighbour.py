@@ -125,7 +125,8 @@ class NearestNeighbourTracker(Tracker):
             ids = np.zeros(len(times) + 1, dtype=np.int64)
             ids[rows[:, s]] = batch.track_id
             assigned.append(ids[1:])
-        return batch, assigned, seen, np.concatenate([looked[:old].any(axis=1), np.ones(len(order), dtype=np.bool_)])
+        at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(order), dtype=np.bool_)])
+        return batch, assigned, np.asarray(seen), at_all
 
     def _choose(
         self, track: Array, measurement: Array, gain: Array, missed: Array, scores: Array, count: int

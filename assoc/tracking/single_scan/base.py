@@ -77,7 +77,8 @@ class SingleScanTracker(Tracker):
         followed = timed.follow(track, rows)
         gain = -score_costs(timed, followed, rows, self.terms, looked[track])
         when = np.where(rows.any(axis=1), followed.when, np.nan)
-        return ScanOutcome(timed.at(followed, track, scan.time), gain, rows, born, when, looked[track].any(axis=1))
+        at_all = np.asarray(looked[track].any(axis=1))
+        return ScanOutcome(timed.at(followed, track, scan.time), gain, rows, born, when, at_all)
 
     def _begin_timed(self, scan: Scan, timed: TimedScan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
