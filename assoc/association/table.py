@@ -93,7 +93,8 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
         sizes = " ".join(map(str, scan.sizes))
         writer.writerow(
             [spreadsheet_text(file), scan.scan, *([rank] if ranked else []), scan.time, sizes]
-            + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
-            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples, scan.compile_time]
+            + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap]
+            + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
+            + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
         )
     return text.getvalue()
