@@ -214,9 +214,11 @@ def _of_scene(
     from assoc.tracking import track_scene
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
-    for flag in ("rotation", "rates", *_RADAR):
+    if parsed["rates"] is not None:
+        raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
+    for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
-            raise InvalidInputError(f"{flag_of(flag)}: is for the plots of a radar, not for a scene")
+            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")

@@ -116,6 +116,7 @@ BAD = {
     "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: imm-cv"),
     "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
+    "rates for a scene": (["SCENE", "--rates", "r.csv"], "--rates: judges the plots"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
     "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
@@ -125,7 +126,7 @@ BAD = {
     "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
-    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, none"),
+    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, irregular, none"),
     "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
     "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }
