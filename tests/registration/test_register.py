@@ -13,6 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.registration import RegistrationParameters, register, with_biases
 from assoc.registration.correction import corrected_measurements
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D
+from assoc.simulation import simulate
 from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
 
 
@@ -208,6 +209,15 @@ def test_bearings_beside_radars():
     wrong = [{"range": 100.0}, {"azimuth": np.radians(0.1)}, {"azimuth": np.radians(-0.3)}]
     result = register(with_biases(scene_of(sensors, 7, 20), wrong))
     assert np.degrees(result.of(2)["azimuth"]) == pytest.approx(-0.3, abs=0.05)
+
+
+def test_measurements_with_times_of_their_own():
+    """Antennas that turn in 4, 5 and 5.5 s: looks are moved to one time by their targets' motion."""
+    scene = with_biases(simulate("rotating-radars", 1, duration=80.0), BIASES)
+    result = register(scene)
+    off = result.biases - truth_of(result, BIASES)
+    assert (np.abs(off) < 4.5 * result.deviations).all() and result.deviations[0] < 8.0
+    assert result.noise < 1.2
 
 
 def test_false_alarms_do_not_disturb():

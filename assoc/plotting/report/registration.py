@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from assoc._text.html import escape
-from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.residuals import residual_columns
 from assoc.registration import Registration
