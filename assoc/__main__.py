@@ -17,6 +17,7 @@ PROGRAMS = {
     "simulate": ("simulate a scene", "three-radar -o scene.npz"),
     "solve": ("associate its measurements", "scene.npz --solver aco"),
     "track": ("make tracks of scenes or of radar plots", "scene.npz -o tracks.csv"),
+    "register": ("find biases of sensors", "scene.npz -o registered.npz"),
     "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),
 }
 """Name of each: a module ``assoc.NAME`` with a function ``start``; what it does, and an example."""

@@ -9,14 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from assoc._system.interrupts import interruptible
+from assoc._types import Array
+from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
 from assoc.costs.range_rates import SPEED, range_rates
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -33,6 +36,7 @@ def build_problem(
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
+    all_tuples: bool = False,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -41,6 +45,9 @@ def build_problem(
     * each pair of its measurements passes the chi-square gate of that pair,
     * all of them together pass the gate of their degrees of freedom,
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
+
+    Measurements that have times of their own are compared through the target's predicted motion: it flies straight,
+    with a velocity of which only the usual `speed` is known; the gates are those of a measurement given those before.
 
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
@@ -58,7 +65,10 @@ def build_problem(
         The most candidate tuples that may be made.
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
-        against; without a sensor that measures range rate it has no effect.
+        against, and what a target may fly between measurements of different times; without either it has no effect.
+    all_tuples : bool
+        Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
+        papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
 
     Returns
     -------
@@ -67,7 +77,7 @@ def build_problem(
     Raises
     ------
     LimitExceededError
-        There are more candidates than `max_tuples`; the message estimates how many.
+        There are more tuples than `max_tuples`; the message says how many, or estimates it.
     InvalidInputError
         An argument is out of range.
 
@@ -84,6 +94,10 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if all_tuples:
+        return _whole_grid(scene, one, int(max_tuples), speed)
+    if not one.at_once:
+        return timed_problem(scene, one, probability, int(max_tuples), speed)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
@@ -94,6 +108,75 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def _whole_grid(scene: Scene, one: Scan, most: int, speed: float | Sequence[float]) -> AssignmentProblem:
+    shape = [int(size) + 1 for size in one.sizes]
+    count = math.prod(shape) - 1
+    if count > most:
+        raise LimitExceededError(
+            f"scan {one.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
+        )
+    # the first of the grid is the tuple without measurements, which no problem has
+    tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
+    return AssignmentProblem(tuples, tuple_costs(scene, one, tuples, speed=speed), one.sizes)
+
+
+def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:
+    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+
+    Parameters
+    ----------
+    scene, scan
+        See `build_problem`.
+    tuples : array_like of int (K, S)
+        1-based measurement of each sensor, 0 where it missed the target.
+    speed : float or sequence of float
+        See `build_problem`.
+
+    Returns
+    -------
+    ndarray (K,)
+
+    Raises
+    ------
+    InvalidInputError
+        The tuples have the wrong shape, an index out of range, or no measurement.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.tuple_costs(scene, one, tuples, speed=speed)
+    return timed_costs(scene, one, tuples, speed)
+
+
+def positions_and_covariances(
+    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
+) -> tuple[Array, Array]:
+    """Positions of tuples at the scan's time, and their covariances.
+
+    Where all measurements are of that time, they are the maximum-likelihood positions (equation 4), and the speed has
+    no effect. What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    deviation half its width. So a position always exists.
+
+    Parameters
+    ----------
+    scene, scan, tuples, speed
+        See `tuple_costs`.
+
+    Returns
+    -------
+    positions (K, 3), covariances (K, 3, 3)
+        Metres; the covariance is the inverse information at the position.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.positions_and_covariances(scene, one, tuples)
+    return timed_positions(scene, one, tuples, speed)
 
 
 _known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()
