@@ -74,7 +74,8 @@ def _write(words: list[str], parsed: dict[str, Any], page: str | None, values: d
 
     scene = Scene.load(file)
     if parsed["verbose"]:
-        print_lines(f"{printable(file)}: {scene!r}; " + (", ".join(f"{k} {v}" for k, v in values.items()) or "defaults"))
+        used = ", ".join(f"{name} {value}" for name, value in values.items())
+        print_lines(f"{printable(file)}: {scene!r}; {used or 'all defaults'}")
     started = time.perf_counter()
     found = register(scene, **values)
     elapsed = time.perf_counter() - started
