@@ -7,12 +7,16 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from assoc._system.compile_time import is_compiling
+
 if TYPE_CHECKING:
     from assoc.sweeps.study import Counts
 
 Item = TypeVar("Item")
 
 _EVERY = 5.0
+# seconds of compiling that need no words
+_SOON = 0.5
 
 
 class ProgressBar:
@@ -35,7 +39,22 @@ class ProgressBar:
         if shown and sys.stderr.isatty():
             # needed on a terminal alone, and slow to load
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                ProgressColumn,
+                Task,
+                TextColumn,
+                TimeRemainingColumn,
+            )
+            from rich.text import Text
+
+            class Compiling(ProgressColumn):
+                """Says why the first scans take so long, while they do."""
+
+                def render(self, task: Task) -> Text:
+                    return Text("compiling, once after installation" if is_compiling(_SOON) else "")
 
             self._progress = Progress(
                 TextColumn("{task.description}"),
@@ -44,6 +63,7 @@ class ProgressBar:
                 TextColumn("{task.fields[rate]}"),
                 TimeRemainingColumn(compact=True),
                 TextColumn("left"),
+                Compiling(),
                 console=Console(file=sys.stderr),
                 transient=True,
             )

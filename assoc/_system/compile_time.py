@@ -43,6 +43,12 @@ def loading() -> Iterator[None]:
         left()
 
 
+def is_compiling(seconds: float = 0.0) -> bool:
+    """Whether some thread has been in the compiler, or importing, for so long."""
+    now = time.perf_counter()
+    return any(now - since > seconds for _, since in [*_under_way.values()])
+
+
 def compile_seconds() -> float:
     """Return the seconds of this thread so far in which kernels were compiled or loaded, or modules imported.
 

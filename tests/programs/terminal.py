@@ -6,17 +6,24 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 
-def shown(words: Sequence[object], *, only_errors: bool = False, columns: int = 200, **options: object) -> str:
+def shown(
+    words: Sequence[object],
+    *,
+    only_errors: bool = False,
+    columns: int = 200,
+    variables: Mapping[str, str] | None = None,
+    **options: object,
+) -> str:
     """Run ``python -m words`` on a pseudo terminal and return what it shows; of stderr alone with ``only_errors``."""
     main, side = os.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", *map(str, words)],
         stdout=subprocess.DEVNULL if only_errors else side,
         stderr=side,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": str(columns)},
+        env={**os.environ, "TERM": "xterm", "COLUMNS": str(columns), **(variables or {})},
         **options,
     )
     os.close(side)

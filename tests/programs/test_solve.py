@@ -184,3 +184,10 @@ def test_kbest_refuses(run, scene_file, words, message):
     done = run("assoc.solve", scene_file, *words)
     assert done.returncode == 2
     assert message in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_a_terminal_says_that_kernels_are_compiled(scene_file, tmp_path):
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path), "ASSOC_INTERPRET": "0"}
+    words = ["assoc.solve", scene_file, "--solver", "greedy", "--scans", "0"]
+    assert "compiling, once after installation" in shown(words, only_errors=True, variables=cold)

@@ -11,7 +11,7 @@ import pytest
 
 import assoc
 from assoc._system import compile_time
-from assoc._system.compile_time import compile_seconds, loading
+from assoc._system.compile_time import compile_seconds, is_compiling, loading
 from assoc.simulation import simulate
 
 # one small kernel in place of a solver's many
@@ -113,3 +113,21 @@ def test_what_was_interrupted_counts_no_further():
     with loading():
         time.sleep(0.01)
     assert 0.01 <= compile_seconds() - before < 5.0
+
+
+def test_who_shows_progress_can_ask_whether_a_thread_compiles():
+    inside, done = threading.Event(), threading.Event()
+
+    def work():
+        with loading():
+            inside.set()
+            done.wait(30)
+
+    thread = threading.Thread(target=work)
+    assert not is_compiling()
+    thread.start()
+    inside.wait(30)
+    assert is_compiling() and not is_compiling(1000.0)
+    done.set()
+    thread.join()
+    assert not is_compiling()
