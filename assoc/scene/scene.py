@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from assoc._text.html import escape, table
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
+from assoc.scene.doubts import doubts_about
 from assoc.scene.file import load_parts, save_parts
+from assoc.scene.instants import as_seconds
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
@@ -30,7 +33,8 @@ class Scene:
     sensors : sequence of Sensor
         At least one.
     times : array_like (K,)
-        Time stamps in seconds, not decreasing; at least one scan.
+        Time stamps in seconds, not decreasing; at least one scan. Dates (datetime, datetime64, pandas) become
+        seconds since 1970-01-01 UTC.
     measurements : sequence over scans of sequences over sensors of arrays (n, d_s)
         What each sensor reported; n may be 0.
     region : array_like (3, 2), optional
@@ -44,6 +48,11 @@ class Scene:
     ------
     InvalidInputError
         One line that names the argument and what was expected.
+
+    Warns
+    -----
+    AssocWarning
+        The measurements of a sensor do not fit what it says of itself, as with degrees or kilometres.
     """
 
     sensors: Sequence[Sensor]
@@ -65,7 +74,7 @@ class Scene:
                 )
         if not isinstance(self.name, str):
             raise InvalidInputError(f"name must be text, got {type(self.name).__name__}")
-        times = finite_array(self.times, "times")
+        times = finite_array(as_seconds(self.times, "times"), "times")
         if times.ndim != 1 or not times.size:
             raise InvalidInputError(f"times must have shape (K,) with K >= 1, got {times.shape}")
         if (np.diff(times) < 0).any():
@@ -77,6 +86,17 @@ class Scene:
         put(self, "region", self._checked_region())
         if self.truth is not None:
             self._check_truth(self.truth)
+        for line in self._doubts:
+            warn(line)
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return doubts_about(self.sensors, self.measurements)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is almost surely a mistake in the sensors and their measurements, one line each."""
+        return (*(line for sensor in self.sensors for line in sensor.warnings), *self._doubts)
 
     def _checked_measurements(self) -> tuple[tuple[Array, ...], ...]:
         if len(self.measurements) != self.num_scans:
