@@ -9,6 +9,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.inputs import check_outputs
@@ -16,7 +17,7 @@ from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
 from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
-from assoc._cli.values import number, seconds, whole_number
+from assoc._cli.values import number, place_on_earth, seconds, whole_number
 from assoc._parameters import Option, options
 from assoc._system.compile_time import compile_seconds
 from assoc._system.extras import check_extra
@@ -78,7 +79,10 @@ def _track(words: list[str]) -> None:
         one.kind = float
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
-    check_outputs([parsed["output"], parsed["report"]], [file])
+    check_outputs([parsed["output"], parsed["report"], parsed["map"]], [file])
+    if parsed["map"] and not parsed["map"].lower().endswith((".geojson", ".json", ".kml")):
+        raise InvalidInputError(f"--map: expected a name that ends in .geojson or .kml, got {parsed['map']!r}")
+    parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
@@ -106,7 +110,14 @@ def _track(words: list[str]) -> None:
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
+    def write_tracks_on_map() -> None:
+        if parsed["map"]:
+            from assoc.tracking.maps import write_map
+
+            write_map(parsed["map"], table.to_frame())
+
     write_all(
+        write_tracks_on_map,
         lambda: table.to_csv(parsed["output"]),
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
@@ -130,6 +141,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
     add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv)")
+    add("--map", metavar="FILE", help="write the tracks for a map as well (.geojson or .kml); needs an origin")
+    add("--origin", metavar="LAT,LON[,H]", help="where x = y = 0 is on the earth, degrees and metres (if not in FILE)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
     add("--tracker", metavar="NAME", help="name of the tracker, see below")
     add("--solver", metavar="NAME", help="name of the solver (default exact)")
@@ -206,6 +219,10 @@ def _of_scene(
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
+    if parsed["origin"] is not None:
+        scene = replace(scene, origin=parsed["origin"])
+    elif parsed["map"] and scene.origin is None:
+        raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
     table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
@@ -240,7 +257,9 @@ def _of_plots(
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
-    table = TrackTable()
+    if parsed["map"] and parsed["origin"] is None:
+        raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
+    table = TrackTable(parsed["origin"])
     for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
         tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
         table.add(tracks, tracker.filter.motion.position)

@@ -57,6 +57,9 @@ EXPERIMENTS = (
         "fusion before tracking, in Stone Soup",
         "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
     ),
+    Experiment(
+        "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"
+    ),
     Experiment("sweep_overhead", "time of a parameter study besides its solves", "docs/sweeps.md (overhead)"),
     Experiment("cold_start", "what a user waits for after an installation", "nothing in the pages: make bench-cold"),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),

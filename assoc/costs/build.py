@@ -15,6 +15,7 @@ from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
+from assoc.costs.prices import position_prior, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
@@ -33,6 +34,7 @@ def build_problem(
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -59,6 +61,12 @@ def build_problem(
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
         against; without a sensor that measures range rate it has no effect.
+    target_density : float or "auto", optional
+        None is equation 5: the likelihood at the best position. A number is the density of targets in the region,
+        per m^3 (per m^2 if no sensor measures full positions): positions are integrated out under it, and a cost gains
+        -ln(density (2 pi)^(n/2) |P|^(1/2)) with P the covariance of the position. "auto" takes the density from the
+        numbers of measurements in the scene. The prior is right where measurements hardly determine positions, as
+        bearings: equation 5 then finds too many targets.
 
     Returns
     -------
@@ -84,23 +92,26 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
-    sensors = sensor_arrays(scene)
+    bare = sensor_arrays(scene)
+    prior = position_prior(scene, bare, target_density)
+    sensors = with_prior(bare, prior)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
     measured, index = scan_arrays(sensors, one, reach, least)
     limits = {"number": one.index, "max_tuples": int(max_tuples)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
 
 
-_known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()
+_known_gates: weakref.WeakKeyDictionary[Scene, dict[tuple[float, float], Gates]] = weakref.WeakKeyDictionary()
 
 
 def _gates(scene: Scene, sensors: SensorArrays, probability: float) -> Gates:
     known = _known_gates.setdefault(scene, {})
-    if probability not in known:
-        known[probability] = make_gates(sensors, probability)
-    return known[probability]
+    key = (probability, sensors.base)
+    if key not in known:
+        known[key] = make_gates(sensors, probability)
+    return known[key]

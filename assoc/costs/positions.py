@@ -10,7 +10,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
-from assoc.costs.range_rates import SPEED, prices, range_rates
+from assoc.costs.prices import position_prior, prices, with_prior
+from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -18,9 +19,14 @@ from assoc.sensors.codes import POSITION
 
 
 def tuple_costs(
-    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
+    scene: Scene,
+    scan: int | Scan,
+    tuples: Array,
+    *,
+    speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
 ) -> Array:
-    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+    """Cost of given tuples, gated or not, by equation 5 or with a prior; a single measurement costs 0, a false alarm.
 
     Parameters
     ----------
@@ -28,7 +34,7 @@ def tuple_costs(
         See `build_problem`.
     tuples : array_like of int (K, S)
         1-based measurement of each sensor, 0 where it missed the target.
-    speed : float or sequence of float
+    speed, target_density
         See `build_problem`.
 
     Returns
@@ -40,12 +46,13 @@ def tuple_costs(
     InvalidInputError
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
-    sensors = sensor_arrays(scene)
-    rows, chi, positions, _ = _fit_tuples(scene, scan, tuples)
+    prior = position_prior(scene, sensor_arrays(scene), target_density)
+    sensors = with_prior(sensor_arrays(scene), prior)
+    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
-    if rates is not None:
+    if rates is not None or prior is not None:
         flat, _ = scan_arrays(sensors, scan_of(scene, scan), 1.0, 1.0)
-        chi = chi + prices(sensors, flat, rates, rows, positions)
+        chi = chi + prices(sensors, flat, rows, rates, prior)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)

@@ -11,6 +11,7 @@ import numpy as np
 from assoc._files.npz import Field, load_npz, save_npz
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_parts
 from assoc.sensors import KINDS
 
 FORMAT = "assoc.scene"
@@ -34,6 +35,7 @@ _FIELDS = {
     "truth_offsets": Field("int", 1, required=False),
     "truth_ids": Field("int", 1, required=False),
     "truth_positions": Field("float", 2, required=False),
+    **METADATA_FIELDS,
 }
 
 
@@ -72,6 +74,7 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
             [np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1
         ),
     }
+    arrays |= metadata_arrays(parts)
     truth = parts["truth"]
     if truth is not None:
         arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth["target_ids"])], dtype=np.int64)
@@ -132,12 +135,18 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
             raise InvalidInputError(f"sensor {s}: {error}") from error
         square, row = square + dim * dim, row + dim
     measurements, rows = _split_measurements(arrays, dims, scans)
+    metadata = metadata_parts(arrays)
+    truth = _read_truth(arrays, scans, rows)
+    if truth is not None:
+        truth["names"] = metadata["names"]
     return {
+        "origin": metadata["origin"],
+        "notes": metadata["notes"],
         "sensors": sensors,
         "times": arrays["times"],
         "measurements": measurements,
         "region": arrays.get("region"),
-        "truth": _read_truth(arrays, scans, rows),
+        "truth": truth,
         "name": str(arrays["name"][()]) if "name" in arrays else "",
     }
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
 from assoc.scene.doubts import doubts_about
 from assoc.scene.file import load_parts, save_parts
+from assoc.scene.geodesy import Origin, checked_origin, geodetic
 from assoc.scene.instants import as_seconds
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
@@ -43,6 +44,11 @@ class Scene:
         fields of view, from the lowest sensor to 20 km above it.
     truth : Truth, optional
     name : str, optional
+    origin : tuple of latitude, longitude, height, optional
+        Where the scene's frame stands on the earth: x east, y north, z up in the plane that touches the WGS-84
+        ellipsoid there; radians, radians, metres. Tracks and reports then have latitudes and longitudes.
+    notes : mapping of str to int, optional
+        What was left out or mended when the scene was made from a file, and how often.
 
     Raises
     ------
@@ -61,6 +67,8 @@ class Scene:
     region: Array = None  # type: ignore[assignment]  # always an array once made
     truth: Truth | None = None
     name: str = ""
+    origin: Origin | None = field(default=None, kw_only=True)
+    notes: Mapping[str, int] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -84,6 +92,9 @@ class Scene:
         put(self, "times", times)
         put(self, "measurements", self._checked_measurements())
         put(self, "region", self._checked_region())
+        if self.origin is not None:
+            put(self, "origin", checked_origin(self.origin))
+        put(self, "notes", {str(what): int(count) for what, count in dict(self.notes).items()})
         if self.truth is not None:
             self._check_truth(self.truth)
         for line in self._doubts:
@@ -208,6 +219,9 @@ class Scene:
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
             place = ", ".join(f"{x:g}" for x in sensor.position)
+            if self.origin is not None:
+                lat, lon, _ = geodetic(sensor.position, self.origin)[0]
+                place += f" ({np.degrees(lat):.5f}°, {np.degrees(lon):.5f}°)"
             sigmas = np.sqrt(np.diagonal(sensor.covariance))
             noise = ", ".join(
                 f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} {units.get(name, 'm')}"
