@@ -9,10 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from assoc._system.interrupts import interruptible
+from assoc._types import Array
+from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
 from assoc.costs.prices import position_prior, with_prior
@@ -44,6 +47,9 @@ def build_problem(
     * all of them together pass the gate of their degrees of freedom,
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
 
+    Measurements that have times of their own are compared through the target's predicted motion: it flies straight,
+    with a velocity of which only the usual `speed` is known; the gates are those of a measurement given those before.
+
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
     heights are sought within three half heights of the middle of the scene's region.
@@ -60,7 +66,7 @@ def build_problem(
         The most candidate tuples that may be made.
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
-        against; without a sensor that measures range rate it has no effect.
+        against, and what a target may fly between measurements of different times; without either it has no effect.
     target_density : float or "auto", optional
         None is equation 5: the likelihood at the best position. A number is the density of targets in the region,
         per m^3 (per m^2 if no sensor measures full positions): positions are integrated out under it, and a cost gains
@@ -92,6 +98,9 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if not one.at_once:
+        _refuse_prior(target_density)
+        return timed_problem(scene, one, probability, int(max_tuples), speed)
     bare = sensor_arrays(scene)
     prior = position_prior(scene, bare, target_density)
     sensors = with_prior(bare, prior)
@@ -104,6 +113,78 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def tuple_costs(
+    scene: Scene,
+    scan: int | Scan,
+    tuples: Array,
+    *,
+    speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
+) -> Array:
+    """Cost of given tuples, gated or not, by equation 5 or with a prior; a single measurement costs 0, a false alarm.
+
+    Parameters
+    ----------
+    scene, scan
+        See `build_problem`.
+    tuples : array_like of int (K, S)
+        1-based measurement of each sensor, 0 where it missed the target.
+    speed, target_density
+        See `build_problem`.
+
+    Returns
+    -------
+    ndarray (K,)
+
+    Raises
+    ------
+    InvalidInputError
+        The tuples have the wrong shape, an index out of range, or no measurement.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.tuple_costs(scene, one, tuples, speed=speed, target_density=target_density)
+    _refuse_prior(target_density)
+    return timed_costs(scene, one, tuples, speed)
+
+
+def positions_and_covariances(
+    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
+) -> tuple[Array, Array]:
+    """Positions of tuples at the scan's time, and their covariances.
+
+    Where all measurements are of that time, they are the maximum-likelihood positions (equation 4), and the speed has
+    no effect. What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    deviation half its width. So a position always exists.
+
+    Parameters
+    ----------
+    scene, scan, tuples, speed
+        See `tuple_costs`.
+
+    Returns
+    -------
+    positions (K, 3), covariances (K, 3, 3)
+        Metres; the covariance is the inverse information at the position.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.positions_and_covariances(scene, one, tuples)
+    return timed_positions(scene, one, tuples, speed)
+
+
+def _refuse_prior(target_density: float | str | None) -> None:
+    if target_density is not None:
+        raise InvalidInputError(
+            "target_density: measurements with times of their own have costs without a prior only; leave it out"
+        )
 
 
 _known_gates: weakref.WeakKeyDictionary[Scene, dict[tuple[float, float], Gates]] = weakref.WeakKeyDictionary()

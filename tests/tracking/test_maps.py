@@ -34,6 +34,8 @@ def test_the_way_back_from_the_plane():
         np.testing.assert_allclose(found[:, 2], wide[2], atol=1e-6)
 
 
+POINT = ["longitude", "latitude", "altitude"]
+
 FLIGHTS = "time,icao24,callsign,lat,lon,geoaltitude\n" + "".join(
     f"{t},{who},{call},{47.0 + 0.05 * k + 0.002 * t:.6f},{8.0 + 0.06 * k:.6f},{9000 + 300 * k}\n"
     for k, (who, call) in enumerate((("4b1", "SWR1  "), ("4b2", ""), ("3c3", "DLH3")))
@@ -80,13 +82,13 @@ def test_tracks_have_coordinates_and_call_signs(scene, tmp_path):
     for one in content["features"]:
         rows = frame[frame["track_id"] == one["properties"]["track_id"]]
         assert one["geometry"]["type"] == "LineString"
-        np.testing.assert_allclose(one["geometry"]["coordinates"], rows[["longitude", "latitude", "altitude"]], atol=1e-6)
+        np.testing.assert_allclose(one["geometry"]["coordinates"], rows[POINT], atol=1e-6)
         assert one["properties"]["target"] == rows["target"].iloc[0]
     write_map(tmp_path / "map.kml", frame)
     root = ElementTree.parse(tmp_path / "map.kml").getroot()
     space = {"k": "http://www.opengis.net/kml/2.2"}
     first = root.find(".//k:coordinates", space).text.split()[0].split(",")
-    np.testing.assert_allclose([float(v) for v in first], frame[["longitude", "latitude", "altitude"]].iloc[0], atol=1e-6)
+    np.testing.assert_allclose([float(v) for v in first], frame[POINT].iloc[0], atol=1e-6)
     assert len(root.findall(".//k:Placemark", space)) == frame["track_id"].nunique()
 
 
