@@ -12,7 +12,8 @@ with P the covariance of the position (Laplace's approximation, exact for linear
     - ln( lambda (2 pi)^(n/2) |P|^(1/2) ).
 
 A direction in which the measurements tell less than the region does integrates to the region's width, and the whole
-to lambda V at most, the number of targets in the region.
+to lambda V at most, the number of targets in the region. Where the best position lies outside of the region, the
+nearest one inside counts, with what it costs the residuals at least.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ class PositionPrior(NamedTuple):
 
     log_density: float
     """ln of targets per m^3."""
-    height: float
-    """Of the region, metres."""
+    region: Array
+    """Lower and upper bounds, (3, 2), metres."""
     log_targets: float
     """ln of the targets in the region, the most that an integral over it can be."""
 
@@ -47,11 +48,12 @@ def position_prior(scene: Scene, sensors: SensorArrays, target_density: float | 
     if target_density is None:
         return None
     width, depth, height = (2.0 * sensors.half).tolist()
+    region = sensors.middle[:, None] + sensors.half[:, None] * [-1.0, 1.0]
     if isinstance(target_density, str):
         if target_density != "auto":
             raise InvalidInputError(f"target_density must be a number, 'auto' or None, got {target_density!r}")
         log_targets = math.log(expected_targets(scene))
-        return PositionPrior(log_targets - math.log(width * depth * height), height, log_targets)
+        return PositionPrior(log_targets - math.log(width * depth * height), region, log_targets)
     try:
         density = math.nan if isinstance(target_density, bool) else float(target_density)
     except (TypeError, ValueError):
@@ -60,7 +62,7 @@ def position_prior(scene: Scene, sensors: SensorArrays, target_density: float | 
         raise InvalidInputError(f"target_density must be a number above 0, 'auto' or None, got {target_density!r}")
     # in the plane it is one per m^2, over the whole height
     log_density = math.log(density) - (0.0 if sensors.full.any() else math.log(height))
-    return PositionPrior(log_density, height, log_density + math.log(width * depth * height))
+    return PositionPrior(log_density, region, log_density + math.log(width * depth * height))
 
 
 def expected_targets(scene: Scene) -> float:
@@ -100,15 +102,22 @@ def prices(
     if rates is not None:
         total += range_rate_prices(sensors, scan, rates, rows, positions)
     if prior is not None:
-        total += 2.0 * (prior.log_targets - log_expected(prior, covariances))
+        total += 2.0 * (prior.log_targets - log_expected(prior, positions, covariances))
     return total
 
 
-def log_expected(prior: PositionPrior, covariances: Array) -> Array:
-    """Ln of lambda (2 pi)^(n/2) |P|^(1/2) for covariances (K, 3, 3), at most that of all targets."""
-    plane = covariances[:, 0, 0] * covariances[:, 1, 1] - covariances[:, 0, 1] ** 2
-    whole = np.linalg.slogdet(covariances)[1]
-    area = math.log(2.0 * math.pi) + 0.5 * np.log(np.maximum(plane, 1e-300))
-    volume = 1.5 * math.log(2.0 * math.pi) + 0.5 * whole
-    limited = np.minimum(volume, area + math.log(prior.height))
-    return np.asarray(np.minimum(prior.log_density + limited, prior.log_targets))
+def log_expected(prior: PositionPrior, positions: Array, covariances: Array) -> Array:
+    """Ln of lambda (2 pi)^(n/2) |P|^(1/2) for positions (K, 3) and covariances (K, 3, 3), within the region."""
+    widths = prior.region[:, 1] - prior.region[:, 0]
+    plane = covariances[:, :2, :2]
+    det = np.maximum(plane[:, 0, 0] * plane[:, 1, 1] - plane[:, 0, 1] ** 2, 1e-300)
+    # the covariance as it is within the region: a normal density of the region's width has this variance
+    edge = widths[:2] ** 2 / (2.0 * math.pi)
+    trace = plane[:, 0, 0] / edge[0] + plane[:, 1, 1] / edge[1]
+    within = det / (1.0 + trace + det / (edge[0] * edge[1]))
+    upright = np.exp(0.5 * (np.linalg.slogdet(covariances)[1] - np.log(det)))
+    height = np.minimum(math.sqrt(2.0 * math.pi) * upright, widths[2])
+    outside = np.maximum(prior.region[:, 0] - positions, positions - prior.region[:, 1]).clip(min=0.0)[:, :2]
+    away = (outside**2 / np.diagonal(plane, axis1=1, axis2=2)).max(axis=1)
+    log_volume = math.log(2.0 * math.pi) + 0.5 * np.log(within) + np.log(height)
+    return np.asarray(np.minimum(prior.log_density + log_volume, prior.log_targets) - 0.5 * away)

@@ -93,7 +93,8 @@ def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_uni
                 f"{_place(path, row, chosen[meaning])}: "
                 f"expected at most {limit:g} in size, got {columns[meaning][row]:g}"
             )
-    ids, target = np.unique(table[chosen["id"]].to_numpy(dtype=str)[known], return_inverse=True)
+    # known ones alone: beside a missing one pandas cuts texts to their first letter
+    ids, target = np.unique(table[chosen["id"]][known].astype(str).to_numpy(dtype=str), return_inverse=True)
     time, lat, lon, height = (columns[meaning][known] for meaning in ("time", "latitude", "longitude", "altitude"))
     height = height * ALTITUDE_UNITS[altitude_unit]
     if len(height) >= 10 and float(np.quantile(height, 0.9)) > HIGH:
