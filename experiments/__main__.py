@@ -36,20 +36,66 @@ EXPERIMENTS = (
         "time and memory of one large scan, in a process of its own",
         "one line of JSON: family scale of the benchmarks",
     ),
-    Experiment("papers.ant_colony", "table 1 of the ant colony paper", "docs/sweeps.md (table 1), docs/papers.md"),
+    Experiment(
+        "pages",
+        "nothing: writes the tables of four pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md",
+    ),
+    Experiment(
+        "papers.ant_colony",
+        "table 1 of the ant colony paper, readings of it, its conclusion",
+        "docs/sweeps.md (table 1), docs/papers.md; with --publish experiments/results/papers.ant_colony.json",
+    ),
     Experiment(
         "papers.clustering_time_window",
-        "the clustering time window of Cahyono's thesis",
-        "docs/recordings.md (what the window is worth), docs/papers.md",
+        "the clustering time window of Cahyono's thesis on simulated recordings",
+        "docs/recordings.md (what the window is worth), docs/papers.md; with --publish "
+        "experiments/results/papers.clustering_time_window.json",
     ),
-    Experiment("papers.modified_ekf", "the modified EKF for a 3-D radar", "docs/filters.md, docs/papers.md"),
-    Experiment("papers.fuzzy_ekf", "the EKF with fuzzy inference", "docs/filters.md, docs/papers.md"),
-    Experiment("papers.dubins_enkf", "Dubins paths and the ensemble Kalman filter", "docs/filters.md, docs/papers.md"),
-    Experiment("filters.benchmark", "time of our filters and of other packages'", "docs/filters.md (speed)"),
-    Experiment("filters.consistency", "NEES and NIS of every filter", "docs/filters.md (consistency)"),
-    Experiment("filters.endurance", "covariances after 100,000 corrections", "docs/filters.md (consistency)"),
+    Experiment(
+        "papers.clustering_time_window.tables",
+        "the thesis's tables 2.1 and 4.1 to 4.24, given as a folder, and its five aircraft",
+        "docs/recordings.md, docs/papers.md; with --publish "
+        "experiments/results/papers.clustering_time_window.tables.json",
+    ),
+    Experiment(
+        "papers.modified_ekf",
+        "the modified EKF for a 3-D radar: the paper's setting, and B1",
+        "docs/filters.md, docs/papers.md; with --publish experiments/results/papers.modified_ekf.json",
+    ),
+    Experiment(
+        "papers.fuzzy_ekf",
+        "the EKF with fuzzy inference",
+        "docs/filters.md, docs/papers.md; with --publish experiments/results/papers.fuzzy_ekf.json",
+    ),
+    Experiment(
+        "papers.fuzzy_ekf.tune_published",
+        "tuning of what the fuzzy paper does not give",
+        "experiments/papers/fuzzy_ekf/published_rules.json",
+    ),
+    Experiment(
+        "papers.dubins_enkf",
+        "Dubins paths and the ensemble Kalman filter",
+        "docs/filters.md, docs/papers.md; with --publish experiments/results/papers.dubins_enkf.json",
+    ),
+    Experiment(
+        "filters.benchmark",
+        "time of our filters and of other packages'",
+        "docs/filters.md (speed); with --publish experiments/results/filters.benchmark.json",
+    ),
+    Experiment(
+        "filters.consistency",
+        "NEES and NIS of every filter",
+        "docs/filters.md (consistency); with --publish experiments/results/filters.consistency.json",
+    ),
+    Experiment(
+        "filters.endurance",
+        "covariances after 100,000 corrections",
+        "docs/filters.md (consistency); with --publish experiments/results/filters.endurance.json",
+    ),
     Experiment("filters.tune", "tuning of the fuzzy rules and of the IMM", "assoc/filters/fuzzy/tuned_parameters.json"),
     Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
+    Experiment("trackers.biases", "registration of biased radars", "docs/registration.md (measured)"),
     Experiment("trackers.close_targets", "trackers where association is hard", "docs/tracking.md (close targets)"),
     Experiment("trackers.comparison", "our trackers side by side", "docs/tracking.md (measured)"),
     Experiment(
@@ -60,7 +106,11 @@ EXPERIMENTS = (
     Experiment(
         "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"
     ),
-    Experiment("sweep_overhead", "time of a parameter study besides its solves", "docs/sweeps.md (overhead)"),
+    Experiment(
+        "sweep_overhead",
+        "time of a parameter study besides its solves",
+        "docs/sweeps.md (overhead); with --publish experiments/results/sweep_overhead.json",
+    ),
     Experiment("cold_start", "what a user waits for after an installation", "nothing in the pages: make bench-cold"),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),

@@ -20,7 +20,7 @@ from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
 from assoc.costs.prices import position_prior, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -38,6 +38,7 @@ def build_problem(
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
     target_density: float | str | None = None,
+    all_tuples: bool = False,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -73,6 +74,9 @@ def build_problem(
         -ln(density (2 pi)^(n/2) |P|^(1/2)) with P the covariance of the position. "auto" takes the density from the
         numbers of measurements in the scene. The prior is right where measurements hardly determine positions, as
         bearings: equation 5 then finds too many targets.
+    all_tuples : bool
+        Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
+        papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
 
     Returns
     -------
@@ -81,7 +85,7 @@ def build_problem(
     Raises
     ------
     LimitExceededError
-        There are more candidates than `max_tuples`; the message estimates how many.
+        There are more tuples than `max_tuples`; the message says how many, or estimates it.
     InvalidInputError
         An argument is out of range.
 
@@ -98,6 +102,8 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if all_tuples:
+        return _whole_grid(scene, one, int(max_tuples), speed, target_density)
     if not one.at_once:
         _refuse_prior(target_density)
         return timed_problem(scene, one, probability, int(max_tuples), speed)
@@ -113,6 +119,21 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def _whole_grid(
+    scene: Scene, one: Scan, most: int, speed: float | Sequence[float], density: float | str | None
+) -> AssignmentProblem:
+    shape = [int(size) + 1 for size in one.sizes]
+    count = math.prod(shape) - 1
+    if count > most:
+        raise LimitExceededError(
+            f"scan {one.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
+        )
+    # the first of the grid is the tuple without measurements, which no problem has
+    tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
+    costs = tuple_costs(scene, one, tuples, speed=speed, target_density=density)
+    return AssignmentProblem(tuples, costs, one.sizes)
 
 
 def tuple_costs(

@@ -87,7 +87,8 @@ def _by_track(tracks: pd.DataFrame) -> Iterator[tuple[int, str, pd.DataFrame]]:
 
 def _lines(rows: pd.DataFrame) -> list[list[list[float]]]:
     """Longitude, latitude, altitude of each row, cut where the track passes the date line."""
-    points = np.round(rows[["longitude", "latitude", "altitude"]].to_numpy(dtype=float), 7)
+    # an altitude that nobody told is shown on the ground
+    points = np.round(np.nan_to_num(rows[["longitude", "latitude", "altitude"]].to_numpy(dtype=float)), 7)
     cuts = np.flatnonzero(np.abs(np.diff(points[:, 0])) > 180.0) + 1
     return [part.tolist() for part in np.split(points, cuts)]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
-from assoc.tracking.maps import COORDINATES, coordinates, followed_targets
+from assoc.tracking.maps import coordinates, followed_targets
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
 
@@ -21,9 +22,13 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z",
+    "sigma_x", "sigma_y", "sigma_z", "speed", "heading", "altitude",
 )  # fmt: skip
-"""Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position."""
+"""Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
+
+Speed and heading are those of the horizontal velocity (equations 3.5 to 3.8 of the thesis on clustering time windows,
+of the filter's estimate and not from plot to plot), the heading in degrees, clockwise from +y: with y to the north a
+compass heading."""
 
 
 class TrackTable:
@@ -34,7 +39,8 @@ class TrackTable:
     Parameters
     ----------
     origin : tuple of latitude, longitude, height, optional
-        Of the scene (`assoc.Scene.origin`): the table then has columns latitude, longitude (degrees) and altitude.
+        Of the scene (`assoc.Scene.origin`): the table then has latitude and longitude in degrees, and altitudes
+        above the ellipsoid.
 
     Attributes
     ----------
@@ -47,7 +53,12 @@ class TrackTable:
         self.targets: dict[int, str] = {}
         self._rows: list[tuple[Any, ...]] = []
 
-    def add(self, tracks: Iterable[Track], positions: Sequence[int] = (0, 1, 2)) -> None:
+    def add(
+        self,
+        tracks: Iterable[Track],
+        positions: Sequence[int] = (0, 1, 2),
+        altitudes: Mapping[int, float] | None = None,
+    ) -> None:
         """Add the tracks of one scan.
 
         Parameters
@@ -55,10 +66,14 @@ class TrackTable:
         tracks : iterable of Track
         positions : sequence of int
             Where x, y (and z) stand in the state: ``filter.motion.position``.
+        altitudes : mapping of track id to metres, optional
+            What transponders have told; without it the altitude is z, of tracks in the plane NaN.
         """
         for track in tracks:
             sigma = np.zeros(3)
             sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
+            vx, vy = track.velocity[:2].tolist()
+            told = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
             self._rows.append(
                 (
                     track.track_id,
@@ -71,6 +86,9 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    math.hypot(vx, vy),
+                    math.degrees(math.atan2(vx, vy)) % 360.0,
+                    told if altitudes is None else altitudes.get(track.track_id, math.nan),
                 )  # fmt: skip
             )
 
@@ -85,8 +103,10 @@ class TrackTable:
         kinds = dict.fromkeys(COLUMNS, "float64") | {"track_id": "int64", "confirmed": "bool", "hits": "int64"}
         frame = frame.astype(kinds)
         if self.origin is not None:
-            found = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin)
-            frame = frame.assign(**dict(zip(COORDINATES, found.T, strict=True)))
+            latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
+            # a track in the plane has no height of its own; what its transponder told stays
+            frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
+            frame = frame.assign(latitude=latitude, longitude=longitude)
         if self.targets:
             frame["target"] = [self.targets.get(number, "") for number in frame["track_id"].tolist()]
         return frame
