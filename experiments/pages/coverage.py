@@ -108,8 +108,8 @@ def ant_colony() -> str:
             f"{NOT}: a tour ends when no node is allowed", aco),
         Row("scene: targets, 3 radars, P_d, false alarms", "assoc/simulation/scenarios/three_radar.py",
             f"{HOLDS}; noise and region are not given and chosen by us", test("tests/simulation/")),
-        Row("figures 1 and 2, targets and measurements", TRUTH, "drawn, no figures to compare", command),
-        Row("figure 3, measurements selected", TRUTH, "drawn, no figures to compare", command),
+        Row("figures 1 and 2, targets and measurements", TRUTH, f"{HOLDS}: drawn; no numbers to compare", command),
+        Row("figure 3, measurements selected", TRUTH, f"{HOLDS}: drawn; no numbers to compare", command),
         Row("table 1, mean cycles", TABLE_1,
             f"{verdict(*settings)}: {number(cycles.ours)} against {number(cycles.paper or 0.0)}; "
             f"nearest of the [readings](sweeps.md) of what is left open: {number(grid.ours)}, all tuples as nodes",
@@ -193,11 +193,12 @@ def clustering_time_window() -> str:
             f"{ABSENT} as a recording: they have no times, and gaps", rebuild),
         Row("tables 4.10, 4.12, 4.14, 4.16, 4.18, figures 4.1 to 4.5, without the window",
             TABLES_PROGRAM,
-            f"read again, plots held of the five: {', '.join(held('without', one) for one in aircraft)}; our tracks "
+            f"{ABSENT} as a result of ours, without the recording; read again, plots held of the five: "
+            f"{', '.join(held('without', one) for one in aircraft)}; our tracks "
             f"of the same plots, times chosen by us: {', '.join(held('ours', one) for one in aircraft)}", rebuild),
         Row("tables 4.19 to 4.23, figures 4.6 to 4.10, with the window",
             TABLES_PROGRAM,
-            f"read again, plots held of the five: {', '.join(held('with', one) for one in aircraft)}", rebuild),
+            f"{ABSENT} likewise; plots held: {', '.join(held('with', one) for one in aircraft)}", rebuild),
         Row("figures 4.11 to 4.15, comparison; conclusion 2", TABLES_PROGRAM,
             f"{verdict(better)}: the window's track holds more in {better.ours:.0f} of the five", rebuild),
         Row("table 4.24 and conclusion 3, a false plot at the start", FALSE_START,
@@ -218,7 +219,8 @@ def clustering_time_window() -> str:
         Row("conclusions 1 and 2 on the thesis's recording", "", f"{ABSENT}: the recording is not public", ""),
         Row("appendix A, tracks of all aircraft", "", f"{ABSENT}: pictures without figures", ""),
         Row("appendix B, figures 1 to 7, program", "assoc/track.py",
-            f"{HOLDS}: plots, aircraft, tracks, altitudes and CT, MT, IT in `assoc.track --report`", test("tests/programs/test_track.py")),
+            f"{HOLDS}: plots, aircraft, tracks, altitudes and CT, MT, IT in `assoc.track --report`",
+            test("tests/programs/test_track.py")),
     ])  # fmt: skip
 
 
@@ -274,7 +276,7 @@ def modified_ekf() -> str:
         Row("tables 4.1 and 4.2, start and parameters", where,
             f"{NOT} together: R_k and the sigmas contradict each other, so each reading is a row", command),
         *variables,
-        Row("figure 4.7, errors", where, "drawn; velocities keep the error of the start: no measurement reaches them",
+        Row("figure 4.7, errors", where, f"{NOT}: velocities keep the error of the start, no measurement reaches them",
             command),
         Row("table 4.3, modified below EKF", where,
             f"{NOT} with the paper's model: ratio {number(ratio['sigmas'].ours)} (sigmas), {number(ratio['R_k'].ours)} "
@@ -332,14 +334,16 @@ def fuzzy_ekf() -> str:
         Row("equations 38 to 40, Q_0, R_0, P_0", "experiments/papers/fuzzy_ekf/published.py",
             f"{NOT} taken literally: {span(literal)} m, worse than the raw measurements", command),
         Row("equation 41, Jacobian", "assoc/sensors/", f"{HOLDS}; row 3 lacks a square root", sensors),
-        Row("figures 5 and 6, EKF, RMSE 52.06 m", figures, f"{NOT} on our flights: {span(plain)} m, the best of a grid", command),
+        Row("figures 5 and 6, EKF, RMSE 52.06 m", figures,
+            f"{NOT} on our flights: {span(plain)} m, the best of a grid", command),
         Row("EKF 41.93 % below the raw measurements", where, f"{NOT} on our flights: {span(gained)} %", command),
-        Row("figures 10 and 11, EKF with inference, RMSE 35.9 m", figures, f"{NOT} on our flights: {span(rules)} m", command),
+        Row("figures 10 and 11, EKF with inference, RMSE 35.9 m", figures,
+            f"{NOT} on our flights: {span(rules)} m", command),
         Row("59.97 % below the raw measurements", where, f"{verdict(*below)}: ours {span(below)} %", command),
         Row("conclusion: inference improves the EKF", where,
             f"{verdict(*against)} scenarios: {span(against)} times the best fixed EKF of the same model, against 0.69",
             command),
-        Row("figures 12 and 13, q and r over time", figures, "drawn, no figures to compare", command),
+        Row("figures 12 and 13, q and r over time", figures, f"{HOLDS}: drawn; no numbers to compare", command),
     ])  # fmt: skip
 
 
@@ -373,14 +377,15 @@ def dubins_enkf() -> str:
             f"{HOLDS}; the constants are not given, those of a published aircraft are used", motion),
         Row("equation 3, ends", "", f"{ABSENT}: values are not given", ""),
         Row("equation 4, limits", where,
-            f"{ABSENT}: the paper gives no values; with those of the published aircraft, speeds: {verdict(*speeds)}", command),
+            f"{ABSENT}: the paper gives no values; with those of the published aircraft, speeds: {verdict(*speeds)}",
+            command),
         Row("equations 5 and 6, circles, tangents, length", "assoc/simulation/dubins/paths.py", HOLDS, dubins),
         Row("equation 7, existence", "assoc/simulation/dubins/paths.py", HOLDS, dubins),
         Row("equations 8 to 13, ensemble Kalman filter", "assoc/filters/ensemble.py", HOLDS, enkf),
         Row("equations 14 to 16, length of RSL and the others", "assoc/simulation/dubins/paths.py",
             f"{HOLDS}; equation 16 is not legible. The paper prints no length; ours in m: "
             + ", ".join(f"{word} {value}" for word, value in lengths.items()), command),
-        Row("figure 1, path around an obstacle", paths, "drawn with its kinks", command),
+        Row("figure 1, path around an obstacle", paths, f"{HOLDS}: drawn, with its kinks", command),
         Row("equations 17 to 19, forward difference", "assoc/filters/motion/unmanned_aircraft.py",
             f"{HOLDS}; the row of v adds gamma_k where v_k is meant", motion),
         Row("equations 20 to 31, filter on the model", "assoc/filters/ensemble.py", HOLDS, enkf),
@@ -404,7 +409,8 @@ def dubins_enkf() -> str:
             f"{verdict(*members['changing attack'])}: N 200 / N 100 {number(members['changing attack'][0].ours)}; "
             "the text itself uses 100", command),
         Row("far better if all states are measured", where, verdict(*measured), command),
-        Row("conclusion: estimates near the truth", where, f"{verdict(*fixed, *third, *treble)} over three process noises: the noise decides it", command),
+        Row("conclusion: estimates near the truth", where,
+            f"{verdict(*fixed, *third, *treble)} over three process noises: the noise decides it", command),
     ])  # fmt: skip
 
 
