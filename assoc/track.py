@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
+    from assoc.tracking.plot_tracks import PlotTracks
 
 TRACKERS = {
     "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
@@ -35,7 +36,7 @@ TRACKERS = {
     "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
     "nearest-neighbour": "assigns each measurement to the nearest track",
 }
-WINDOWS = ("ctw", "ctw-time", "none")
+WINDOWS = ("ctw", "ctw-time", "irregular", "none")
 # option -> the trackers that take it
 _OWN = {
     "depth": ("mht", "mht-hypothesis"),
@@ -78,7 +79,7 @@ def _track(words: list[str]) -> None:
         one.kind = float
     parsed = vars(_parser([*own, *cycle, *start]).parse_args(words))
     file = parsed["file"]
-    check_outputs([parsed["output"], parsed["report"]], [file])
+    check_outputs([parsed["output"], parsed["report"], parsed["rates"]], [file])
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
@@ -93,8 +94,10 @@ def _track(words: list[str]) -> None:
         if parsed["window"] is not None:
             raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
         count, tracker, table, scene = _of_scene(file, parsed, settings)
+        plots = None
     else:
-        count, tracker, table, scene = _of_plots(file, parsed, settings)
+        tracker, plots = _of_plots(file, parsed, settings)
+        count, table, scene = len(plots.windows), plots.table, None
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
 
@@ -104,12 +107,19 @@ def _track(words: list[str]) -> None:
 
             used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+            more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
+
+    def write_rates() -> None:
+        if parsed["rates"] and plots is not None:
+            _write_rates(parsed["rates"], plots)
 
     write_all(
         lambda: table.to_csv(parsed["output"]),
+        write_rates,
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
+        lambda: _report_rates(plots),
     )
 
 
@@ -149,8 +159,10 @@ def _parser(further: Sequence[Option]) -> Parser:
     plots.add_argument(
         "--window",
         metavar="NAME",
-        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; none, one by one",
+        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by "
+        "random intervals; none, one by one",
     )
+    plots.add_argument("--rates", metavar="FILE", help="write CT, MT and IT of each window (.csv; needs identities)")
     plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
     add = plots.add_argument
     add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
@@ -203,6 +215,8 @@ def _of_scene(
     from assoc.tracking import track_scene
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
+    if parsed["rates"] is not None:
+        raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
@@ -217,12 +231,11 @@ def _of_scene(
     return scene.num_scans, tracker, table, scene
 
 
-def _of_plots(
-    file: str, parsed: dict[str, Any], settings: dict[str, Any]
-) -> tuple[int, Tracker, TrackTable, Scene | None]:
-    from assoc.recordings import Window, clustering_time_window, radar_of, read_plots
-    from assoc.tracking import TrackTable
-    from assoc.tracking.plot_windows import step_windows
+def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks]:
+    import numpy as np
+
+    from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
+    from assoc.tracking.plot_tracks import track_plots
 
     if parsed["registration"] is not None:
         raise InvalidInputError("--registration: biases of one radar alone cannot be observed; it is for scenes")
@@ -241,17 +254,40 @@ def _of_plots(
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
+    if parsed["rates"] and recording.aircraft is None:
+        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
         windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
+    elif window == "irregular":
+        windows = irregular_groups(recording, np.random.default_rng(settings.get("seed", 0)))
     else:
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
-    table = TrackTable()
-    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
-        tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
-        table.add(tracks, tracker.filter.motion.position)
-    return len(windows), tracker, table, None
+    shown = with_progress(windows, len(windows), "tracking")
+    return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
+
+
+def _write_rates(path: str, plots: PlotTracks) -> None:
+    from assoc._files.output import write_text
+
+    assert plots.rates is not None
+    lines = ["window,time,plots,ct,mt,it"]
+    for number_of, row in zip(plots.rates.windows.tolist(), plots.rates.per_window.tolist(), strict=True):
+        cells = ["" if math.isnan(value) else f"{value:.2f}" for value in row]
+        lines.append(f"{number_of + 1},{plots.ends[number_of]:g},{len(plots.windows[number_of])},{','.join(cells)}")
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _report_rates(plots: PlotTracks | None) -> None:
+    if plots is None or plots.rates is None:
+        return
+    rates, known = plots.rates, "aircraft" if plots.recording.sources is not None else "Mode 3"
+    figures = ", ".join(
+        f"{name} {'-' if math.isnan(value) else f'{value:.1f} %'}"
+        for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
+    )
+    print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
 
 
 def _report(
