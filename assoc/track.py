@@ -24,6 +24,7 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from assoc.recordings import Recording
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
@@ -165,6 +166,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     plots.add_argument("--rates", metavar="FILE", help="write CT, MT and IT of each window (.csv; needs identities)")
     plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
     add = plots.add_argument
+    add("--radar", metavar="SAC/SIC", help="which radar of an ASTERIX file (.ast, .asterix, .pcap)")
     add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
     add("--range-noise", metavar="M", help="standard deviation of range, metres (default: from the plots' steps)")
     add("--bearing-noise", metavar="DEG", help="standard deviation of bearing, degrees (default: likewise)")
@@ -182,6 +184,24 @@ def _is_npz(file: str) -> bool:
     except OSError:
         return not file.lower().endswith(".csv")
     return start == b"PK\x03\x04" or file.lower().endswith(".npz")
+
+
+def _is_asterix(file: str) -> bool:
+    return file.lower().endswith((".ast", ".asterix", ".pcap"))
+
+
+def _read_asterix(file: str, radar: str | None) -> Recording:
+    """Plots of one radar of an ASTERIX file."""
+    from assoc.integrations.asterix import read_asterix
+
+    plots = {f"{sac}/{sic}": recording for (sac, sic), recording in sorted(read_asterix(file).plots.items())}
+    if not plots:
+        raise InvalidInputError(f"{file}: holds no plots (category 048)")
+    if radar is None and len(plots) == 1:
+        return next(iter(plots.values()))
+    if radar not in plots:
+        raise InvalidInputError(f"--radar: the file holds plots of {', '.join(plots)}; name one")
+    return plots[radar]
 
 
 def _make(
@@ -253,7 +273,9 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
-    recording = read_plots(file)
+    recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
+    if parsed["radar"] is not None and not _is_asterix(file):
+        raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
     if parsed["rates"] and recording.aircraft is None:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":

@@ -83,7 +83,8 @@ class Recording:
             raise InvalidInputError(f"altitudes must be numbers or NaN of shape {shape}, got {altitudes.shape}")
         altitudes.setflags(write=False)
         put(self, "altitudes", altitudes)
-        for name, default in (("identities", UNDECODED), ("addresses", 0), ("lines", 0), ("garbled", False), ("sources", None)):
+        numbers = (("identities", UNDECODED), ("addresses", 0), ("lines", 0), ("garbled", False), ("sources", None))
+        for name, default in numbers:
             value: Any = getattr(self, name)
             if value is None and default is None:
                 continue

@@ -1,10 +1,12 @@
-"""ASTERIX: round trips to the last step, bytes of the standard's own example, cut and hostile files, midnight, a pcap."""
+"""ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
 
 from __future__ import annotations
 
 import math
 import struct
-import urllib.request
+import subprocess
+import sys
+import tarfile
 
 import numpy as np
 import pandas as pd
@@ -12,14 +14,13 @@ import pytest
 
 pytest.importorskip("asterix", reason="libasterix is not installed: pip install 'assoc[asterix]'")
 
+from assoc import track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_tracks, write_plots, write_tracks
 from assoc.integrations.asterix.blocks import edition
 from assoc.recordings import Recording
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.simulation import simulate_recording
-
-SAMPLE = "https://github.com/CroatiaControlLtd/asterix/raw/master/asterix/sample_data/cat_034_048.pcap"
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +107,8 @@ def test_adsb_as_seen_from_a_place(tmp_path):
 def test_tracks_there_and_back(tmp_path):
     rng = np.random.default_rng(0)
     count = 250
-    frame = pd.DataFrame(rng.normal(0, 1, (count, 6)) * [5e4, 5e4, 3e3, 200, 200, 10], columns=[*"xyz", "vx", "vy", "vz"])
+    values = rng.normal(0, 1, (count, 6)) * [5e4, 5e4, 3e3, 200, 200, 10]
+    frame = pd.DataFrame(values, columns=[*"xyz", "vx", "vy", "vz"])
     frame.insert(0, "track_id", np.arange(count) + 1)
     frame.insert(1, "time", np.sort(rng.uniform(0, 3600, count)))
     frame["confirmed"] = rng.random(count) < 0.8
@@ -206,11 +208,38 @@ def test_bad_arguments(plots, tmp_path):
 @pytest.mark.slow
 def test_a_recording_of_real_radars(tmp_path):
     """The sample of another decoder (GPL: fetched here, never shipped): 126 plots of 7 radars."""
+    words = ["pip", "download", "--quiet", "--no-deps", "--no-binary", ":all:", "-d", str(tmp_path), "asterix_decoder"]
     try:
-        with urllib.request.urlopen(SAMPLE, timeout=10) as answer:
-            content = answer.read(10_000_000)
-    except OSError:
+        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, timeout=120)
+    except subprocess.TimeoutExpired:
         pytest.skip("the sample cannot be reached")
-    (tmp_path / "sample.pcap").write_bytes(content)
+    archives = list(tmp_path.glob("asterix_decoder-*.tar.gz"))
+    if done.returncode or not archives:
+        pytest.skip("the sample cannot be reached")
+    with tarfile.open(archives[0]) as archive:
+        member = next(one for one in archive if one.name.endswith("/asterix/sample_data/cat_034_048.pcap"))
+        (tmp_path / "sample.pcap").write_bytes(archive.extractfile(member).read())
     found = read_asterix(tmp_path / "sample.pcap")
     assert sum(len(one) for one in found.plots.values()) == 126 and len(found.plots) == 7
+    assert found.radars[25, 12].rotation == pytest.approx(4.945, abs=0.001)
+    latitude, longitude, height = found.radars[25, 12].place
+    assert math.degrees(latitude) == pytest.approx(43.571, abs=0.001) and height == 780.0
+    assert math.degrees(longitude) == pytest.approx(16.406, abs=0.001)
+
+
+def test_the_program_takes_them(file, plots, tmp_path, capsys):
+    words = ["-o", str(tmp_path / "tracks.csv"), "--window", "ctw-time", "--rotation", "9.5"]
+    assert track.main([str(file), *words, "--range-noise", "500", "--bearing-noise", "0.1"]) == 0
+    assert f"{len(plots)} plots over" in capsys.readouterr().out
+    write_plots(tmp_path / "other.ast", plots, (25, 202))
+    (tmp_path / "two.ast").write_bytes(file.read_bytes() + (tmp_path / "other.ast").read_bytes())
+    assert track.main([str(tmp_path / "two.ast"), *words]) == 2
+    assert "--radar: the file holds plots of 25/201, 25/202; name one" in capsys.readouterr().err
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "25/202", "--range-noise", "500",
+                       "--bearing-noise", "0.1"]) == 0  # fmt: skip
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "1/1"]) == 2
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "one"]) == 2
+    (tmp_path / "cut.ast").write_bytes(file.read_bytes()[:40])
+    capsys.readouterr()
+    assert track.main([str(tmp_path / "cut.ast"), *words]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1

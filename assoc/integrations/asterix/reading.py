@@ -140,7 +140,8 @@ def read_asterix(
                 continue
             source = (sac, sic)
             if block.category == 34:
-                _take_service(record, radars.setdefault(source, {"norths": []}), clocks.setdefault(source, SourceRows()))
+                radar, clock = radars.setdefault(source, {"norths": []}), clocks.setdefault(source, SourceRows())
+                _take_service(record, radar, clock)
                 continue
             row, kept = (_plot, plots) if block.category == 48 else (_report, reports)
             rows = kept.setdefault(source, SourceRows())

@@ -53,7 +53,8 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
         values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
         most = 1 << (bits - 1)
         if len(values) and not ((values >= -most) & (values < most)).all():
-            raise InvalidInputError(f"tracks: {name} does not fit category 062, expected at most {most * step:g} in size")
+            expected = f"expected at most {most * step:g} in size"
+            raise InvalidInputError(f"tracks: {name} does not fit category 062, {expected}")
         raw[name] = values.astype(np.int64) & ((1 << bits) - 1)
     known = tracks["confirmed"].to_numpy() if "confirmed" in tracks else np.ones(len(tracks), dtype=bool)
     contents: list[dict[str, Any]] = []
