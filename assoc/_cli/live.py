@@ -102,6 +102,7 @@ class Lines:
             try:
                 self._socket.bind(("127.0.0.1", port))
             except (OSError, OverflowError) as error:
+                self._socket.close()
                 raise InvalidInputError(f"--udp: port {port} cannot be used ({error})") from None
         threading.Thread(target=self._read, name="plots", daemon=True).start()
 

@@ -16,7 +16,7 @@ from assoc._types import Array
 from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scene import Scene
-from assoc.tracking.checking import checked_measurements
+from assoc.tracking.checking import checked
 from assoc.tracking.late_plots import HORIZON, LatePlots
 from assoc.tracking.track import Track
 from assoc.tracking.tracker import Tracker
@@ -164,10 +164,8 @@ class LiveTracker:
             self.leave_out("unknown sensor", f"plot of the unknown sensor {str(sensor)[:40]!r} left out")
             return []
         where = self._scene.sensors[s].name or s + 1
-        empty = [np.zeros((0, one.dim)) for one in self._scene.sensors]
         try:
-            empty[s] = np.array([values], dtype=np.float64)
-            z = checked_measurements(empty, self._scene.sensors)[s][0]
+            z = checked(np.array([values], dtype=np.float64), s, self._scene.sensors[s])[0]
         except (AssocError, TypeError, ValueError) as error:
             self.leave_out("unusable", f"plot of {where} left out: {error}")
             return []

@@ -62,6 +62,7 @@ class LivePage:
         self._last: str | None = None
         self._readers: set[queue.Queue[str | None]] = set()
         self._lock = threading.Lock()
+        self._closed = False
         page = self
 
         class Handler(_Handler):
@@ -104,7 +105,10 @@ class LivePage:
                 one.put_nowait(event)
 
     def close(self) -> None:
-        """Tell the browsers that no more comes, and stop."""
+        """Tell the browsers that no more comes, and stop; a second time does nothing."""
+        if self._closed:
+            return
+        self._closed = True
         self._push(_event("end", {}))
         with self._lock:
             readers = list(self._readers)
