@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
+    from assoc.tracking.plot_tracks import PlotTracks
 
 _INTERRUPTION = Interruption("assoc.track")
 TRACKERS = {
@@ -37,7 +38,7 @@ TRACKERS = {
     "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
     "nearest-neighbour": "assigns each measurement to the nearest track",
 }
-WINDOWS = ("ctw", "ctw-time", "none")
+WINDOWS = ("ctw", "ctw-time", "irregular", "none")
 # option -> the trackers that take it
 _OWN = {
     "depth": ("mht", "mht-hypothesis"),
@@ -85,7 +86,7 @@ def _track(words: list[str]) -> None:
     file = parsed["file"]
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
-    check_outputs([parsed["output"], parsed["report"]], [file])
+    check_outputs([parsed["output"], parsed["report"], parsed["rates"]], [file])
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
@@ -106,8 +107,10 @@ def _track(words: list[str]) -> None:
         if parsed["window"] is not None:
             raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
         count, tracker, table, scene = _of_scene(file, parsed, settings)
+        plots = None
     else:
-        count, tracker, table, scene = _of_plots(file, parsed, settings)
+        tracker, plots = _of_plots(file, parsed, settings)
+        count, table, scene = len(plots.windows), plots.table, None
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
 
@@ -117,12 +120,19 @@ def _track(words: list[str]) -> None:
 
             used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+            more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
+
+    def write_rates() -> None:
+        if parsed["rates"] and plots is not None:
+            _write_rates(parsed["rates"], plots)
 
     write_all(
         lambda: table.to_csv(parsed["output"]),
+        write_rates,
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
+        lambda: _report_rates(plots),
     )
 
 
@@ -154,6 +164,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     )
     add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
+    add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
     add("--all", action="store_true", help="also write tentative tracks")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
@@ -162,8 +173,10 @@ def _parser(further: Sequence[Option]) -> Parser:
     plots.add_argument(
         "--window",
         metavar="NAME",
-        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; none, one by one",
+        help="how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by "
+        "random intervals; none, one by one",
     )
+    plots.add_argument("--rates", metavar="FILE", help="write CT, MT and IT of each window (.csv; needs identities)")
     plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
     add = plots.add_argument
     add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
@@ -226,9 +239,15 @@ def _of_scene(
     from assoc.tracking import track_scene
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
+    if parsed["rates"] is not None:
+        raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
+    if parsed["registration"] is not None:
+        if parsed["registration"] != "online":
+            raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
+        settings["registration"] = "online"
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
@@ -236,13 +255,14 @@ def _of_scene(
     return scene.num_scans, tracker, table, scene
 
 
-def _of_plots(
-    file: str, parsed: dict[str, Any], settings: dict[str, Any]
-) -> tuple[int, Tracker, TrackTable, Scene | None]:
-    from assoc.recordings import Window, clustering_time_window, radar_of, read_plots
-    from assoc.tracking import TrackTable
-    from assoc.tracking.plot_windows import step_windows
+def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks]:
+    import numpy as np
 
+    from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
+    from assoc.tracking.plot_tracks import track_plots
+
+    if parsed["registration"] is not None:
+        raise InvalidInputError("--registration: biases of one radar alone cannot be observed; it is for scenes")
     name = parsed["tracker"] or "mht"
     parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):
@@ -258,17 +278,40 @@ def _of_plots(
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
     recording = read_plots(file)
+    if parsed["rates"] and recording.aircraft is None:
+        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
         windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
+    elif window == "irregular":
+        windows = irregular_groups(recording, np.random.default_rng(settings.get("seed", 0)))
     else:
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
-    table = TrackTable()
-    for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
-        tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
-        table.add(tracks, tracker.filter.motion.position)
-    return len(windows), tracker, table, None
+    shown = with_progress(windows, len(windows), "tracking")
+    return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
+
+
+def _write_rates(path: str, plots: PlotTracks) -> None:
+    from assoc._files.output import write_text
+
+    assert plots.rates is not None
+    lines = ["window,time,plots,ct,mt,it"]
+    for number_of, row in zip(plots.rates.windows.tolist(), plots.rates.per_window.tolist(), strict=True):
+        cells = ["" if math.isnan(value) else f"{value:.2f}" for value in row]
+        lines.append(f"{number_of + 1},{plots.ends[number_of]:g},{len(plots.windows[number_of])},{','.join(cells)}")
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _report_rates(plots: PlotTracks | None) -> None:
+    if plots is None or plots.rates is None:
+        return
+    rates, known = plots.rates, "aircraft" if plots.recording.sources is not None else "Mode 3"
+    figures = ", ".join(
+        f"{name} {'-' if math.isnan(value) else f'{value:.1f} %'}"
+        for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
+    )
+    print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
 
 
 def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
@@ -277,9 +320,9 @@ def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
     from assoc.scene.scene import Scene
     from assoc.tracking import LiveTracker
 
-    for flag in ("report", "window", "rotation", *_RADAR):
+    for flag in ("report", "rates", "window", "rotation", "registration", *_RADAR):
         if parsed[flag] is not None:
-            raise InvalidInputError(f"{flag_of(flag)}: is not for --live, whose sensors are those of a scene")
+            raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
     if parsed["udp"] is not None and parsed["replay"] is not None:
         raise InvalidInputError("--udp and --replay: expected one of them")
     parsed["filter"] = parsed["filter"] or "imm-cv"

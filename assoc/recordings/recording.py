@@ -107,6 +107,17 @@ class Recording:
         return np.stack([self.ranges, self.azimuths], axis=1)
 
     @property
+    def aircraft(self) -> Array | None:
+        """Which aircraft each plot is of (n,): the sources, else Mode 3, -1 where it is not decoded.
+
+        None where neither is known. A plot without an identity counts as one of no aircraft, as in the thesis.
+        """
+        if self.sources is not None:
+            return self.sources
+        decoded = self.identities != UNDECODED
+        return np.where(decoded, self.identities, -1) if decoded.any() else None
+
+    @property
     def positions(self) -> Array:
         """Places x (east), y (north) in the slant plane (n, 2), metres."""
         return self.ranges[:, None] * np.stack([np.cos(self.azimuths), np.sin(self.azimuths)], axis=1)

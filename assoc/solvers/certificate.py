@@ -119,7 +119,9 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
         for r in range(start[s], start[s + 1]):
             if found[r] >= 0 and exact:
                 indices[count] = found[r]
-                chosen[count] = tuples[found[r]]
+                # number by number: assigning a row would compile the text for shapes that differ
+                for k in range(num_sensors):
+                    chosen[count, k] = tuples[found[r], k]
                 prices[count] = costs[found[r]]
                 count += 1
     return exact, indices, chosen, prices, magnitude

@@ -139,11 +139,7 @@ class Reduction:
         num, granularity = self._whole.num_rows, self._whole.granularity
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
-        state: _State
-        if self._run.should_stop():
-            state = _start(self._whole.arrays)
-        else:
-            state = _begin(self._whole.arrays, closed, granularity, self._run.deadline())
+        state: _State = _start(self._whole.arrays)
         while counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
             state = _reduce(state, closed, granularity, self._run.deadline())
         self.closed_columns.append(closed.columns[: counts[1]])
@@ -162,12 +158,6 @@ class Reduction:
             component.bound = max(component.bound, float(state.bound[c]))
         self._proof[state.rows] = state.hard
         return components
-
-
-@njit
-def _begin(packing: PackingArrays, done: _Closed, granularity: float, deadline: float) -> _State:
-    """The state of the reduction after the first call of `_reduce`: the last one, on most scenes."""
-    return _reduce(_start(packing), done, granularity, deadline)
 
 
 @njit
