@@ -119,7 +119,8 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
         # where something is absent there may be nothing to show it with
         assert shown or result.startswith("absent"), element
         for program, what in shown:
-            assert (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES, element
+            known = (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES
+            assert known, element
 
 
 def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):
