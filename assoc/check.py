@@ -3,8 +3,8 @@
     python -m assoc.check PROBLEM SOLUTION        is it feasible, and what does it cost?
     python -m assoc.check PROBLEM PROOF           the same, and the lower bound that the proof gives
 
-This file needs nothing but Python: copy it anywhere. It shares no code with the solvers. Numbers are integers (multiples
-of 1e-60): nothing is ever rounded. Exit code 0: what the file claims holds; 1: it does not; 2: a file cannot be read.
+This file needs nothing but Python: copy it anywhere. It shares no code with the solvers. Numbers are whole multiples of
+1e-60: nothing is ever rounded. Exit code 0: what the file claims holds; 1: it does not; 2: a file cannot be read.
 
 Why a proof holds. Every measurement (row) must be in exactly one chosen tuple. For any multipliers u of the rows, a
 solution costs at least sum(u) if no tuple costs less than the u of its measurements together; where one does, the u of
