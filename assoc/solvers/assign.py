@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
@@ -32,6 +33,7 @@ def assign(
     time_limit: float | None = None,
     callback: Callback | None = None,
     advise: bool = True,
+    proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
     """Solve an assignment problem.
@@ -50,6 +52,9 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     advise : bool, default True
         Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
+    proof : path-like, optional
+        Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
+        (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
     **parameters
         Parameters of that solver (``assoc.solvers.parameters(name)``).
 
@@ -76,6 +81,8 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
+    if proof is not None:
+        check_writable(proof)
     run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
@@ -95,6 +102,10 @@ def assign(
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
         solution = certify(problem, prepared, outcome, run, solver, chosen)
+        if proof is not None:
+            from assoc.proofs import write_proof  # loads what few calls need
+
+            write_proof(proof, problem, solution)
     # only where nothing was found is it worth a look why
     if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
         for line in doubts_about_costs(problem):
