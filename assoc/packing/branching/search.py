@@ -298,7 +298,7 @@ def _search(work: _Work, stack: Stack, num_open: int, incumbent: float, limits: 
                 break
             num = _drop(work, num, bound, cut)
             allowed = Allowed(node.active[:num], node.columns, node.slack)
-            whole = _by_values(work, allowed)
+            whole = status == OPTIMAL and _by_values(work, allowed)
             weight, count = _greedy(work, allowed)
             if weight < incumbent - 1e-3 * tolerance:
                 incumbent = weight
@@ -315,7 +315,6 @@ def _search(work: _Work, stack: Stack, num_open: int, incumbent: float, limits: 
                 in_doubt = doubtful_pairs(cols, basis, trials)
             if in_doubt == 0:
                 one, two = any_open_pair(cols, allowed, work.trial)
-                closed = one < 0
                 break
             which, verdict = decide(program, cols, allowed, basis, trials, in_doubt, Effort(cut, 0, deadline))
             one, two, likely = int(trials.pairs[which, 0]), int(trials.pairs[which, 1]), trials.values[which]
@@ -331,6 +330,17 @@ def _search(work: _Work, stack: Stack, num_open: int, incumbent: float, limits: 
         num_open = top
         nodes += 1
         if closed:
+            continue
+        if one < 0:
+            # columns that share a row are the same: the lightest of each kind
+            allowed = Allowed(node.active[:num], node.columns, node.slack)
+            for a in range(num):
+                work.key[a] = program.weights[node.active[a]]
+            weight, count = _greedy(work, allowed)
+            if weight < incumbent:
+                incumbent = weight
+                count_found = count
+                work.found[:count] = work.trial[:count]
             continue
         for turn in range(2):
             # the likelier side comes last, and is searched first
