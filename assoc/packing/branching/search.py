@@ -188,13 +188,8 @@ def _greedy(work: _Work, allowed: Allowed) -> Any:
     covered = np.zeros(allowed.slack.size, np.bool_)
     weight = 0.0
     count = 0
-<<<<<<< HEAD
     for a in np.argsort(work.key[: allowed.active.size], kind="mergesort"):
         j = allowed.active[a]
-=======
-    for a in np.argsort(node.reduced[:num], kind="mergesort"):
-        j = active[a]
->>>>>>> main
         free = True
         duty = False
         for s in range(cols.shape[1]):
