@@ -29,7 +29,7 @@ from assoc.packing.packing import assemble
 # shares of the rows that are set free: at first, at the least and at the most (all would be an exact solver)
 _START, _LEAST, _MOST = 0.5, 0.2, 0.92
 # nodes of one try, and those up to which it was easy
-_NODES, _EASY = 50, 5
+_NODES, _EASY = 20, 5
 # tries on one cover: then only another one helps
 _TRIES = 300
 
