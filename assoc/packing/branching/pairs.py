@@ -46,7 +46,7 @@ class Trials(NamedTuple):
     ----------
     mass : float array, shape (R, R)
         Room: how much the columns with both rows add up to; 0 between calls.
-    gain, count : float32 array, shape (2, R, R), and uint8 array of the same shape
+    gain, tried : float32 array, shape (2, R, R), and uint8 array of the same shape
         Mean gain of the bound for each unit of the LP's values that a side forbids; side 0: apart, 1: together.
     pairs, values : int32 array, shape (K, 2), float array, shape (K,)
         The pairs in doubt, the most doubtful first, and their mass.
@@ -60,7 +60,7 @@ class Trials(NamedTuple):
 
     mass: NDArray[np.float64]
     gain: NDArray[np.float32]
-    count: NDArray[np.uint8]
+    tried: NDArray[np.uint8]
     pairs: NDArray[np.int32]
     values: Floats
     basis: Basis
@@ -197,8 +197,8 @@ def decide(
         value = trials.values[i]
         for joined in range(2):
             share = 1.0 - value if joined else value
-            tried = trials.count[joined, one, two]
-            if tried >= _RELIABLE:
+            known = trials.tried[joined, one, two]
+            if known >= _RELIABLE:
                 gains[joined] = trials.gain[joined, one, two] * share
                 continue
             status, reached = _try(program, cols, allowed, basis, trials, ((one, two), joined == 1), trial)
@@ -207,8 +207,8 @@ def decide(
             gain = max(reached - bound, 0.0)
             gains[joined] = gain
             mean = trials.gain[joined, one, two]
-            trials.gain[joined, one, two] = mean + (gain / share - mean) / (tried + 1.0)
-            trials.count[joined, one, two] = tried + 1
+            trials.gain[joined, one, two] = mean + (gain / share - mean) / (known + 1.0)
+            trials.tried[joined, one, two] = known + 1
         score = min(max(gains[0], 1e-4 * gap), gap) * min(max(gains[1], 1e-4 * gap), gap)
         if score > best:
             pick, best, in_vain = i, score, 0
