@@ -22,7 +22,8 @@ _SCENE = (
 <button type="button" id="plan" aria-pressed="true">Plan</button>
 <button type="button" id="space" aria-pressed="false">3-D</button></div>
 <div class="buttons" id="zooms"><button type="button" id="nearer" disabled>Zoom to target</button>
-<button type="button" id="whole">Whole scene</button></div>
+<button type="button" id="whole">Whole scene</button>
+<button type="button" id="legend" aria-pressed="true">Legend</button></div>
 <a href="#scans" id="to-row">row of this scan in the table</a></div>
 <div class="split"><div id="scene-plot" class="plot large"></div>
 <div><div id="detail" class="detail" aria-live="polite"></div>
