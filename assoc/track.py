@@ -34,6 +34,7 @@ TRACKERS = {
     "mht": "track-oriented multiple hypothesis tracking (default for plots)",
     "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
     "nearest-neighbour": "assigns each measurement to the nearest track",
+    "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
 WINDOWS = ("ctw", "ctw-time", "none")
 # option -> the trackers that take it
@@ -41,6 +42,8 @@ _OWN = {
     "depth": ("mht", "mht-hypothesis"),
     "max_branches": ("mht",),
     "max_hypotheses": ("mht-hypothesis",),
+    "max_events": ("joint-probabilistic",),
+    "rule": ("nearest-neighbour",),
 }
 # option -> what `assoc.recordings.radar_of` calls it, and its unit
 _RADAR = {
@@ -102,7 +105,8 @@ def _track(words: list[str]) -> None:
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
+            asked = solver if tracker.solver_calls else "none"
+            used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
@@ -146,6 +150,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    add("--max-events", metavar="N", help="joint-probabilistic: joint events listed for each cluster (default 100)")
+    add("--rule", metavar="NAME", help="nearest-neighbour: greedy (default), or assignment, which uses the solver")
     plots = parser.add_argument_group("options for plots")
     plots.add_argument(
         "--window",
@@ -189,7 +195,7 @@ def _make(
         flag = flag_of(option)
         if name not in takers:
             raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
-        extra[option] = whole_number(parsed[option], flag, 1)
+        extra[option] = parsed[option] if option == "rule" else whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
         noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
@@ -225,7 +231,8 @@ def _of_plots(
     parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):
         raise InvalidInputError(
-            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis or nearest-neighbour"
+            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis, nearest-neighbour or "
+            "joint-probabilistic"
         )
     window = parsed["window"] or "ctw"
     if window not in WINDOWS:
@@ -255,7 +262,9 @@ def _report(
     _, ids, _ = table.arrays()
     print(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
-    print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling")
+    # several trackers never need one, or only for what their own search leaves open
+    used = tracker.solver if tracker.solver_calls else "no solver used"
+    print(f"{tracker.name}, {used}: {elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling")
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise

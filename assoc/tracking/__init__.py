@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from assoc.tracking.initiation import Initiation
+from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
@@ -21,6 +22,7 @@ TRACKERS: dict[str, type[Tracker]] = {
         TrackOrientedMHT,
         HypothesisOrientedMHT,
         NearestNeighbourTracker,
+        JointProbabilisticTracker,
     )
 }
 """Trackers by the names that programs know them by."""
@@ -30,9 +32,11 @@ __all__ = [
     "Decision",
     "HypothesisOrientedMHT",
     "Initiation",
+    "JointProbabilisticTracker",
     "LifeCycle",
     "MultiSensorTracker",
     "NearestNeighbourTracker",
+    "PairProbabilities",
     "StaticFusionTracker",
     "Step",
     "Track",

@@ -57,15 +57,14 @@ class NearestNeighbourTracker(Tracker):
             chosen = self._choose(gated, s, batch.score, len(z))
             batch, hit, ids = self._take_in(batch, gated, chosen, s, len(z))
             free = np.flatnonzero(ids == 0)
-            states, fit, positions = self._singles(s, z[free])
+            states, fit, positions, score = self._singles(s, z[free])
             free = free[fit]
             when = np.full(len(free), time) if stamps is None else stamps[free]
             order = np.lexsort((*positions.T, when))
             new = self._new_ids(len(free))
             ids[free[order]] = new
-            score = np.full(len(free), self._birth[s])
             aged = predict_each(self.filter, states[order], (time - when)[order])
-            batch = TrackBatch.concatenate([batch, TrackBatch.new(aged, new, score, when[order])])
+            batch = TrackBatch.concatenate([batch, TrackBatch.new(aged, new, score[order], when[order])])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
         batch = batch.counted(seen).confirm(self.life_cycle)

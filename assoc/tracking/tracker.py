@@ -14,7 +14,7 @@ from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.positions import positions_and_covariances, single_positions
-from assoc.costs.tracks.scores import score_terms
+from assoc.costs.tracks.scores import log_birth, score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
@@ -113,15 +113,17 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {gate_probability!r}")
         self.gate_probability = float(gate_probability)
         self.max_tuples = max_tuples
-        self.terms = score_terms(self.sensors, self.initiation.birth_rate)
+        self.terms = score_terms(self.sensors)
         # a target that appears with a sensor's measurement was missed by the sensors before it
-        self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
+        self._appears = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
         self._widest = self.initiation.widest * float(np.linalg.norm(np.diff(self._place.region, axis=1)))
         self._time: float | None = None
         self._pace = 0.0
         self._scan = 0
         self._next_id = 1
         self._batch = empty_batch(self.filter)
+        self.solver_calls = 0
+        """Problems that the solver was given so far."""
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
@@ -283,6 +285,7 @@ class Tracker(Checkpoint):
         return np.random.SeedSequence((self.seed, self._scan))
 
     def _assign(self, problem: AssignmentProblem) -> Solution:
+        self.solver_calls += 1
         parameters = self.solver_parameters
         if self.solver == "exact" and self.time_limit is None:
             nodes = max(_LEAST_NODES, _VISITS // max(problem.num_tuples, 1))
@@ -320,13 +323,19 @@ class Tracker(Checkpoint):
             return np.asarray(covariances[:, 0, 0] <= limit)
         return np.asarray((covariances[:, 0, 0] <= limit) & (covariances[:, 1, 1] <= limit))
 
-    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array]:
-        """States of new tracks from single measurements (n, d) of sensor s, which can start one, and where."""
+    def _log_birth(self, covariances: Array) -> Array:
+        """What new targets add to the score of their measurements, by the covariances of their positions."""
+        region = self._place.region
+        return log_birth(covariances, float(np.prod(region[:, 1] - region[:, 0])), self.initiation.birth_rate)
+
+    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
+        """New tracks of single measurements (n, d) of sensor s: states, which can start one, where, and scores."""
         positions, covariances = single_positions(self._place, s, measured)
         fit = self._narrow(covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
-        return self.initiation.start(self.filter, positions, covariances), fit, positions
+        scores = self._appears[s] + self._log_birth(covariances)
+        return self.initiation.start(self.filter, positions, covariances), fit, positions, scores
 
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"

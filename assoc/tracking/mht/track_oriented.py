@@ -28,7 +28,6 @@ from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
 from assoc.tracking.gated_pairs import gated_pairs
-from assoc.tracking.mht.best_hypothesis import choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
@@ -90,17 +89,21 @@ class TrackOrientedMHT(Tracker):
     def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
         if times is not None and len(self.sensors) > 1:
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        self._grow(time, measurements, times)
+        proved = self._grow(time, measurements, times)
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
-        self._chosen = self._best_hypothesis()
+        if not proved or self.solver != "exact" or self.solver_parameters:
+            self._chosen = self._better(self._solved())
         self._confirm()
         now = self._decision(0, self._chosen)
         final, kept = self._prune() if len(self._window) == self.depth else ((), None)
         ended = self._delete_tracks(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
-    def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
-        """Grow every branch by the measurements in its gate and by misses, and start trees."""
+    def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> bool:
+        """Grow every branch by the measurements in its gate and by misses, start trees, and choose the best hypothesis.
+
+        Returns whether it is proved to be the best.
+        """
         count = len(self.sensors)
         batch, before = self._batch, time if self._time is None else self._time
         history = np.zeros_like(self._history)
@@ -112,7 +115,7 @@ class TrackOrientedMHT(Tracker):
             pairs = gated.pairs
             gain = pairs.log_likelihood + self.terms.detection[s]
             begun, roots = self._roots(s, z, time, stamps)
-            kept, tables = extend(
+            kept, tables, chosen, proved = extend(
                 tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, gated.when), roots,
                 s, self._scan, self.max_branches, self.branch_drop,
             )  # fmt: skip
@@ -126,11 +129,12 @@ class TrackOrientedMHT(Tracker):
                 )
         count_scan(tables.counts, tables.history, count)
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
-        self._history, self._born = tables.history, tables.born
+        self._history, self._born, self._chosen = tables.history, tables.born, chosen
+        return proved
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Any, Roots]:
         """New trees, one for each measurement that tells a position, and their states."""
-        states, fit, positions = self._singles(s, z)
+        states, fit, positions, score = self._singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
         if stamps is None:
@@ -142,15 +146,16 @@ class TrackOrientedMHT(Tracker):
             states = predict_each(self.filter, states, time - when)
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[order] = self._new_ids(len(numbers))
-        return states, Roots(ids, numbers, when, float(self._birth[s]))
+        return states, Roots(ids, numbers, when, score)
 
-    def _best_hypothesis(self) -> Array:
-        """Branches of the best global hypothesis, as a mask."""
-        score, track_id = self._batch.score.copy(), self._batch.track_id.copy()
-        if self.solver == "exact" and not self.solver_parameters:
-            easy = choose(track_id, score, self._history)
-            if easy is not None:
-                return easy
+    def _better(self, other: Array) -> Array:
+        """The better of the hypothesis that was found growing and another, as masks of branches."""
+        score = self._batch.score
+        return other if score[other].sum() >= score[self._chosen].sum() else self._chosen
+
+    def _solved(self) -> Array:
+        """Branches of the best global hypothesis by the tracker's solver, as a mask."""
+        score, track_id = self._batch.score, self._batch.track_id
         chosen = np.zeros(len(self._batch), dtype=np.bool_)
         # a branch of no positive score is better left to false alarms
         rows = np.flatnonzero(score > 0)
