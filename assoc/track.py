@@ -144,9 +144,10 @@ def _parser(further: Sequence[Option]) -> Parser:
         metavar="NAME",
         help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
     )
-    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
+    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
-    add("--all", action="store_true", help="also write tentative tracks")
+    add("--all", action="store_true", help="also write tracks that are tentative, or whose target may be gone")
+    add("--smooth", action="store_true", help="smooth the tracks of a scene: each position by all of its measurements")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
@@ -180,7 +181,8 @@ def _is_npz(file: str) -> bool:
 
 
 def _make(
-    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
+    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any,
+    pace: float = 1.0,
 ) -> Tracker:
     from assoc._parameters import positive
     from assoc.tracking import TRACKERS as KINDS
@@ -199,7 +201,7 @@ def _make(
     noise = None
     if parsed["process_noise"] is not None:
         noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
-    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace)
     return KINDS[name](sensors, made, region=region, **settings, **extra)
 
 
@@ -207,16 +209,20 @@ def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
 ) -> tuple[int, Tracker, TrackTable, Scene | None]:
     from assoc.scene.scene import Scene
-    from assoc.tracking import track_scene
+    from assoc.tracking import smoothed, track_scene
+    from assoc.tracking.filter_choice import pace_of
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     scene = Scene.load(file)
-    tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+    name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
+    tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
-    table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    if parsed["smooth"]:
+        table = smoothed(tracker, scene, decisions)
     return scene.num_scans, tracker, table, scene
 
 
@@ -242,6 +248,8 @@ def _of_plots(
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for scenes (.npz), not for plots")
     recording = read_plots(file)
     if window == "none":
         windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
@@ -251,7 +259,7 @@ def _of_plots(
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     table = TrackTable()
     for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
-        tracks = (track for track in tracker.tracks if track.confirmed or parsed["all"])
+        tracks = (track for track in tracker.tracks if track.reported or parsed["all"])
         table.add(tracks, tracker.filter.motion.position)
     return len(windows), tracker, table, None
 

@@ -10,6 +10,7 @@ from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
 from assoc.tracking.single_scan.multi_sensor import MultiSensorTracker
 from assoc.tracking.single_scan.static import StaticFusionTracker
+from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
@@ -43,5 +44,6 @@ __all__ = [
     "TrackOrientedMHT",
     "TrackTable",
     "Tracker",
+    "smoothed",
     "track_scene",
 ]

@@ -108,6 +108,10 @@ class JointProbabilisticTracker(Tracker):
             batch = TrackBatch.concatenate([batch, new])
             seen = np.concatenate([seen | hit, np.ones(len(new), dtype=np.bool_)])
             assigned.append(ids)
+        if times is None:
+            crossed = self._crossed(self._scan_of(time, measurements), assigned)
+            batch = TrackBatch.concatenate([batch, crossed])
+            seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
         batch = batch.counted(seen).confirm(self.life_cycle)
         now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
         gone = self._to_delete(batch, time)
@@ -123,7 +127,7 @@ class JointProbabilisticTracker(Tracker):
         if not len(rows):
             nothing = np.zeros(0)
             return PairProbabilities(ids, pairs.measurement, nothing, nothing, nothing)
-        exists = _probability(batch.score)
+        exists = _probability(batch.existence)
         absent = np.log1p(-exists * -np.expm1(self.terms.miss[s]))
         weight = np.log(exists)[pairs.track] + self.terms.detection[s] + pairs.log_likelihood - absent[pairs.track]
         known = marginals(AssignmentProblem(rows + 1, -weight, [len(batch), count]), self.max_events)
@@ -139,14 +143,14 @@ class JointProbabilisticTracker(Tracker):
         count, pairs = len(batch), gated.pairs
         if not count:
             return batch, np.zeros(0, dtype=np.bool_)
-        exists = _probability(batch.score)
+        exists = _probability(batch.existence)
         detected = np.bincount(pairs.track, share, count)
         silent = np.maximum(1.0 - detected, 0.0)
         missed = silent * exists * np.exp(self.terms.miss[s]) / (1.0 - exists * -np.expm1(self.terms.miss[s]))
         # what remains for "there is no target" as odds, without 1 - 1
         none = silent * (1.0 - exists) / (1.0 - exists * -np.expm1(self.terms.miss[s]))
         after = detected + missed
-        score = np.clip(np.log(np.maximum(after, 1e-300)) - np.log(np.maximum(none, 1e-300)), -_SURE, _SURE)
+        odds = np.clip(np.log(np.maximum(after, 1e-300)) - np.log(np.maximum(none, 1e-300)), -_SURE, _SURE)
         target = np.concatenate([pairs.track, np.arange(count)])
         weights = np.concatenate([share, missed]) / np.maximum(after, 1e-300)[target]
         states = merged(concatenate([pairs.states, gated.predicted]), target, weights, count)
@@ -155,7 +159,7 @@ class JointProbabilisticTracker(Tracker):
         when = np.full(count, np.nan)
         order = np.argsort(share, kind="stable")
         when[pairs.track[order]] = gated.when[order]
-        return batch.scored(states, score - batch.score, np.where(hit, when, np.nan)), hit
+        return batch.scored(states, odds - batch.existence, np.where(hit, when, np.nan)), hit
 
     @staticmethod
     def _owners(gated: GatedPairs, pairs: PairProbabilities, count: int) -> tuple[Array, Array]:

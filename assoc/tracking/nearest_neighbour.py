@@ -67,6 +67,10 @@ class NearestNeighbourTracker(Tracker):
             batch = TrackBatch.concatenate([batch, TrackBatch.new(aged, new, score[order], when[order])])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
+        if times is None:
+            crossed = self._crossed(self._scan_of(time, measurements), assigned)
+            batch = TrackBatch.concatenate([batch, crossed])
+            seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
         batch = batch.counted(seen).confirm(self.life_cycle)
         now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
         gone = self._to_delete(batch, time)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z",
+    "sigma_x", "sigma_y", "sigma_z", "existence",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position."""
 
@@ -57,6 +57,7 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    track.existence,
                 )  # fmt: skip
             )
 
@@ -96,7 +97,7 @@ def track_scene(
     tracker : Tracker
     scene : Scene
     confirmed : bool
-        Whether only confirmed tracks are listed.
+        Whether only confirmed tracks are listed, while their targets are rather there than not (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
 
@@ -112,6 +113,6 @@ def track_scene(
         step = tracker.step(scan.time, scan.measurements)
         decisions += step.final
         table.add(
-            (track for track in tracker.tracks if track.confirmed or not confirmed), tracker.filter.motion.position
+            (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
         )
     return table, [*decisions, *tracker.flush()]

@@ -29,8 +29,9 @@ from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint
-from assoc.tracking.filter_choice import two_speeds
+from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.initiation import Initiation
+from assoc.tracking.joint_starts import Crossings, crossings
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch, empty_batch
@@ -127,7 +128,12 @@ class Tracker(Checkpoint):
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
-        """A tracker for the sensors and the region of a scene; further arguments as for the class."""
+        """A tracker for the sensors and the region of a scene; further arguments as for the class.
+
+        Without a `filter`, the default one's process noise suits the pace of the scans.
+        """
+        if not arguments and options.get("filter") is None:
+            options["filter"] = two_speeds(manoeuvre_noise(pace_of(scene.times)))
         return cls(scene.sensors, *arguments, region=scene.region, **options)
 
     @property
@@ -215,6 +221,7 @@ class Tracker(Checkpoint):
             if dt > 0:
                 # a running mean that forgets: scans may change their pace
                 self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
+            self._batch = self._batch.survived(math.exp(-dt / self.life_cycle.lifetime))
             with interruptible():
                 step = self._step(when, checked, stamps)
         except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -226,6 +233,7 @@ class Tracker(Checkpoint):
         except BaseException:
             self._go_back(before)
             raise
+        self._batch = self._batch.not_overlooked(-(self._out_of_view() @ self.terms.miss))
         self._time = when
         self._scan += 1
         return step
@@ -280,6 +288,14 @@ class Tracker(Checkpoint):
                 "or use an mht or nearest-neighbour tracker"
             )
 
+    def _out_of_view(self) -> Array:
+        """Which sensors cannot see which tracks: they have not missed them; bool (T, S)."""
+        position = list(self.filter.motion.position)
+        where = np.zeros((len(self._batch), 3))
+        where[:, : len(position)] = self._batch.states.mean[:, position]
+        views = [sensor.position_part for sensor in self.sensors]
+        return ~np.stack([one.in_view(one.measure(where)) for one in views], axis=1)
+
     def _seed(self) -> np.random.SeedSequence:
         """Source of the randomness of this step alone, so that a restored tracker goes on alike."""
         return np.random.SeedSequence((self.seed, self._scan))
@@ -328,6 +344,13 @@ class Tracker(Checkpoint):
         region = self._place.region
         return log_birth(covariances, float(np.prod(region[:, 1] - region[:, 0])), self.initiation.birth_rate)
 
+    def _new_scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
+        """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
+        seen = rows > 0
+        # to `tuple_costs` a single measurement is a false alarm
+        alone = seen @ self.terms.birth + ~seen @ self.terms.miss
+        return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
+
     def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
         """New tracks of single measurements (n, d) of sensor s: states, which can start one, where, and scores."""
         positions, covariances = single_positions(self._place, s, measured)
@@ -340,3 +363,37 @@ class Tracker(Checkpoint):
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
+
+    def _crossings(self, scan: Scan, free: Sequence[Array]) -> tuple[Crossings, Array] | None:
+        """Tuples that may start tracks where no single measurement can, and their scores as new targets.
+
+        `free` are masks over the measurements of each sensor; see `assoc.tracking.joint_starts`.
+        """
+        usable = []
+        for s, (one, z) in enumerate(zip(free, scan.measurements, strict=True)):
+            alone = len(z) > 0 and self._narrow(single_positions(self._place, s, z)[1]).any()
+            usable.append(np.zeros(len(z), dtype=np.bool_) if alone else one)
+        found = crossings(
+            self._place, scan, usable, gate_probability=self.gate_probability, max_tuples=self.max_tuples,
+            speed=self.initiation.speed,
+        )  # fmt: skip
+        if found is None:
+            return None
+        fit = self._narrow(found.covariances)
+        kept = Crossings(*(one[fit] for one in found))
+        return kept, self._new_scores(kept.rows, kept.costs, kept.covariances)
+
+    def _crossed(self, scan: Scan, assigned: list[Array]) -> TrackBatch:
+        """New tracks of what is left over of sensors that start none alone; their ids are put into `assigned`."""
+        found = self._crossings(scan, [ids == 0 for ids in assigned])
+        if found is None or not len(found[1]):
+            return self._batch[:0]
+        several, scores = found
+        solution = self._assign(AssignmentProblem(several.rows, several.costs, scan.sizes))
+        chosen = solution.indices[solution.indices < len(scores)]
+        chosen = chosen[np.lexsort(several.positions[chosen].T)]
+        ids = self._new_ids(len(chosen))
+        for s, numbers in enumerate(several.rows[chosen].T):
+            assigned[s][numbers[numbers > 0] - 1] = ids[numbers > 0]
+        states = self.initiation.start(self.filter, several.positions[chosen], several.covariances[chosen])
+        return TrackBatch.new(states, ids, scores[chosen], scan.time)

@@ -15,7 +15,7 @@ from assoc._types import Array
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
-from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
+from assoc.tracking.track_batch import BEST, BITS, EXISTS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
 
 class Tables(NamedTuple):
@@ -37,10 +37,10 @@ class Hits(NamedTuple):
 
 
 class Roots(NamedTuple):
-    """New trees: ids, 0-based measurements, seconds, and the scores that they begin with, each (K,)."""
+    """New trees: ids (K,), 1-based measurements of the scan's sensors (K, S), seconds and scores to begin with (K,)."""
 
     ids: Array
-    measurement: Array
+    rows: Array
     when: Array
     score: Array
 
@@ -81,7 +81,7 @@ def extend(
 @search_njit
 def _extend(
     numbers: Any, counts: Any, history: Any, born: Any, miss: float, branch: Any, measurement: Any, gain: Any,
-    when: Any, ids: Any, number: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
+    when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
 ) -> Any:  # fmt: skip
     old, hits = born.size, branch.size
     tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
@@ -98,7 +98,7 @@ def _extend(
         wide[old + i] = history[branch[i]]
         wide[old + i, column] = measurement[i] + 1
     for i in range(ids.size):
-        wide[old + hits + i, column] = number[i] + 1
+        wide[old + hits + i, : rows.shape[1]] = rows[i]
     known = priced(tree, score, wide)
     chosen, proved = choose(score, wide, known, VISITS)
     kept = keep_best(tree, score, np.where(chosen, -1.0, known.loss), most, drop)
@@ -108,10 +108,10 @@ def _extend(
         row = kept[k]
         if row >= old + hits:
             i = row - old - hits
-            new_numbers[k, SCORE] = new_numbers[k, BEST] = first[i]
+            new_numbers[k, SCORE] = new_numbers[k, BEST] = new_numbers[k, EXISTS] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
             new_counts[k, ID] = ids[i]
-            new_history[k, column] = number[i] + 1
+            new_history[k, : rows.shape[1]] = rows[i]
             continue
         source = row if row < old else branch[row - old]
         new_numbers[k] = numbers[source]
@@ -119,6 +119,7 @@ def _extend(
         new_history[k] = history[source]
         new_born[k] = born[source]
         new_numbers[k, SCORE] = score[row]
+        new_numbers[k, EXISTS] += score[row] - numbers[source, SCORE]
         new_numbers[k, BEST] = max(numbers[source, BEST], score[row])
         if row >= old:
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])

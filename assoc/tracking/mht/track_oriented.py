@@ -26,13 +26,17 @@ from assoc.costs.tracks.tuples import require_states
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.filters.batches import concatenate, predict_each
 from assoc.problem import AssignmentProblem
+from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
 from assoc.tracking.gated_pairs import gated_pairs
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.track_batch import SURE, TrackBatch
 from assoc.tracking.tracker import Tracker
+
+_MOST_CROSSINGS = 100
+"""The most trees that begin in a scan where several sensors together tell a position."""
 
 
 class TrackOrientedMHT(Tracker):
@@ -127,6 +131,17 @@ class TrackOrientedMHT(Tracker):
                     f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
                     "lower gate_probability, depth or max_branches, or raise max_tuples"
                 )
+        if times is None:
+            sure = chosen & (tables.counts[:, SURE] > 0)
+            crossed = self._crossed_roots(self._scan_of(time, measurements), tables.history[sure, :count])
+            if crossed is not None:
+                begun, roots = crossed
+                nothing = np.zeros(0, dtype=np.int64)
+                kept, tables, chosen, proved = extend(
+                    tables, 0.0, Hits(nothing, nothing, np.zeros(0), np.zeros(0)), roots,
+                    0, self._scan, self.max_branches, self.branch_drop,
+                )  # fmt: skip
+                states = concatenate([states, begun])[kept]
         count_scan(tables.counts, tables.history, count)
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born, self._chosen = tables.history, tables.born, chosen
@@ -146,7 +161,27 @@ class TrackOrientedMHT(Tracker):
             states = predict_each(self.filter, states, time - when)
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[order] = self._new_ids(len(numbers))
-        return states, Roots(ids, numbers, when, score)
+        rows = np.zeros((len(numbers), len(self.sensors)), dtype=np.int32)
+        rows[:, s] = numbers + 1
+        return states, Roots(ids, rows, when, score)
+
+    def _crossed_roots(self, scan: Scan, taken: Array) -> tuple[Any, Roots] | None:
+        """New trees of what confirmed tracks (their measurements: (T, S)) leave of sensors that start none alone."""
+        free = []
+        for s, size in enumerate(scan.sizes.tolist()):
+            own = np.ones(size + 1, dtype=np.bool_)
+            own[taken[:, s]] = False
+            free.append(own[1:])
+        found = self._crossings(scan, free)
+        if found is None:
+            return None
+        several, scores = found
+        # by far the most are ghosts
+        best = np.argsort(-scores, kind="stable")[:_MOST_CROSSINGS]
+        best = best[np.lexsort(several.positions[best].T)]
+        states = self.initiation.start(self.filter, several.positions[best], several.covariances[best])
+        when = np.full(len(best), scan.time)
+        return states, Roots(self._new_ids(len(best)), several.rows[best], when, scores[best])
 
     def _better(self, other: Array) -> Array:
         """The better of the hypothesis that was found growing and another, as masks of branches."""

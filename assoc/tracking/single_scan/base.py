@@ -75,13 +75,6 @@ class SingleScanTracker(Tracker):
         score = self._new_scores(rows, costs, covariances)
         return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
 
-    def _new_scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
-        """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
-        seen = rows > 0
-        # to `tuple_costs` a single measurement is a false alarm
-        alone = seen @ self.terms.birth + ~seen @ self.terms.miss
-        return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
-
     def _decision(self, scan: Scan, batch: TrackBatch, rows: Array) -> Decision:
         assigned = []
         for s, size in enumerate(scan.sizes.tolist()):
