@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
+from assoc.tracking.late_plots import LatePlots
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
@@ -34,6 +35,7 @@ __all__ = [
     "HypothesisOrientedMHT",
     "Initiation",
     "JointProbabilisticTracker",
+    "LatePlots",
     "LifeCycle",
     "MultiSensorTracker",
     "NearestNeighbourTracker",

@@ -178,6 +178,7 @@ class Checkpoint(ABC):
     _place: Scene
     _time: float | None
     _pace: float
+    _turns: Array
     _scan: int
     _next_id: int
     _batch: TrackBatch
@@ -232,6 +233,7 @@ class Checkpoint(ABC):
             "time": np.array(math.nan if self._time is None else self._time),
             "scan": np.array(self._scan),
             "pace": np.array(self._pace),
+            "turns": self._turns,
             "next_id": np.array(self._next_id),
             "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
             **self._batch.arrays(PREFIX),
@@ -240,6 +242,9 @@ class Checkpoint(ABC):
     def _check(self, arrays: dict[str, Array]) -> None:
         """Refuse arrays that no tracker of these settings has saved."""
         check_progress(arrays, len(arrays[f"{PREFIX}track_id"]))
+        turns = arrays["turns"]
+        good = turns.shape == self._turns.shape and ((turns >= 0) & (turns <= 1 + 1e-6)).all()
+        require_field(good, "turns", f"{len(self.sensors)} shares of a turn")
         check_tracks(arrays, self.filter, max(sensor.dim for sensor in self.sensors))
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
@@ -251,6 +256,7 @@ class Checkpoint(ABC):
         self._time = None if math.isnan(when) else when
         self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
         self._pace = float(arrays["pace"])
+        self._turns = arrays["turns"]
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
             rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))

@@ -26,12 +26,13 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import concatenate, predict_each
+from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.problem import AssignmentProblem
 from assoc.ranking.marginals import marginals
-from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
+from assoc.scene.scan import Scan
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
@@ -89,29 +90,29 @@ class JointProbabilisticTracker(Tracker):
         # refuse a filter that cannot merge now, not in the first scan
         merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
 
-    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
-        if times is not None and len(self.sensors) > 1:
-            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        batch, before = self._batch, time if self._time is None else self._time
+    def _step(self, scan: Scan) -> Step:
+        if not scan.at_once:
+            raise InvalidInputError(
+                f"times: the {self.name} tracker takes all measurements at one instant; use another tracker for "
+                "measurements with times of their own"
+            )
+        time, batch = scan.time, self._predicted(self._batch, self._elapsed(scan.time))
         seen = np.zeros(len(batch), dtype=np.bool_)
         assigned, found = [], []
-        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
-            stamps = None if times is None else times[s]
-            gated = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
-            before = time
-            pairs = self._probabilities(batch, gated, s, len(z))
+        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
+            near = track_pairs(self.filter, batch.states, z, sensor, gate_of(sensor, self.gate_probability))
+            pairs = self._probabilities(batch, near, s, len(z))
             found.append(pairs)
-            batch, hit = self._take_in(batch, gated, pairs.probability, s)
-            ids, taken = self._owners(gated, pairs, len(z))
-            new, numbers = self._begin(s, z, taken, time, stamps)
+            batch, hit = self._take_in(batch, near, pairs.probability, s, time)
+            ids, taken = self._owners(pairs, len(z))
+            new, numbers = self._begin(s, z, taken, time)
             ids[numbers] = new.track_id
             batch = TrackBatch.concatenate([batch, new])
             seen = np.concatenate([seen | hit, np.ones(len(new), dtype=np.bool_)])
             assigned.append(ids)
-        if times is None:
-            crossed = self._crossed(self._scan_of(time, measurements), assigned)
-            batch = TrackBatch.concatenate([batch, crossed])
-            seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
+        crossed = self._crossed(scan, assigned)
+        batch = TrackBatch.concatenate([batch, crossed])
+        seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
         batch = batch.counted(seen).confirm(self.life_cycle)
         now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
         gone = self._to_delete(batch, time)
@@ -119,9 +120,8 @@ class JointProbabilisticTracker(Tracker):
         ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
-    def _probabilities(self, batch: TrackBatch, gated: GatedPairs, s: int, count: int) -> PairProbabilities:
+    def _probabilities(self, batch: TrackBatch, pairs: TrackPairs, s: int, count: int) -> PairProbabilities:
         """Sum the joint events of one sensor's measurements and the tracks."""
-        pairs = gated.pairs
         rows = np.stack([pairs.track, pairs.measurement], axis=1)
         ids = batch.track_id[pairs.track]
         if not len(rows):
@@ -138,9 +138,11 @@ class JointProbabilisticTracker(Tracker):
         back[np.lexsort(rows.T[::-1])] = order
         return PairProbabilities(ids, pairs.measurement, known.probability[back], known.lower[back], known.upper[back])
 
-    def _take_in(self, batch: TrackBatch, gated: GatedPairs, share: Array, s: int) -> tuple[TrackBatch, Array]:
+    def _take_in(
+        self, batch: TrackBatch, pairs: TrackPairs, share: Array, s: int, time: float
+    ) -> tuple[TrackBatch, Array]:
         """Tracks after a sensor's scan, and which of them were rather detected than not."""
-        count, pairs = len(batch), gated.pairs
+        count = len(batch)
         if not count:
             return batch, np.zeros(0, dtype=np.bool_)
         exists = _probability(batch.existence)
@@ -153,32 +155,26 @@ class JointProbabilisticTracker(Tracker):
         odds = np.clip(np.log(np.maximum(after, 1e-300)) - np.log(np.maximum(none, 1e-300)), -_SURE, _SURE)
         target = np.concatenate([pairs.track, np.arange(count)])
         weights = np.concatenate([share, missed]) / np.maximum(after, 1e-300)[target]
-        states = merged(concatenate([pairs.states, gated.predicted]), target, weights, count)
+        states = merged(concatenate([pairs.states, batch.states]), target, weights, count)
         hit = detected > 0.5
-        # when a track was last seen: by the likeliest of its measurements
-        when = np.full(count, np.nan)
-        order = np.argsort(share, kind="stable")
-        when[pairs.track[order]] = gated.when[order]
-        return batch.scored(states, odds - batch.existence, np.where(hit, when, np.nan)), hit
+        return batch.scored(states, odds - batch.existence, np.where(hit, time, np.nan)), hit
 
     @staticmethod
-    def _owners(gated: GatedPairs, pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
+    def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
         """The track that each measurement belongs to rather than not, 0 for none, and how surely it is some track's."""
         ids = np.zeros(count, dtype=np.int64)
         likely = pairs.probability > 0.5
         ids[pairs.measurement[likely]] = pairs.track_id[likely]
-        return ids, np.minimum(np.bincount(gated.pairs.measurement, pairs.probability, count), 1.0)
+        return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
 
-    def _begin(self, s: int, z: Array, taken: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array]:
+    def _begin(self, s: int, z: Array, taken: Array, time: float) -> tuple[TrackBatch, Array]:
         """New tracks of measurements that are rather no track's, and their numbers."""
         free = np.flatnonzero(taken < 0.5)
         states, fit, positions, score = self._singles(s, z[free])
         free = free[fit]
-        when = np.full(len(free), time) if stamps is None else stamps[free]
-        order = np.lexsort((*positions.T, when))
+        order = np.lexsort(positions.T)
         score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
-        aged = predict_each(self.filter, states[order], (time - when)[order])
-        return TrackBatch.new(aged, self._new_ids(len(free)), score[order], when[order]), free[order]
+        return TrackBatch.new(states[order], self._new_ids(len(free)), score[order], time), free[order]
 
     def _settings(self) -> dict[str, str]:
         return super()._settings() | {"max_events": repr(self.max_events)}

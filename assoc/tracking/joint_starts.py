@@ -34,7 +34,7 @@ class Crossings(NamedTuple):
 
 
 def crossings(place: Scene, scan: Scan, free: Sequence[Array], **options: Any) -> Crossings | None:
-    """Tuples of free measurements of the sensors that cannot start a track alone.
+    """Tuples of two free measurements or more.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def crossings(place: Scene, scan: Scan, free: Sequence[Array], **options: Any) -
         Sensors and region.
     scan : Scan
     free : sequence over sensors of bool arrays (n_s,)
-        Measurements that may be used; none of sensors that start tracks alone.
+        Measurements that may be used.
     **options
         Of `assoc.build_problem`.
 

@@ -147,12 +147,14 @@ class TrackBatch:
             np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
         return TrackBatch(states, numbers, self.counts)
 
-    def survived(self, share: float) -> TrackBatch:
-        """Tracks a while later, of which this share of the targets is still there."""
+    def survived(self, lifetimes: float) -> TrackBatch:
+        """Tracks so many mean lifetimes later: exp(-lifetimes) of the targets are still there."""
+        if lifetimes == 0.0:
+            return self
         numbers = self.numbers.copy()
-        # odds p / (1 - p) with p = share / (1 + exp(-odds before))
-        gone = np.logaddexp(-numbers[:, EXISTS], np.log1p(-share)) if share < 1.0 else -numbers[:, EXISTS]
-        numbers[:, EXISTS] = np.log(share) - gone
+        # odds p / (1 - p) with p = exp(-lifetimes) / (1 + exp(-odds before))
+        gone = np.logaddexp(-numbers[:, EXISTS], np.log(-np.expm1(-lifetimes)))
+        numbers[:, EXISTS] = -lifetimes - gone
         return TrackBatch(self.states, numbers, self.counts)
 
     def not_overlooked(self, gain: Array) -> TrackBatch:
@@ -161,8 +163,16 @@ class TrackBatch:
         numbers[:, EXISTS] += gain
         return TrackBatch(self.states, numbers, self.counts)
 
-    def counted(self, detected: Array) -> TrackBatch:
-        """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor."""
+    def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
+        """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor.
+
+        With `looked` (bool (T,)) the scan counts only for tracks that any sensor looked at.
+        """
+        if looked is not None and not looked.all():
+            rows = np.flatnonzero(looked | detected)
+            counts = self.counts.copy()
+            counts[rows] = self[rows].counted(detected[rows]).counts
+            return TrackBatch(self.states, self.numbers, counts)
         counts = self.counts.copy()
         counts[:, BITS] = ((counts[:, BITS] << np.int64(1)) & MASK) | detected
         counts[:, MISSED] += 1

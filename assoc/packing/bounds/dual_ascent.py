@@ -85,27 +85,54 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     float array, shape (R,)
         Multipliers u; ``certified_bound(packing, u)`` is the bound.
     """
+    arrays = packing.arrays
     duals = np.zeros(packing.num_rows)
-    temperature = START * spread(packing.arrays)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
-    hard_pass(packing, duals, point.reduced, 1)
-    size = packing.row_cols.size
+    temperature = START * spread(arrays)
+    # under a time limit the passes of large problems are made in turns, with a look at the clock between them
+    limited = run is not None and run.time_limit is not None
+    turn = max(6, _VISITS // max(packing.row_cols.size, 1)) if limited else passes
     deadline = math.inf if run is None else run.deadline()
-    for _ in range(levels):
-        left = passes
-        while left > 0 and (run is None or run.remaining() > 0.0):
-            # under a time limit large problems come back for a look at the clock
-            turn = left if run is None or run.time_limit is None else min(left, max(6, _VISITS // max(size, 1)))
-            visits = smooth_passes(packing.arrays, point, temperature, turn, deadline)
-            left = left - turn if visits == turn * size else 0
-        temperature *= COOLING
-    hard_pass(packing, duals, point.reduced, 2)
+    done = -1
+    while done < levels:
+        done = _ascend(arrays, point, temperature, done, (levels, passes, turn), deadline)
+        if limited and run is not None and run.remaining() <= 0.0:
+            deadline = -math.inf  # for systems where kernels cannot read the clock
     return duals
+
+
+@njit
+def _ascend(
+    packing: PackingArrays,
+    point: SmoothPoint,
+    temperature: Floats,
+    done: int,
+    course: tuple[int, int, int],
+    deadline: float,
+) -> int:
+    """Cool through levels until all are done or the visits are used up; how many are done (-1: none, not begun)."""
+    levels, passes, turn = course
+    size = packing.row_cols.size
+    if done < 0:
+        hard_sweeps(packing, point.duals, point.reduced, 1)
+        done = 0
+    total = 0
+    while done < levels and total < _VISITS:
+        left = passes
+        while left > 0 and not is_over(deadline):
+            now = min(left, turn)
+            visits = smooth_passes(packing, point, temperature, now, deadline)
+            left = left - now if visits == now * size else 0
+            total += visits
+        temperature *= COOLING
+        done += 1
+    if done == levels:
+        hard_sweeps(packing, point.duals, point.reduced, 2)
+    return done
 
 
 def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
     """Fill ``reduced`` from ``duals``, then raise ``duals`` by passes with the hard minimum (eq. above, T -> 0)."""
-    fill_reduced(packing.arrays, duals, reduced)
     hard_sweeps(packing.arrays, duals, reduced, sweeps)
 
 
@@ -167,7 +194,8 @@ def fill_reduced(packing: PackingArrays, duals: Floats, reduced: Floats) -> None
 
 @njit
 def hard_sweeps(packing: PackingArrays, duals: Floats, reduced: Floats, sweeps: int) -> None:
-    """Passes with the hard minimum: each row takes what the least reduced cost of its columns leaves."""
+    """Fill ``reduced``; then passes with the hard minimum: each row takes the least reduced cost of its columns."""
+    fill_reduced(packing, duals, reduced)
     slack, row_ptr, row_cols = packing.slack, packing.row_ptr, packing.row_cols
     for _ in range(sweeps):
         for r in range(slack.size):

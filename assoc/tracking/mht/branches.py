@@ -46,7 +46,7 @@ class Roots(NamedTuple):
 
 
 def extend(
-    tables: Tables, miss: float, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
+    tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
 ) -> tuple[Array, Tables, Array, bool]:
     """Next branches, cut to those that matter to good global hypotheses.
 
@@ -57,8 +57,8 @@ def extend(
     ----------
     tables : Tables
         Before.
-    miss : float
-        What a miss adds to a score.
+    miss : array (B,)
+        What a miss adds to the score of each branch.
     hits, roots
     column : int
         Of the sensor in the history.
@@ -80,13 +80,13 @@ def extend(
 
 @search_njit
 def _extend(
-    numbers: Any, counts: Any, history: Any, born: Any, miss: float, branch: Any, measurement: Any, gain: Any,
+    numbers: Any, counts: Any, history: Any, born: Any, miss: Any, branch: Any, measurement: Any, gain: Any,
     when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
 ) -> Any:  # fmt: skip
     old, hits = born.size, branch.size
     tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
     for i in range(old):
-        tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss
+        tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss[i]
     for i in range(hits):
         tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
     for i in range(ids.size):
@@ -128,12 +128,17 @@ def _extend(
 
 
 @njit
-def count_scan(counts: Any, history: Any, sensors: int) -> None:
-    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history."""
+def count_scan(counts: Any, history: Any, sensors: int, looked: Any) -> None:
+    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history.
+
+    The scan counts for branches that a sensor looked at (bool (B,)).
+    """
     for i in range(counts.shape[0]):
         seen = False
         for s in range(sensors):
             seen = seen or history[i, s] > 0
+        if not (seen or looked[i]):
+            continue
         counts[i, BITS] = (counts[i, BITS] << 1) & MASK | seen
         counts[i, MISSED] = 0 if seen else counts[i, MISSED] + 1
         counts[i, HITS] += seen

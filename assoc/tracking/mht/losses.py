@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.compiled import njit
-from assoc.packing.bounds.dual_ascent import START, SmoothPoint, fill_reduced, hard_sweeps, smooth_passes, spread
+from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.packing import PackingArrays, assembled
 
 # the smoothed ascent begins hot enough to move prices across the whole spread of scores, and is cooled until losses are
@@ -146,13 +146,11 @@ def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, in
     duals, reduced = np.zeros(free.size), np.empty(count)
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
     # trees come first in every component: they take what their best branches score, and the rest is differences
-    fill_reduced(packing, duals, reduced)
     hard_sweeps(packing, duals, reduced, 1)
     temperature = np.maximum(START * spread(packing), 2.0 * _COLDEST)
     while temperature.max() > _COLDEST:
         smooth_passes(packing, point, temperature, _PASSES, np.inf)
         temperature = np.maximum(0.5 * temperature, 0.5 * _COLDEST)
-    fill_reduced(packing, duals, reduced)
     hard_sweeps(packing, duals, reduced, 2)
     for r in range(free.size):
         price[row_origin[r]] = max(-duals[r], 0.0)
