@@ -23,6 +23,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import gaussian
+from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking.initiation import Initiation
@@ -175,6 +176,7 @@ class Checkpoint(ABC):
     life_cycle: LifeCycle
     initiation: Initiation
     gate_probability: float
+    registration: OnlineRegistration | None
     _place: Scene
     _time: float | None
     _pace: float
@@ -224,6 +226,7 @@ class Checkpoint(ABC):
             "life_cycle": repr(self.life_cycle),
             "initiation": repr(self.initiation),
             "gate_probability": repr(self.gate_probability),
+            **({} if self.registration is None else {"registration": repr(self.registration.parameters)}),
         }
 
     def _arrays(self) -> dict[str, Array]:
@@ -237,6 +240,7 @@ class Checkpoint(ABC):
             "next_id": np.array(self._next_id),
             "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
             **self._batch.arrays(PREFIX),
+            **({} if self.registration is None else self.registration.arrays()),
         }
 
     def _check(self, arrays: dict[str, Array]) -> None:
@@ -249,6 +253,8 @@ class Checkpoint(ABC):
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
             rng_state(rng, str(arrays["filter_rng"]))
+        if self.registration is not None:
+            self.registration.restored(arrays)
 
     def _take(self, arrays: dict[str, Array]) -> None:
         """Take over checked arrays."""
@@ -261,3 +267,5 @@ class Checkpoint(ABC):
         if rng is not None and str(arrays["filter_rng"]):
             rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))
         self._batch = self._batch.restored(arrays, PREFIX)
+        if self.registration is not None:
+            self.registration = self.registration.restored(arrays)

@@ -14,6 +14,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.positions import positions_and_covariances
+from assoc.errors import InvalidInputError
 from assoc.filters.smoother import FixedLagSmoother, Window
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -39,7 +40,16 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     TrackTable
         One row for each track and scan, from its first detection to its last, also where scans in between missed it.
         Its existence is 1; it has no score (NaN).
+
+    Raises
+    ------
+    InvalidInputError
+        Measurements have times of their own, or the tracker corrects biases of sensors.
     """
+    if tracker.registration is not None:
+        raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
+    if not all(scene.scan(one.scan).at_once for one in decisions):
+        raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
     ordered = sorted(decisions, key=lambda one: one.scan)
     sure = {i for one in ordered for ids, known in zip(one.assigned, one.confirmed, strict=True) for i in ids[known]}
     rows: dict[int, dict[int, Array]] = {int(i): {} for i in sorted(sure) if i > 0}

@@ -21,6 +21,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
+from assoc.registration.online import OnlineRegistration
 from assoc.scene.own_times import FULL_TURN, checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -98,6 +99,9 @@ class Tracker(Checkpoint):
         Share of true measurements that a gate lets through, above 0 and below 1.
     max_tuples : int
         The most candidate tuples in a scan.
+    registration : "online" or OnlineRegistration, optional
+        Estimates the sensors' biases from the measurements that come in and corrects these by them; all measurements of
+        a scan must then be of one instant. Without it measurements are taken as they are.
 
     Raises
     ------
@@ -121,6 +125,7 @@ class Tracker(Checkpoint):
         initiation: Initiation | None = None,
         gate_probability: float = GATE_PROBABILITY,
         max_tuples: int = MAX_TUPLES,
+        registration: str | OnlineRegistration | None = None,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         self._place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
@@ -144,6 +149,11 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {gate_probability!r}")
         self.gate_probability = float(gate_probability)
         self.max_tuples = max_tuples
+        if registration == "online":
+            registration = OnlineRegistration(self.sensors, self._place.region)
+        if not (registration is None or isinstance(registration, OnlineRegistration)):
+            raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
+        self.registration = registration
         self.terms = score_terms(self.sensors)
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._appears = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
@@ -258,9 +268,14 @@ class Tracker(Checkpoint):
         checked = checked_measurements(measurements, self.sensors)
         stamps = None if times is None else self._checked_stamps(times, checked, when)
         looks = None if sectors is None else checked_sectors(sectors, len(self.sensors), "sectors")
-        scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks)
+        if self.registration is not None and stamps is not None:
+            raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
         before = self.remember()
         try:
+            if self.registration is not None:
+                self.registration = self.registration.after(when, checked)
+                checked = self.registration.correct(checked)
+            scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks)
             dt = self._elapsed(when)
             if dt > 0:
                 # a running mean that forgets: scans may change their pace
