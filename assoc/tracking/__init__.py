@@ -6,6 +6,7 @@ from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.late_plots import LatePlots
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.live import LiveTracker, Picture
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
@@ -37,9 +38,11 @@ __all__ = [
     "JointProbabilisticTracker",
     "LatePlots",
     "LifeCycle",
+    "LiveTracker",
     "MultiSensorTracker",
     "NearestNeighbourTracker",
     "PairProbabilities",
+    "Picture",
     "StaticFusionTracker",
     "Step",
     "Track",

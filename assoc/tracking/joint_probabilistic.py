@@ -26,13 +26,14 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
+from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import concatenate
+from assoc.filters.batches import concatenate, predict_each
 from assoc.filters.merging import merged
 from assoc.problem import AssignmentProblem
 from assoc.ranking.marginals import marginals
 from assoc.scene.scan import Scan
+from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
@@ -91,26 +92,26 @@ class JointProbabilisticTracker(Tracker):
         merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
 
     def _step(self, scan: Scan) -> Step:
-        if not scan.at_once:
-            raise InvalidInputError(
-                f"times: the {self.name} tracker takes all measurements at one instant; use another tracker for "
-                "measurements with times of their own"
-            )
-        time, batch = scan.time, self._predicted(self._batch, self._elapsed(scan.time))
+        time, times, batch = scan.time, scan.times, self._batch
+        if scan.sectors is not None or (times is not None and len(self.sensors) > 1):
+            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
+        before = time if self._time is None else self._time
         seen = np.zeros(len(batch), dtype=np.bool_)
         assigned, found = [], []
         for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
-            near = track_pairs(self.filter, batch.states, z, sensor, gate_of(sensor, self.gate_probability))
-            pairs = self._probabilities(batch, near, s, len(z))
+            stamps = None if times is None else times[s]
+            near = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
+            before = time
+            pairs = self._probabilities(batch, near.pairs, s, len(z))
             found.append(pairs)
-            batch, hit = self._take_in(batch, near, pairs.probability, s, time)
+            batch, hit = self._take_in(batch, near, pairs.probability, s)
             ids, taken = self._owners(pairs, len(z))
-            new, numbers = self._begin(s, z, taken, time)
+            new, numbers = self._begin(s, z, taken, time, stamps)
             ids[numbers] = new.track_id
             batch = TrackBatch.concatenate([batch, new])
             seen = np.concatenate([seen | hit, np.ones(len(new), dtype=np.bool_)])
             assigned.append(ids)
-        crossed = self._crossed(scan, assigned)
+        crossed = self._crossed(scan, assigned) if times is None else batch[:0]
         batch = TrackBatch.concatenate([batch, crossed])
         seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
         batch = batch.counted(seen).confirm(self.life_cycle)
@@ -138,11 +139,9 @@ class JointProbabilisticTracker(Tracker):
         back[np.lexsort(rows.T[::-1])] = order
         return PairProbabilities(ids, pairs.measurement, known.probability[back], known.lower[back], known.upper[back])
 
-    def _take_in(
-        self, batch: TrackBatch, pairs: TrackPairs, share: Array, s: int, time: float
-    ) -> tuple[TrackBatch, Array]:
+    def _take_in(self, batch: TrackBatch, gated: GatedPairs, share: Array, s: int) -> tuple[TrackBatch, Array]:
         """Tracks after a sensor's scan, and which of them were rather detected than not."""
-        count = len(batch)
+        count, pairs = len(batch), gated.pairs
         if not count:
             return batch, np.zeros(0, dtype=np.bool_)
         exists = _probability(batch.existence)
@@ -155,9 +154,13 @@ class JointProbabilisticTracker(Tracker):
         odds = np.clip(np.log(np.maximum(after, 1e-300)) - np.log(np.maximum(none, 1e-300)), -_SURE, _SURE)
         target = np.concatenate([pairs.track, np.arange(count)])
         weights = np.concatenate([share, missed]) / np.maximum(after, 1e-300)[target]
-        states = merged(concatenate([pairs.states, batch.states]), target, weights, count)
+        states = merged(concatenate([pairs.states, gated.predicted]), target, weights, count)
         hit = detected > 0.5
-        return batch.scored(states, odds - batch.existence, np.where(hit, time, np.nan)), hit
+        # when a track was last seen: by the likeliest of its measurements
+        when = np.full(count, np.nan)
+        order = np.argsort(share, kind="stable")
+        when[pairs.track[order]] = gated.when[order]
+        return batch.scored(states, odds - batch.existence, np.where(hit, when, np.nan)), hit
 
     @staticmethod
     def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
@@ -167,14 +170,16 @@ class JointProbabilisticTracker(Tracker):
         ids[pairs.measurement[likely]] = pairs.track_id[likely]
         return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
 
-    def _begin(self, s: int, z: Array, taken: Array, time: float) -> tuple[TrackBatch, Array]:
+    def _begin(self, s: int, z: Array, taken: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array]:
         """New tracks of measurements that are rather no track's, and their numbers."""
         free = np.flatnonzero(taken < 0.5)
         states, fit, positions, score = self._singles(s, z[free])
         free = free[fit]
-        order = np.lexsort(positions.T)
+        when = np.full(len(free), time) if stamps is None else stamps[free]
+        order = np.lexsort((*positions.T, when))
         score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
-        return TrackBatch.new(states[order], self._new_ids(len(free)), score[order], time), free[order]
+        aged = predict_each(self.filter, states[order], (time - when)[order])
+        return TrackBatch.new(aged, self._new_ids(len(free)), score[order], when[order]), free[order]
 
     def _settings(self) -> dict[str, str]:
         return super()._settings() | {"max_events": repr(self.max_events)}
