@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z", "speed", "heading", "altitude", "existence",
+    "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
 
@@ -71,10 +71,10 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    track.existence,
                     math.hypot(vx, vy),
                     math.degrees(math.atan2(vx, vy)) % 360.0,
                     told if altitudes is None else altitudes.get(track.track_id, math.nan),
-                    track.existence,
                 )  # fmt: skip
             )
 
