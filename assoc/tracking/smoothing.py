@@ -58,7 +58,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
             for m in np.flatnonzero(np.isin(ids, list(rows))).tolist():
                 own = rows[int(ids[m])].setdefault(one.scan, np.zeros(len(one.assigned), dtype=np.int32))
                 own[s] = m + 1
-    table = TrackTable()
+    table = TrackTable(scene.origin)
     for track_id, found in rows.items():
         table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position)
     return table
