@@ -145,3 +145,30 @@ def test_a_script_that_slips_through_does_not_run(browser, page, tmp_path):
     show(browser, broken)
     assert browser.execute_script("return window.slipped === undefined")
     assert any("Content Security Policy" in one for one in complaints(browser))
+
+
+def test_dark_pages_phones_and_crowds(browser, tmp_path, pictures):
+    scene = simulate("crowd", 0, targets=60)
+    path = tmp_path / "crowd.html"
+    write_association_report(path, assoc.associate(scene), scene)
+    try:
+        media = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        show(browser, path, PHONE)
+        layout = "return document.getElementById('scene-plot').layout"
+        assert browser.execute_script(f"{layout}.paper_bgcolor") == "#161b22"
+        assert browser.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(13, 17, 23)"
+        # the picture stands above the summary, its legend is folded and opens
+        top = "return document.getElementById(arguments[0]).getBoundingClientRect().top"
+        assert browser.execute_script(top, "scene") < browser.execute_script(top, "summary")
+        assert browser.execute_script(f"{layout}.showlegend") is False
+        press(browser, browser.find_element("id", "legend"))
+        assert browser.execute_script(f"{layout}.showlegend") is True
+        screenshot(browser, pictures / "crowd-phone-dark.png")
+        # the targets fill the view: no sensor outside of the crowd makes it wider
+        show(browser, path, DESKTOP)
+        low, high = browser.execute_script(f"{layout}.yaxis.range")
+        reach = (scene.region[1, 1] - scene.region[1, 0]) / (1000.0 if scene.region.max() > 3000 else 1.0)
+        assert high - low < 1.6 * reach
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
