@@ -44,6 +44,13 @@ class Track:
     started: float
     last_detection: float
 
+    def named(self, track_id: int) -> Track:
+        """The same track under another id."""
+        # `dataclasses.replace` takes longer than all else that is done with a track
+        made = object.__new__(Track)
+        made.__dict__.update(self.__dict__, track_id=track_id)
+        return made
+
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)
         kind = "confirmed" if self.confirmed else "tentative"
