@@ -9,6 +9,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.inputs import check_outputs
@@ -17,7 +18,7 @@ from assoc._cli.options import add_common_options, common_values, flag_of, param
 from assoc._cli.program import Parser, prepare_process, prepare_streams, run_program, write_all
 from assoc._cli.progress import with_progress
 from assoc._cli.signals import Interruption
-from assoc._cli.values import number, seconds, whole_number
+from assoc._cli.values import number, place_on_earth, seconds, whole_number
 from assoc._parameters import Option, options
 from assoc._system.compile_time import compile_seconds
 from assoc._system.extras import check_extra
@@ -25,6 +26,7 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from assoc.recordings import Recording
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
@@ -37,6 +39,7 @@ TRACKERS = {
     "mht": "track-oriented multiple hypothesis tracking (default for plots)",
     "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
     "nearest-neighbour": "assigns each measurement to the nearest track",
+    "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
 WINDOWS = ("ctw", "ctw-time", "irregular", "none")
 # option -> the trackers that take it
@@ -44,6 +47,8 @@ _OWN = {
     "depth": ("mht", "mht-hypothesis"),
     "max_branches": ("mht",),
     "max_hypotheses": ("mht-hypothesis",),
+    "max_events": ("joint-probabilistic",),
+    "rule": ("nearest-neighbour",),
 }
 # option -> what `assoc.recordings.radar_of` calls it, and its unit
 _RADAR = {
@@ -86,7 +91,10 @@ def _track(words: list[str]) -> None:
     file = parsed["file"]
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
-    check_outputs([parsed["output"], parsed["report"], parsed["rates"]], [file])
+    check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [file])
+    if parsed["map"] and not parsed["map"].lower().endswith((".geojson", ".json", ".kml")):
+        raise InvalidInputError(f"--map: expected a name that ends in .geojson or .kml, got {parsed['map']!r}")
+    parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
@@ -111,6 +119,7 @@ def _track(words: list[str]) -> None:
     else:
         tracker, plots = _of_plots(file, parsed, settings)
         count, table, scene = len(plots.windows), plots.table, None
+        table.origin = parsed["origin"]
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
 
@@ -118,16 +127,24 @@ def _track(words: list[str]) -> None:
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            used = {"tracker": tracker.name, "solver": solver, "filter": parsed["filter"], "scans": count}
+            asked = solver if tracker.solver_calls else "none"
+            used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
             more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
+
+    def write_tracks_on_map() -> None:
+        if parsed["map"]:
+            from assoc.tracking.maps import write_map
+
+            write_map(parsed["map"], table.to_frame())
 
     def write_rates() -> None:
         if parsed["rates"] and plots is not None:
             _write_rates(parsed["rates"], plots)
 
     write_all(
+        write_tracks_on_map,
         lambda: table.to_csv(parsed["output"]),
         write_rates,
         write_report,
@@ -154,6 +171,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
     add("-o", "--output", metavar="FILE", help="file for the tracks (.csv)")
+    add("--map", metavar="FILE", help="write the tracks for a map as well (.geojson or .kml); needs an origin")
+    add("--origin", metavar="LAT,LON[,H]", help="where x = y = 0 is on the earth, degrees and metres (if not in FILE)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
     add("--tracker", metavar="NAME", help="name of the tracker, see below")
     add("--solver", metavar="NAME", help="name of the solver (default exact)")
@@ -162,13 +181,16 @@ def _parser(further: Sequence[Option]) -> Parser:
         metavar="NAME",
         help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
     )
-    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
+    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
     add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
-    add("--all", action="store_true", help="also write tentative tracks")
+    add("--all", action="store_true", help="also write tracks that are tentative, or whose target may be gone")
+    add("--smooth", action="store_true", help="smooth the tracks of a scene: each position by all of its measurements")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    add("--max-events", metavar="N", help="joint-probabilistic: joint events listed for each cluster (default 100)")
+    add("--rule", metavar="NAME", help="nearest-neighbour: greedy (default), or assignment, which uses the solver")
     plots = parser.add_argument_group("options for plots")
     plots.add_argument(
         "--window",
@@ -179,6 +201,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     plots.add_argument("--rates", metavar="FILE", help="write CT, MT and IT of each window (.csv; needs identities)")
     plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
     add = plots.add_argument
+    add("--radar", metavar="SAC/SIC", help="which radar of an ASTERIX file (.ast, .asterix, .pcap)")
     add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
     add("--range-noise", metavar="M", help="standard deviation of range, metres (default: from the plots' steps)")
     add("--bearing-noise", metavar="DEG", help="standard deviation of bearing, degrees (default: likewise)")
@@ -208,8 +231,27 @@ def _is_npz(file: str) -> bool:
     return start == b"PK\x03\x04" or file.lower().endswith(".npz")
 
 
+def _is_asterix(file: str) -> bool:
+    return file.lower().endswith((".ast", ".asterix", ".pcap"))
+
+
+def _read_asterix(file: str, radar: str | None) -> Recording:
+    """Plots of one radar of an ASTERIX file."""
+    from assoc.integrations.asterix import read_asterix
+
+    plots = {f"{sac}/{sic}": recording for (sac, sic), recording in sorted(read_asterix(file).plots.items())}
+    if not plots:
+        raise InvalidInputError(f"{file}: holds no plots (category 048)")
+    if radar is None and len(plots) == 1:
+        return next(iter(plots.values()))
+    if radar not in plots:
+        raise InvalidInputError(f"--radar: the file holds plots of {', '.join(plots)}; name one")
+    return plots[radar]
+
+
 def _make(
-    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
+    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any,
+    pace: float = 1.0,
 ) -> Tracker:
     from assoc._parameters import positive
     from assoc.tracking import TRACKERS as KINDS
@@ -224,11 +266,11 @@ def _make(
         flag = flag_of(option)
         if name not in takers:
             raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
-        extra[option] = whole_number(parsed[option], flag, 1)
+        extra[option] = parsed[option] if option == "rule" else whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
         noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
-    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace)
     return KINDS[name](sensors, made, region=region, **settings, **extra)
 
 
@@ -236,7 +278,8 @@ def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
 ) -> tuple[int, Tracker, TrackTable, Scene | None]:
     from assoc.scene.scene import Scene
-    from assoc.tracking import track_scene
+    from assoc.tracking import smoothed, track_scene
+    from assoc.tracking.filter_choice import pace_of
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
     if parsed["rates"] is not None:
@@ -249,9 +292,16 @@ def _of_scene(
             raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
         settings["registration"] = "online"
     scene = Scene.load(file)
-    tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+    if parsed["origin"] is not None:
+        scene = replace(scene, origin=parsed["origin"])
+    elif parsed["map"] and scene.origin is None:
+        raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
+    name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
+    tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
-    table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    if parsed["smooth"]:
+        table = smoothed(tracker, scene, decisions)
     return scene.num_scans, tracker, table, scene
 
 
@@ -267,7 +317,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):
         raise InvalidInputError(
-            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis or nearest-neighbour"
+            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis, nearest-neighbour or "
+            "joint-probabilistic"
         )
     window = parsed["window"] or "ctw"
     if window not in WINDOWS:
@@ -277,7 +328,11 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
-    recording = read_plots(file)
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for scenes (.npz), not for plots")
+    recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
+    if parsed["radar"] is not None and not _is_asterix(file):
+        raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
     if parsed["rates"] and recording.aircraft is None:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
@@ -288,6 +343,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
+    if parsed["map"] and parsed["origin"] is None:
+        raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
     shown = with_progress(windows, len(windows), "tracking")
     return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
 
@@ -323,6 +380,8 @@ def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
     for flag in ("report", "rates", "window", "rotation", "registration", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for finished tracks, not for --live")
     if parsed["udp"] is not None and parsed["replay"] is not None:
         raise InvalidInputError("--udp and --replay: expected one of them")
     parsed["filter"] = parsed["filter"] or "imm-cv"
@@ -396,8 +455,10 @@ def _report(
     _, ids, _ = table.arrays()
     print_lines(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
+    # several trackers never need one, or only for what their own search leaves open
+    used = tracker.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
-    print_lines(f"{tracker.name}, {tracker.solver}: {spent}")
+    print_lines(f"{tracker.name}, {used}: {spent}")
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise
