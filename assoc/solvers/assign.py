@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -30,6 +31,7 @@ def assign(
     seed: int | np.random.SeedSequence | np.random.Generator = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
+    watch: Callable[[Any], object] | None = None,
     **parameters: Any,
 ) -> Solution:
     """Solve an assignment problem.
@@ -46,6 +48,9 @@ def assign(
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
         Called with each ``TracePoint``; a true answer stops the solver.
+    watch : callable, optional
+        Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
+        gives the same by tuples of the problem.
     **parameters
         Parameters of that solver (``assoc.solvers.parameters(name)``).
 
@@ -67,7 +72,7 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
-    run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
+    run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset

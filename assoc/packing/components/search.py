@@ -12,6 +12,7 @@ from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.components.component import Component
+from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.proof import bound_of_component
 from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.kernels.sorting import ascending
@@ -31,9 +32,7 @@ def search_components(
     make: Callable[[Component, np.random.Generator], Searcher],
     packing: Packing,
     run: Run,
-    iterations: int,
-    patience: int,
-    refinement: int = 0,
+    parameters: SearchParameters,
 ) -> Outcome:
     """Run a metaheuristic on every component of the packing.
 
@@ -45,12 +44,7 @@ def search_components(
         The whole problem.
     run : Run
         Clock, random generator, trace.
-    iterations : int
-        Iterations on one component at the most.
-    patience : int
-        A component is left after so many iterations without improvement.
-    refinement : int
-        Exact sub-steps on the best cover after each iteration, for every 30 rows of the component.
+    parameters : SearchParameters
 
     Raises
     ------
@@ -63,7 +57,7 @@ def search_components(
     components = split_components(packing, duals, np.arange(packing.num_columns))
     deadline = run.deadline()
     for component in components:
-        component.deadline = deadline
+        component.deadline, component.refinement = deadline, parameters.refinement
         component.offer_greedy()
         if not component.closed and not share.should_stop():
             component.sharpen(share)
@@ -82,9 +76,11 @@ def search_components(
             if searcher is None:
                 searcher = make(component, run.rng)
             before, iterations_before = component.weight, component.iterations
-            over = _take_turn(component, searcher, run, iterations, patience, refinement)
+            over = _take_turn(component, searcher, run, parameters)
             done += component.iterations - iterations_before
-            cut_off |= component.iterations >= iterations and component.stalled < patience and not component.closed
+            cut_off |= component.iterations >= parameters.iterations and not (
+                component.closed or component.stalled >= parameters.patience
+            )
             if component.best is None and over:
                 complete_greedily(component, run)
             if component.weight < before:
@@ -107,17 +103,16 @@ def search_components(
     return Outcome(chosen, done, bound, duals)
 
 
-def _take_turn(
-    component: Component, searcher: Searcher, run: Run, iterations: int, patience: int, refinement: int
-) -> bool:
+def _take_turn(component: Component, searcher: Searcher, run: Run, limits: SearchParameters) -> bool:
     """Give a component up to ten iterations; whether its search is over."""
     for _ in range(10):
         before = component.weight
         searcher.iterate(component, run.rng)
-        component.refine(run, refinement)
+        component.refine(run, limits.clusters)
         component.iterations += 1
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
-        if component.closed or component.stalled >= patience or component.iterations >= iterations or run.should_stop():
+        ended = component.stalled >= limits.patience or component.iterations >= limits.iterations
+        if component.closed or ended or run.should_stop():
             return True
     return False
 

@@ -19,7 +19,6 @@ from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.neighbourhoods.cover import own
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
-from assoc.packing.neighbourhoods.random_cover import random_cover
 from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
@@ -65,10 +64,7 @@ class Breeding:
             fitness.append(component.weight)
         while len(members) < self.parameters.population:
             # random greedy solutions, strict and loose ones by turns
-            strictness = 2.0 ** (len(members) % 10)
-            owner = random_cover(
-                component.arrays, component.prices, strictness, component.temperature, rng, component.deadline
-            )
+            owner = component.random_cover(2.0 ** (len(members) % 10), rng)
             weight = component.settle(owner, rng, 0)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
@@ -82,8 +78,11 @@ class Breeding:
 
     def _child(self, component: Component, one: int, two: int, rng: np.random.Generator) -> NDArray[np.int32]:
         mother, father, mutation = self.members[one], self.members[two], float(self.parameters.mutation)
-        scale, deadline = component.temperature, component.deadline
-        return _cross(component.arrays, component.reduced, mother, father, scale, mutation, rng, deadline)
+        owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, mutation, rng)
+        if component.inserts:
+            rows = np.arange(owner.size, dtype=np.int32)
+            insert_and_eject(component.arrays, owner, rows, component.deadline)
+        return np.asarray(owner)
 
     def _admit(self, component: Component, owner: NDArray[np.int32], weight: float) -> None:
         if not component.is_complete(owner):
@@ -102,9 +101,8 @@ def _cross(
     temperature: float,
     mutation: float,
     rng: Any,
-    deadline: float,
 ) -> Any:
-    """A child of two covers: what they share, then what fits of the rest; mutated, and improved by insertion."""
+    """A child of two covers: what they share, then what fits of the rest; mutated."""
     cols, slack = packing.cols, packing.slack
     num_sensors = cols.shape[1]
     num_rows = slack.size
@@ -133,5 +131,4 @@ def _cross(
             for s in range(num_sensors):
                 if cols[j, s] >= 0:
                     owner[cols[j, s]] = -1
-    insert_and_eject(packing, owner, np.arange(num_rows).astype(np.int32), deadline)
     return owner

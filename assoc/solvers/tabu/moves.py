@@ -18,7 +18,6 @@ from assoc.packing.components.component import NEIGHBOURHOODS, Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
-from assoc.packing.neighbourhoods.random_cover import random_cover
 from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
@@ -70,7 +69,7 @@ class TabuSearch:
         self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
         weight = component.improve(best, rng, 0)
         component.offer(best, weight)
-        if p.clusters and not component.closed:
+        if not component.closed:
             # halves are matched already
             weight = component.improve(best, rng, p.clusters, NEIGHBOURHOODS[1:])
             if component.offer(best, weight):
@@ -80,9 +79,7 @@ class TabuSearch:
         """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
         best, least = component.best, np.inf
         for number in range(_COVERS):
-            owner = random_cover(
-                component.arrays, component.prices, 2.0 ** (number % 6), component.temperature, rng, component.deadline
-            )
+            owner = component.random_cover(2.0 ** (number % 6), rng)
             weight = component.settle(owner, rng, self.parameters.clusters)
             if weight < least and component.is_complete(owner):
                 best, least = owner, weight
