@@ -5,13 +5,13 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from assoc._cli.inputs import check_outputs
+from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options, common_values, parameter_values
 from assoc._cli.program import Parser, prepare_process, run_program
 from assoc._parameters import Option, options
@@ -56,7 +56,7 @@ def _simulate(words: list[str]) -> None:
         return
     scene = simulation.simulate(scenario, seed, **values)
     scene.save(parsed["output"])
-    print(f"{printable(parsed['output'])}: {scene!r}")
+    print_lines(f"{printable(parsed['output'])}: {scene!r}")
 
 
 def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[str, Any]) -> None:
@@ -71,9 +71,9 @@ def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[
     if truth is not None:
         rows = simulated.truth
         write_tracks(truth, rows.ids, rows.times, rows.positions, simulated.velocities)
-    print(f"{printable(output)}: {simulated.recording!r}")
+    print_lines(f"{printable(output)}: {simulated.recording!r}")
     if truth is not None:
-        print(f"{printable(truth)}: {simulated.truth!r}")
+        print_lines(f"{printable(truth)}: {simulated.truth!r}")
 
 
 def _list_parser() -> Parser:
@@ -83,8 +83,6 @@ def _list_parser() -> Parser:
         usage="python -m assoc.simulate SCENARIO -o scene.npz [options]",
         description="Simulate a scene (or plots) and write it to a file.",
         epilog="scenarios (each has its own --help):\n" + "\n".join(lines),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     parser.add_argument("scenario", metavar="SCENARIO", choices=list(_PURPOSE), help="what to simulate")
     return parser
@@ -92,7 +90,7 @@ def _list_parser() -> Parser:
 
 def _parser(scenario: str, choices: list[Option]) -> Parser:
     parser = Parser(
-        prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".", allow_abbrev=False
+        prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + "."
     )
     content = "file for the plots (.csv)" if scenario in _PLOTS else "file for the scene (.npz)"
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)

@@ -6,13 +6,13 @@ This is a program: the package must not import it, or ``python -m assoc.solve`` 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.inputs import check_outputs, read_toml
+from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options, common_values, parameter_values, read_first
 from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
@@ -89,8 +89,6 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
         description="Associate the measurements of scenes, or solve assignment problems,\n"
         "and report how far each answer can be from the optimum.",
         epilog=None if explicit else _other_solvers(solver),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("files", nargs="+", metavar="FILE", help="scene.npz or problem.npz")
@@ -215,12 +213,12 @@ def _print(association: Association, names: list[str], elapsed: float, *, every:
     headers, cells = rows(association.scans[:shown], names[:shown], brief=brief)
     print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
     if len(names) > shown:
-        print(f"... and {len(names) - shown} more scans (--all shows them)")
+        print_lines(f"... and {len(names) - shown} more scans (--all shows them)")
     print()
-    print(association.summary())
+    print_lines(association.summary())
     total = association.totals()
     solving, compiling = total["runtime"], total["compile_time"]
-    print(f"{elapsed:.2f} s in all, {solving:.2f} s of it in the solver, {compiling:.2f} s compiling")
+    print_lines(f"{elapsed:.2f} s in all, {solving:.2f} s of it in the solver, {compiling:.2f} s compiling")
 
 
 if __name__ == "__main__":

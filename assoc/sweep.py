@@ -5,17 +5,16 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options
 from assoc._cli.program import Parser, prepare_streams, run_program
 from assoc._cli.progress import ProgressBar
 from assoc._cli.signals import Interruption
-from assoc._cli.table import print_table
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -23,7 +22,7 @@ from assoc.errors import InvalidInputError
 if TYPE_CHECKING:
     from assoc.sweeps.study import Counts, Study
 
-_SHOWN = 60
+_SHOWN = 20
 _INTERRUPTION = Interruption("assoc.sweep")
 
 
@@ -55,7 +54,8 @@ def _sweep(words: list[str]) -> None:
         counts = study.run(options.output, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     _report(options.output, given, study)
     spread = f", {1e3 * counts.solving / counts.new:.3g} ms a run in the solver" if counts.new else ""
-    print(f"{counts.total} runs in {printable(options.output)}: {counts.new} new, {counts.before} there before{spread}")
+    found = f"{counts.new} new, {counts.before} there before{spread}"
+    print_lines(f"{counts.total} runs in {printable(options.output)}: {found}")
 
 
 def _parser() -> Parser:
@@ -63,11 +63,9 @@ def _parser() -> Parser:
         prog="assoc.sweep",
         usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
         "       python -m assoc.sweep --config STUDY.toml\n"
-        "       python -m assoc.sweep --summary FOLDER [--plot] [--csv FILE] [--report FILE]",
+        "       python -m assoc.sweep --summary FOLDER [--all] [--plot] [--csv FILE] [--report FILE]",
         description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
         "The same command again runs only what is missing.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("files", nargs="*", metavar="FILE", help="scene.npz or problem.npz")
@@ -91,6 +89,8 @@ def _parser() -> Parser:
     add("--tune", metavar="N", help="search for good parameters in the ranges of --grid, with N trials")
     add("--target", metavar="NAME", help="what --tune minimises: gap (mean gap, default) or time (time to optimum)")
     add("--summary", metavar="FOLDER", help="print the table of a study; run nothing")
+    text = f"print all settings on a terminal, not only the first {_SHOWN}"
+    add("--all", action="store_const", const=True, help=text)
     add("--csv", metavar="FILE", help="write the table as CSV")
     add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (needs assoc[report])")
     add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
@@ -98,10 +98,10 @@ def _parser() -> Parser:
 
 
 def _summary(given: dict[str, Any]) -> None:
-    strange = sorted({*given} - {"summary", "csv", "plot", "report", "words", "files"})
+    strange = sorted({*given} - {"summary", "csv", "plot", "report", "all", "words", "files"})
     if strange or given["files"]:
         raise InvalidInputError(
-            "--summary: runs nothing and can be combined only with --plot, --csv and --report, "
+            "--summary: runs nothing and can be combined only with --all, --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
     from assoc._cli.sweep_options import check_study_outputs
@@ -112,23 +112,19 @@ def _summary(given: dict[str, Any]) -> None:
 
 def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
+    from assoc._cli.study_tables import print_study
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
-    from assoc.sweeps.summary import INTERVAL, summarize, summary_rows
+    from assoc.sweeps.summary import summarize
 
     frame = load(folder)
     if study is not None:
         frame = frame[frame["setting"].isin([setting.key for setting in study.settings])].reset_index(drop=True)
     table = summarize(frame)
-    headers, rows = summary_rows(table, brief=sys.stdout.isatty())
-    shown = len(rows) if study is None else _SHOWN
-    print_table(headers, rows[:shown], keys=headers.index("runs"), joined=[INTERVAL])
-    if len(rows) > shown:
-        print(f"... and {len(rows) - shown} more settings (--summary shows them)")
-    print()
+    print_study(table, len(table) if "all" in given else _SHOWN)
     damaged = damaged_lines(folder)
     if damaged and study is None:
-        print(f"{damaged} damaged lines of the log are ignored; the same sweep again repeats their runs")
+        print_lines(f"{damaged} damaged lines of the log are ignored; the same sweep again repeats their runs")
     if "csv" in given:
         from assoc._files.output import write_text
 
@@ -137,7 +133,7 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
         from assoc.plotting.study_figures import draw_study
 
         for path in draw_study(folder, frame):
-            print(f"drawn: {printable(str(path))}")
+            print_lines(f"drawn: {printable(str(path))}")
     if "report" in given:
         from assoc.plotting.report import write_sweep_report
 
@@ -145,11 +141,11 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
 
 
 def _tune(options: Any, given: dict[str, Any]) -> None:
-    from assoc.sweeps.tuning import print_report
+    from assoc._cli.study_tables import print_tuning
 
     with _watched(options.output) as progress:
         report = options.tuning(progress)
-    print_report(report)
+    print_tuning(report)
     if {"plot", "csv", "report"} & {*given}:
         _report(options.output, given, None)
 

@@ -5,7 +5,6 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
@@ -13,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.inputs import check_outputs
+from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
 from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
@@ -52,8 +52,8 @@ _RADAR = {
 GOSPA_CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
-  track life cycle   --confirmation --false-probability --missed-probability --m --n
-                     --deletion --deletion-time --deletion-count --deletion-drop
+  track life cycle   --confirmation --false-probability --missed-probability --m --n \
+--deletion --deletion-time --deletion-count --deletion-drop
   track initiation   --speed --rest --birth-rate --widest
   solver parameters  described by: python -m assoc.solve --solver NAME --help"""
 
@@ -126,8 +126,6 @@ def _parser(further: Sequence[Option]) -> Parser:
         usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
         description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
@@ -240,7 +238,7 @@ def _of_plots(
         windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
     else:
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
-    print(recording.summary())
+    print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     table = TrackTable()
     for _ in step_windows(tracker, with_progress(windows, len(windows), "tracking")):
@@ -253,15 +251,16 @@ def _report(
     output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float, compiling: float
 ) -> None:
     _, ids, _ = table.arrays()
-    print(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
+    print_lines(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
-    print(f"{tracker.name}, {tracker.solver}: {elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling")
+    spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
+    print_lines(f"{tracker.name}, {tracker.solver}: {spent}")
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise
 
     found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), GOSPA_CUTOFF)
-    print(
+    print_lines(
         f"against the truth (cutoff {GOSPA_CUTOFF:g} m): GOSPA {found.gospa:.4g} m "
         f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
         f"false {found.gospa_false:.4g}), "

@@ -72,7 +72,7 @@ def parameter_values(choices: Sequence[Option], parsed: Mapping[str, Any]) -> di
 
 def read_first(program: str, words: Sequence[str], names: Iterable[str]) -> dict[str, str | None]:
     """Read some options before all others: those that decide which others there are."""
-    parser = Parser(prog=program, add_help=False, allow_abbrev=False)
+    parser = Parser(prog=program, add_help=False)
     for name in names:
         parser.add_argument(flag_of(name))
     return vars(parser.parse_known_args(words)[0])

@@ -342,27 +342,3 @@ def _save(path: Path, report: Report) -> None:
         "difference": dict(zip(("mean", "low", "high"), report.difference, strict=True)),
     }
     write_text(path, json.dumps(content, indent=1) + "\n")
-
-
-def print_report(report: Report) -> None:
-    """Print what was found, and how it does on what was held out."""
-    unit, factor = ("cost", 1.0) if report.target == "gap" else ("ms", 1e3)
-    changed = {
-        name: value for name, value in report.tuned.parameters.items() if value != report.default.parameters[name]
-    }
-    words = ", ".join(
-        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in changed.items()
-    )
-    what = "mean gap" if report.target == "gap" else "time to optimum (PAR10)"
-    print(f"{report.solver}, {report.trials} trials: {words or 'the defaults are best'}")
-    print(f"training: {what} {factor * report.training[0]:.4g} -> {factor * report.training[1]:.4g} {unit}")
-    print(f"held out: {report.held_out}")
-    print(f"{'':>9}  {what:>24}  {'mean gap':>10}  {'optimal %':>9}  {'ms':>8}")
-    for row in report.table.to_dict("records"):
-        print(
-            f"{row['parameters']:>9}  {factor * row['score']:>24.4g}  {row['gap']:>10.3g}  "
-            f"{100 * row['optimal']:>9.2f}  {1e3 * row['time']:>8.3g}"
-        )
-    mean, low, high = (factor * value for value in report.difference)
-    verdict = "better" if high < 0 else "worse" if low > 0 else "no difference that shows"
-    print(f"tuned less default: {mean:.4g} {unit}, 95 % interval {low:.4g} .. {high:.4g}: {verdict}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator
@@ -37,7 +38,7 @@ def opened() -> Iterator[Any]:
     # root, as in most containers, cannot use the sandbox
     for word in [*words, *(["--no-sandbox"] if os.geteuid() == 0 else [])]:
         options.add_argument(word)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     browser = selenium.Chrome(options=options, service=Service(driver, log_output=os.devnull))
     try:
         browser.set_page_load_timeout(240)  # machines can be busy
@@ -59,6 +60,16 @@ def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment:
 def complaints(browser: Any) -> list[str]:
     """Return errors and warnings of the console since the page was opened."""
     return [f"{one['level']}: {one['message']}" for one in browser.get_log("browser") if one["level"] != "INFO"]
+
+
+def requests(browser: Any) -> list[str]:
+    """Return the addresses that were asked for since the last call, also those that were blocked."""
+    found = []
+    for entry in browser.get_log("performance"):
+        event = json.loads(entry["message"])["message"]
+        if event["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated"):
+            found.append(event["params"].get("request", event["params"])["url"])
+    return found
 
 
 def screenshot(browser: Any, path: Path) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -19,6 +20,36 @@ def shown(words: Sequence[object], *, only_errors: bool = False, columns: int = 
         **options,
     )
     os.close(side)
+    seen = _read(main)
+    assert process.wait(60) == 0
+    return seen
+
+
+def shown_at(widths: Sequence[int], words: Sequence[object], *, status: int = 0, **options: object) -> dict[int, str]:
+    """Show the program ``words`` on terminals of several widths; one process, without what moves the cursor."""
+    program, *rest = map(str, words)
+    code = (
+        f"import os, importlib; main = importlib.import_module({program!r}).main\n"
+        f"for width in {[*widths]}:\n"
+        "    os.environ['COLUMNS'] = str(width)\n"
+        "    print('=' * 9, width, flush=True)\n"
+        f"    assert main({rest!r}) == {status}"
+    )
+    main, side = os.openpty()
+    command = [sys.executable, "-c", code]
+    environment = {**os.environ, "TERM": "xterm"}
+    process = subprocess.Popen(command, stdout=side, stderr=subprocess.PIPE, env=environment, **options)
+    os.close(side)
+    text = _read(main)
+    _, errors = process.communicate()
+    assert process.returncode == 0, errors
+    text = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", text.replace("\r\n", "\n"))
+    parts = re.split(r"^=========\s(\d+)\n", text, flags=re.MULTILINE)
+    return {int(width): part for width, part in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def _read(main: int) -> str:
+    """Read what was written to the other side of a pseudo terminal until that is closed."""
     seen = b""
     while True:
         try:
@@ -29,5 +60,4 @@ def shown(words: Sequence[object], *, only_errors: bool = False, columns: int = 
             break
         seen += part
     os.close(main)
-    assert process.wait(60) == 0
     return seen.decode()

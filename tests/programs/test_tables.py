@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 
 import pytest
 
+from assoc._cli.lines import fitted
+from assoc._cli.study_tables import without_the_same
 from assoc._cli.table import fitted_lines
 from assoc.simulation import simulate
-from tests.programs.terminal import shown
+from tests.programs.terminal import shown, shown_at
 
 WIDTHS = (60, 80, 120, 200)
 HEADERS = ["solver", "alpha", "runs", "mean cost", "95 %", "mean gap", "95 %", "optimal %", "95 %", "ms", "95 %"]
@@ -67,14 +70,81 @@ def test_solve_shows_twenty_scans(run, tmp_path, width):
         assert len([line for line in everything if re.match(r" *\d+ ", line)]) == 23
 
 
+@pytest.fixture(scope="module")
+def places(run, tmp_path_factory):
+    """Folder with scenes, a study and what a track needs."""
+    folder = tmp_path_factory.mktemp("places")
+    simulate("three-radar", 1, scans=23).save(folder / "s.npz")
+    simulate("crowd", 1, scans=1, targets=40).save(folder / "a-crowd-of-forty.npz")
+    grid = ["--grid", "alpha=1,1.5,2", "rho=0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.9"]
+    done = run("assoc.sweep", "s.npz", "--solver", "aco", *grid, "--scans", "0:2", "-o", "study", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+PROGRAMS = {
+    "several files": ["assoc.solve", "s.npz", "a-crowd-of-forty.npz", "--solver", "greedy", "--scans", "0"],
+    "ranked": ["assoc.solve", "s.npz", "--kbest", "3", "--scans", "0:3"],
+    "study": ["assoc.sweep", "--summary", "study"],
+    "track": ["assoc.track", "s.npz", "-o", "t.csv"],
+    "simulate": ["assoc.simulate", "three-radar", "--scans", "2", "-o", "new.npz"],
+}
+
+
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
-def test_summary_of_a_study_at_80_columns(run, scene_file, tmp_path):
-    words = [scene_file, "--solver", "aco", "--grid", "alpha=1,2", "rho=0.3,0.9", "--scans", "0:2", "-o", "study"]
-    piped = run("assoc.sweep", *words, cwd=tmp_path).stdout.splitlines()
-    text = shown(["assoc.sweep", "--summary", "study"], columns=80, cwd=tmp_path).replace("\r\n", "\n")
-    lines = text.split("\n")
-    assert max(map(len, lines)) <= 80 and "…" not in text
-    for line in piped[1:5]:
-        # the interval of what varies, and the numbers before it
-        for cell in line.split():
-            assert cell in text.split(), cell
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_every_program_fits_every_terminal(run, places, name):
+    """No line is longer than the terminal, and every number that a pipe gets is there, or dropped as a whole."""
+    piped = run(*PROGRAMS[name], cwd=places)
+    words = {word for line in piped.stdout.splitlines() for word in line.split()}
+    for width, text in shown_at(WIDTHS, PROGRAMS[name], cwd=places).items():
+        lines = [line.rpartition("\r")[2] for line in text.splitlines()]
+        assert max(map(len, lines)) <= width and "…" not in text
+        # times differ from run to run
+        seen = {word for line in lines for word in line.split() if re.fullmatch(r"-?\d+\.\d{4}", word)}
+        assert seen <= words, (width, seen - words)
+        assert name == "track" or name == "simulate" or seen
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
+def test_a_study_shows_twenty_settings_and_once_what_is_the_same(run, places):
+    piped = run("assoc.sweep", "--summary", "study", cwd=places).stdout
+    assert len([line for line in piped.splitlines() if line.strip().startswith("aco ")]) == 24
+    text = shown_at([80], ["assoc.sweep", "--summary", "study"], cwd=places)[80]
+    assert len(re.findall(r"^ *aco ", text, re.M)) == 20 and "... and 4 more settings (--all shows them)" in text
+    # every setting proves the optimum of these scans: said once
+    assert "in all settings: runs 2, mean cost" in text and "optimal % 100.00" in text.replace("\n", " ")
+    everything = shown_at([80], ["assoc.sweep", "--summary", "study", "--all"], cwd=places)[80]
+    assert len(re.findall(r"^ *aco ", everything, re.M)) == 24 and "more settings" not in everything
+
+
+def test_what_is_the_same_goes_with_its_interval():
+    headers = ["solver", "runs", "mean cost", "95 %", "mean gap", "95 %", "ms", "95 %"]
+    rows = [["aco", "4", "-1.5", "-2 .. -1", "0.1", "0 .. 1", "3", "2 .. 4"],
+            ["tabu", "4", "-1.5", "-2 .. -1", "0.1", "0 .. 2", "5", "2 .. 4"]]  # fmt: skip
+    left, cells, same = without_the_same(headers, rows, 1)
+    assert left == ["solver", "mean gap", "95 %", "ms", "95 %"] and cells[1] == ["tabu", "0.1", "0 .. 2", "5", "2 .. 4"]
+    assert same == "runs 4, mean cost -1.5 (95 %: -2 .. -1)"
+    # one setting keeps its columns
+    assert without_the_same(headers, rows[:1], 1) == (headers, rows[:1], "")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_text_breaks_between_words(width):
+    line = "against the truth (cutoff 1000 m): GOSPA 1234.5678 m, 3 identity switches; see [--filter NAME] " * 2
+    parts = fitted(line.strip(), width).split("\n")
+    assert max(map(len, parts)) <= width and " ".join(parts).split() == line.split()
+    assert not any(part.endswith("[--filter") for part in parts)
+    entry = fitted("  multi-sensor       " + "words of the second column " * 5, width).split("\n")
+    assert all(part.startswith(" " * 21) for part in entry[1:])
+    assert fitted("short", width) == "short" and fitted("", width) == ""
+
+
+@pytest.mark.parametrize("program", ["simulate", "solve", "track", "sweep"])
+def test_help_fits(monkeypatch, capsys, program):
+    main = importlib.import_module(f"assoc.{program}").main
+    for width in WIDTHS:
+        monkeypatch.setenv("COLUMNS", str(width))
+        with pytest.raises(SystemExit):
+            main(["--help"])
+        assert max(map(len, capsys.readouterr().out.splitlines())) <= width

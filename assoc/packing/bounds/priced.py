@@ -9,15 +9,12 @@ import numpy as np
 
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, hard_pass, reduced_costs
-from assoc.packing.bounds.linear_program import linear_program_duals
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
+from assoc.packing.simplex.linear_program import LinearProgram
 
 TOLERANCE = 1e-9
 """Share of the bound up to which a gap counts as closed."""
-
-# columns up to which the linear program is solved: some seconds at the most
-_LINEAR_PROGRAM = 200_000
 
 
 class Prices(NamedTuple):
@@ -68,10 +65,10 @@ class Priced:
             self.bound, self.duals, self.reduced = bound, duals, reduced_costs(self.packing, duals)
 
     def sharpen(self, run: Run) -> None:
-        """Take the multipliers of the linear program itself, where that is not too large."""
-        if self.packing.num_columns > _LINEAR_PROGRAM:
+        """Take the multipliers of the linear program itself, where there is memory for it."""
+        packing = self.packing
+        if not run.memory_allows(LinearProgram.memory(packing.num_columns, packing.num_rows)):
             return
-        duals = linear_program_duals(self.packing, run)
-        if duals is not None:
-            hard_pass(self.packing, duals, np.empty(self.packing.num_columns), 1)
-            self.take_over(duals)
+        duals = LinearProgram(packing).solve(duals=self.duals, deadline=run.deadline()).duals
+        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+        self.take_over(duals)

@@ -15,9 +15,9 @@ from importlib.resources import files
 from typing import Any
 
 from assoc._files.output import write_text
-from assoc._system.extras import check_extra, load_extra
 from assoc._text.html import escape, script_json
 from assoc._version import __version__
+from assoc.plotting.report.plotly_script import plotly_script
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
@@ -105,26 +105,8 @@ def _policy(scripts: Sequence[str]) -> str:
     """Content security policy: nothing is loaded, and only our scripts run, even if text were read as a tag."""
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{one}'" for one in hashes)
-    return f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"
-
-
-def check_report() -> None:
-    """Raise the MissingExtraError of a report before any work is done for it."""
-    check_extra("plotly", "report")
-
-
-def plotly_script() -> str:
-    """Return plotly.js as the plotly package ships it.
-
-    Raises
-    ------
-    MissingExtraError
-        The package is not installed.
-    """
-    check_report()
-    text: str = load_extra("plotly.offline", "report").get_plotlyjs()
-    # in a script element these would open a state in which the closing tag no longer closes
-    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    nothing = "default-src 'none'; connect-src 'none'; form-action 'none'; base-uri 'none'"
+    return f"{nothing}; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"
 
 
 def made_with(program: str | None, words: Sequence[str] | None) -> dict[str, str]:

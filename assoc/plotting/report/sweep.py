@@ -12,7 +12,8 @@ import numpy as np
 
 from assoc._text.html import escape
 from assoc.plotting.heat_map import LABELS, cells
-from assoc.plotting.report.page import Page, cards, check_report, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.views import number
 from assoc.plotting.study_figures import setting_title
 from assoc.sweeps.excess import mean_excess, with_excess

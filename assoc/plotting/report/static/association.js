@@ -27,7 +27,7 @@ const drawScene = () => {
   plot.parentElement.classList.remove('bare');
   if (!plot.data) plot.replaceChildren();
   const space = state.space && source.height;
-  Plotly.react(plot, sceneTraces(state.scan, space, state.chosen), sceneLayout(scan.source, space, space ? null : state.zoom), CONFIG);
+  Plotly.react(plot, sceneTraces(state.scan, space, state.chosen), sceneLayout(scan.source, space, space ? null : state.zoom), space ? SPACE_CONFIG : CONFIG);
   if (!plot.dataset.listens) {
     plot.dataset.listens = 'yes';
     plot.on('plotly_click', (event) => {

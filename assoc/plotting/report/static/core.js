@@ -132,7 +132,11 @@ const makeSlider = (places, label, show, prefix = '') => {
 
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13 };
 const AXIS = { zeroline: false, gridcolor: '#e5e8eb', linecolor: '#8c959f', ticks: 'outside', automargin: true, tickcolor: '#8c959f' };
-const CONFIG = { responsive: true, displaylogo: false, displayModeBar: window.innerWidth < 820 ? false : 'hover', modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] };
+// The data stay here: a chart has the buttons named below and no others, knows no server, and nothing opens a window.
+window.open = () => null;
+const configOf = (...buttons) => ({ responsive: true, displaylogo: false, plotlyServerURL: '', displayModeBar: window.innerWidth < 820 ? false : 'hover', modeBarButtons: [['toImage'], buttons] });
+const CONFIG = configOf('zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d');
+const SPACE_CONFIG = configOf('zoom3d', 'pan3d', 'orbitRotation', 'tableRotation', 'resetCameraDefault3d');
 const layoutOf = (x, y, more = {}) => ({
   font: FONT,
   paper_bgcolor: '#fff',

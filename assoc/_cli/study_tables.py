@@ -1,0 +1,85 @@
+"""The tables of parameter studies, for people."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from assoc._cli.lines import print_lines
+from assoc._cli.table import print_table
+from assoc.sweeps.summary import INTERVAL, summary_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from assoc.sweeps.tuning import Report
+
+
+def print_study(table: pd.DataFrame, most: int) -> None:
+    """Print the summary of a study: into a pipe the whole of it.
+
+    A terminal gets the first ``most`` settings, and what is the same in all settings in a line below.
+    """
+    brief = sys.stdout.isatty()
+    headers, rows = summary_rows(table, brief=brief)
+    keys = headers.index("runs")
+    same = ""
+    if brief:
+        headers, rows, same = without_the_same(headers, rows, keys)
+    shown = most if brief else len(rows)
+    print_table(headers, rows[:shown], keys=keys, joined=[INTERVAL])
+    if len(rows) > shown:
+        print(f"... and {len(rows) - shown} more settings (--all shows them)")
+    if same:
+        print_lines(f"in all settings: {same}")
+    print()
+
+
+def without_the_same(
+    headers: Sequence[str], rows: Sequence[Sequence[str]], keys: int
+) -> tuple[list[str], list[list[str]], str]:
+    """Take out the columns, after the first ``keys``, whose cells are all the same; return those as words."""
+    if len(rows) < 2:
+        return [*headers], [[*row] for row in rows], ""
+    same = [i for i in range(keys, len(headers)) if len({row[i] for row in rows}) == 1]
+    # an interval goes with its value
+    same = [i for i in same if (i if headers[i] != INTERVAL else i - 1) in same]
+    same = [i for i in same if headers[i + 1 : i + 2] != [INTERVAL] or i + 1 in same]
+    words: list[str] = []
+    for i in same:
+        if headers[i] == INTERVAL:
+            words[-1] += f" ({INTERVAL}: {rows[0][i]})"
+        else:
+            words.append(f"{headers[i]} {rows[0][i]}")
+    kept = [i for i in range(len(headers)) if i not in same]
+    return [headers[i] for i in kept], [[row[i] for i in kept] for row in rows], ", ".join(words)
+
+
+def print_tuning(report: Report) -> None:
+    """Print what a search found, and how it does on what was held out."""
+    unit, factor = ("cost", 1.0) if report.target == "gap" else ("ms", 1e3)
+    changed = {
+        name: value for name, value in report.tuned.parameters.items() if value != report.default.parameters[name]
+    }
+    words = ", ".join(
+        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in changed.items()
+    )
+    what = "mean gap" if report.target == "gap" else "time to optimum (PAR10)"
+    print_lines(f"{report.solver}, {report.trials} trials: {words or 'the defaults are best'}")
+    print_lines(f"training: {what} {factor * report.training[0]:.4g} -> {factor * report.training[1]:.4g} {unit}")
+    print_lines(f"held out: {report.held_out}")
+    rows = [
+        [
+            row["parameters"],
+            *([f"{factor * row['score']:.4g}"] if report.target == "time" else []),
+            f"{row['gap']:.3g}",
+            f"{100 * row['optimal']:.2f}",
+            f"{1e3 * row['time']:.3g}",
+        ]
+        for row in report.table.to_dict("records")
+    ]
+    print_table(["", *([what] if report.target == "time" else []), "mean gap", "optimal %", "ms"], rows, left=[""])
+    mean, low, high = (factor * value for value in report.difference)
+    verdict = "better" if high < 0 else "worse" if low > 0 else "no difference that shows"
+    print_lines(f"tuned less default: {mean:.4g} {unit}, 95 % interval {low:.4g} .. {high:.4g}: {verdict}")

@@ -1,0 +1,177 @@
+"""The linear program of a packing: solved once for its bound, or again and again while columns come and go.
+
+    program = LinearProgram(packing)
+    relaxed = program.solve(duals=dual_bound(packing))       # from the multipliers of the dual ascent
+    program.mark()
+    program.solve(columns=relaxed.reduced <= gap)            # warm: a few exchanges from the basis at hand
+    program.back()                                           # where the mark is
+
+Kernels that search on their own take the same steps: `begin_from_duals`, `restart`, `solve_dual`, `certified`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._types import Floats
+from assoc.packing.packing import Packing
+from assoc.packing.simplex.basis import Basis, begin_from_duals, copy_basis, new_basis, price, primal_values
+from assoc.packing.simplex.dual import INFEASIBLE, Effort, restart, solve_dual
+from assoc.packing.simplex.program import (
+    Allowed,
+    all_reduced_costs,
+    certified,
+    make_feasible,
+    program_of,
+    weight_limit,
+)
+
+# columns for each row that are looked at first, and how many times as many in the next round
+_FEW = 20
+_MORE = 4
+# a reduced cost this far below 0, as a share of the largest weight, is not rounding
+_LACK = 1e-11
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxation:
+    """A linear program as far as it was solved.
+
+    Attributes
+    ----------
+    status : int
+        ``OPTIMAL``; ``CUT``: the bound has reached the cutoff; ``INFEASIBLE``; ``STOPPED`` before the end.
+    bound : float
+        No solution that uses what is allowed weighs less, whatever the status. ``inf``: there is none.
+    duals, reduced : float arrays, shapes (R,) and (N,)
+        Multipliers that give the bound (<= 0 on rows that may stay uncovered), and the reduced costs that they give:
+        at least 0 on the columns that are allowed, but for rounding.
+    primal : float array, shape (N,)
+        How much of each column the LP takes; the optimum's where the status is ``OPTIMAL``.
+    exchanges : int
+        Steps of the simplex method.
+    """
+
+    status: int
+    bound: float
+    duals: Floats
+    reduced: Floats
+    primal: Floats
+    exchanges: int
+
+
+class LinearProgram:
+    """The linear program of a packing with a basis that is kept from one call to the next.
+
+    Parameters
+    ----------
+    packing : Packing
+        One component or several (then as one program). Takes memory for its number of rows, squared.
+    """
+
+    def __init__(self, packing: Packing) -> None:
+        self._packing = packing
+        self._program = program_of(packing.arrays)
+        self._basis: Basis = new_basis(self._program)
+        self._marked: Basis | None = None
+        self._begun = False
+
+    @staticmethod
+    def memory(columns: int, rows: int) -> float:
+        """Bytes that the program of a packing takes."""
+        return 8.0 * rows * rows + 80.0 * columns
+
+    def solve(
+        self,
+        *,
+        columns: NDArray[np.bool_] | None = None,
+        slack: NDArray[np.bool_] | None = None,
+        duals: Floats | None = None,
+        cutoff: float = np.inf,
+        exchanges: int | None = None,
+        deadline: float = np.inf,
+    ) -> Relaxation:
+        """Solve the program for the columns and the slack that are allowed.
+
+        Parameters
+        ----------
+        columns : bool array, shape (N,), optional
+            Columns that may be used; by default all.
+        slack : bool array, shape (R,), optional
+            Rows that may stay uncovered; by default those of the packing. Where all columns of a row but one are masked
+            and the row may not stay uncovered, that one is fixed.
+        duals : float array, shape (R,), optional
+            Multipliers to start from; they need not be feasible. By default the basis of the last call is warm.
+        cutoff : float
+            Stop when the bound has reached it.
+        exchanges : int, optional
+            Steps at the most; by default as many as it takes.
+        deadline : float
+            When to stop (clock.py).
+        """
+        packing, program, basis = self._packing, self._program, self._basis
+        mask = np.ones(packing.num_columns, dtype=np.bool_) if columns is None else columns
+        may_stay = packing.slack if slack is None else slack
+        allowed = Allowed(np.flatnonzero(mask).astype(np.int32), mask, may_stay)
+        limit = float(weight_limit(program))
+        most = 10_000 + 100 * packing.num_rows if exchanges is None else exchanges
+        effort = Effort(min(cutoff, limit), most, deadline)
+        if duals is not None or not self._begun:
+            start = np.zeros(packing.num_rows) if duals is None else duals.copy()
+            status, done = self._from_duals(allowed, start, effort)
+        else:
+            restart(program, allowed, basis)
+            status, done = solve_dual(program, allowed, basis, effort)
+        self._begun = True
+        found = basis.duals.copy()
+        make_feasible(program, allowed, found)
+        bound = float(certified(program, allowed, found))
+        primal = np.empty(packing.num_columns)
+        primal_values(program, basis, primal)
+        reduced = all_reduced_costs(program, found)
+        return Relaxation(status, np.inf if bound >= limit else bound, found, reduced, primal, done)
+
+    def mark(self) -> None:
+        """Remember the basis, for `back`; takes as much memory again."""
+        if self._marked is None:
+            self._marked = new_basis(self._program)
+        copy_basis(self._basis, self._marked)
+
+    def back(self) -> None:
+        """Return to the basis that was marked."""
+        assert self._marked is not None, "nothing was marked"
+        copy_basis(self._marked, self._basis)
+
+    def _from_duals(self, allowed: Allowed, duals: Floats, effort: Effort) -> Any:
+        """Solve from multipliers: first with the columns of small reduced cost, then with those that this leaves out.
+
+        Most columns are far from any optimum, and looking at them in every step is most of the work.
+        """
+        program, basis = self._program, self._basis
+        tolerance = _LACK * float(np.abs(program.weights).max(initial=0.0))
+        few = _FEW * duals.size
+        done = 0
+        while True:
+            make_feasible(program, allowed, duals)
+            near = allowed
+            if allowed.active.size > 2 * few:
+                reduced = all_reduced_costs(program, duals)[allowed.active]
+                chosen = allowed.active[reduced <= np.partition(reduced, few)[few]]
+                mask = np.zeros(allowed.columns.size, dtype=np.bool_)
+                mask[chosen] = True
+                near = Allowed(chosen, mask, allowed.slack)
+            begin_from_duals(program, near, duals, basis)
+            status, more = solve_dual(program, near, basis, effort)
+            done += more
+            # the bound of the few is not yet that of all
+            if near is allowed or price(program, allowed, basis) >= -tolerance or more >= effort.exchanges:
+                break
+            effort = effort._replace(exchanges=effort.exchanges - more)
+            few *= _MORE
+            if status != INFEASIBLE:
+                duals = basis.duals.copy()
+        return status, done

@@ -1,0 +1,145 @@
+"""A packing's linear program in the form of the simplex kernels, and bounds that hold whatever they did.
+
+    min  sum_j w_j x_j     so that     sum_{j in r} a_rj x_j + s_r = b_r  for every row r,     x >= 0, s >= 0
+
+A column is the list of its rows; a row that is listed twice has the coefficient 2. Rows of measurements have b = 1;
+rows of cuts may have more. The slack s_r belongs to rows that may stay uncovered; elsewhere it is 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.packing import PackingArrays
+
+
+class Program(NamedTuple):
+    """A linear program; n columns, m rows.
+
+    Attributes
+    ----------
+    weights : float array, shape (n,)
+        Cost of each column.
+    start : int64 array, shape (n + 1,)
+        Column j has the rows ``rows[start[j]:start[j + 1]]``.
+    rows : int32 array
+        Rows of the columns, one after the other.
+    sides : float array, shape (m,)
+        Right-hand sides b, whole numbers.
+    """
+
+    weights: Floats
+    start: NDArray[np.int64]
+    rows: NDArray[np.int32]
+    sides: Floats
+
+
+class Allowed(NamedTuple):
+    """What a solution may use: a mask on the program.
+
+    Attributes
+    ----------
+    active : int32 array
+        Columns that may be used, ascending.
+    columns : bool array, shape (n,)
+        The same as a mask.
+    slack : bool array, shape (m,)
+        Rows that may stay uncovered.
+    """
+
+    active: NDArray[np.int32]
+    columns: NDArray[np.bool_]
+    slack: NDArray[np.bool_]
+
+
+@njit
+def program_of(packing: PackingArrays) -> Program:
+    """The linear program of a packing."""
+    cols = packing.cols
+    num, num_sensors = cols.shape
+    start = np.zeros(num + 1, np.int64)
+    rows = np.empty(packing.row_cols.size, np.int32)
+    place = 0
+    for j in range(num):
+        for s in range(num_sensors):
+            if cols[j, s] >= 0:
+                rows[place] = cols[j, s]
+                place += 1
+        start[j + 1] = place
+    return Program(packing.weights, start, rows, np.ones(packing.slack.size))
+
+
+@njit
+def reduced_cost(program: Program, duals: Floats, j: int) -> float:
+    """Weight of column j less the multipliers of its rows."""
+    value = program.weights[j]
+    for k in range(program.start[j], program.start[j + 1]):
+        value -= duals[program.rows[k]]
+    return value
+
+
+@njit
+def all_reduced_costs(program: Program, duals: Floats) -> Floats:
+    """Reduced costs of all columns, allowed or not."""
+    reduced = np.empty(program.weights.size)
+    for j in range(reduced.size):
+        reduced[j] = reduced_cost(program, duals, j)
+    return reduced
+
+
+@njit
+def make_feasible(program: Program, allowed: Allowed, duals: Floats) -> None:
+    """Lower multipliers until no allowed column has a negative reduced cost, each by what it lacks."""
+    for r in range(duals.size):
+        if allowed.slack[r] and duals[r] > 0.0:
+            duals[r] = 0.0
+    for j in allowed.active:
+        lack = reduced_cost(program, duals, j)
+        if lack < 0.0:
+            duals[program.rows[program.start[j]]] += lack
+
+
+@njit
+def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
+    """A lower bound on all whole-numbered solutions that holds whatever the multipliers are.
+
+    What reduced costs lack to zero is charged for as many columns as a solution can have, and what rounding can have
+    lost in the sum is taken off.
+    """
+    total = 0.0
+    size = 0.0
+    most = 0.0
+    for r in range(duals.size):
+        u = min(duals[r], 0.0) if allowed.slack[r] else duals[r]
+        total += program.sides[r] * u
+        size += program.sides[r] * abs(u)
+        most += program.sides[r]
+    least = 0.0
+    for j in allowed.active:
+        value = program.weights[j]
+        for k in range(program.start[j], program.start[j + 1]):
+            r = program.rows[k]
+            value -= min(duals[r], 0.0) if allowed.slack[r] else duals[r]
+        least = min(least, value)
+    return total + least * most - 1e-15 * size
+
+
+@njit
+def weight_limit(program: Program) -> float:
+    """More than any solution can weigh: a bound beyond it says that there is none."""
+    most = 0.0
+    for j in range(program.weights.size):
+        most = max(most, abs(program.weights[j]))
+    return 1.0 + 2.0 * most * program.sides.size
+
+
+@njit
+def all_allowed(program: Program, slack: Any) -> Allowed:
+    """No mask: every column, and the slack of the rows that have one."""
+    num = program.weights.size
+    return Allowed(np.arange(num).astype(np.int32), np.ones(num, np.bool_), slack.copy())

@@ -1,0 +1,117 @@
+"""Reports keep the data: whatever is clicked, no window opens and nothing is asked for from a network."""
+
+from __future__ import annotations
+
+import re
+import time
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.association.plan import Plan
+from assoc.plotting.report import write_association_report, write_sweep_report, write_tracking_report
+from assoc.simulation import simulate
+from assoc.sweeps import Study, grid
+from assoc.sweeps.sources import StudySource
+from experiments.common.browser import DESKTOP, PHONE, complaints, press, requests, show
+
+BUTTONS = {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
+SPACE_BUTTONS = {"Orbital rotation", "Turntable rotation", "Reset camera to default"}
+CLICK_ALL = """
+const shown = (one) => one.getClientRects().length > 0 && !one.disabled;
+const click = (one) => {
+  if (shown(one)) one.dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true}));
+};
+// a click may replace what comes later: that is not shown then
+document.querySelectorAll('button, a, tbody tr').forEach(click);
+for (const box of [...document.querySelectorAll('select, input')].filter(shown)) {
+  if (box.options) box.selectedIndex = box.options.length - 1; else box.value = box.max;
+  box.dispatchEvent(new Event(box.options ? 'change' : 'input'));
+}
+const buttons = [...document.querySelectorAll('.modebar-btn')].filter(shown);
+const known = new Set(document.querySelectorAll('button'));
+buttons.forEach(click);
+// what asks before it sends is told yes: the last button of a dialog
+[...document.querySelectorAll('button')].filter((one) => !known.has(one)).reverse().forEach(click);
+return buttons.map((one) => one.dataset.title);
+"""
+LOCAL = ("file:", "data:", "blob:", "about:")
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """One report of each kind."""
+    folder = tmp_path_factory.mktemp("reports")
+    scene = simulate("three-radar", 0, scans=2)
+    association = assoc.associate(scene, "aco")
+    write_association_report(folder / "scene.html", association, scene)
+    problem = assoc.AssignmentProblem.from_dense(np.random.default_rng(0).normal(size=(4, 4, 4)))
+    plan = Plan((problem,), "exact")
+    write_association_report(folder / "problem.html", plan.gather(plan.run(plan.items())), problem)
+    rows = association.to_frame().rename(columns={"target": "track_id"})
+    write_tracking_report(folder / "tracks.html", rows[["track_id", "time", "x", "y", "z"]].dropna(), scene)
+    settings = grid("aco", {"alpha": [1, 2], "rho": [0.3, 0.9]})
+    Study([StudySource(scene, "scene")], settings, 2).run(folder / "study")
+    write_sweep_report(folder / "study.html", folder / "study")
+    return folder
+
+
+@pytest.mark.parametrize("name", ["scene", "problem", "tracks", "study"])
+def test_the_page_names_no_server(pages, name):
+    text = re.sub(r"/\*!.*?\*/", "", (pages / f"{name}.html").read_text(), flags=re.DOTALL)
+    servers = {*re.findall(r"\b(?:https?|wss?)://([\w.{}-]+)", text)}
+    assert servers == {"www.w3.org"}  # names of vocabularies, which nothing asks for
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [("scene", DESKTOP), ("problem", DESKTOP), ("tracks", DESKTOP), ("study", DESKTOP), ("scene", PHONE)],
+    ids=["scene", "problem", "tracks", "study", "scene on a phone"],
+)
+def test_no_click_opens_or_asks_for_anything(browser, pages, tmp_path, name, size):
+    browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    requests(browser)  # what an earlier page asked for
+    show(browser, pages / f"{name}.html", size)
+    windows, address = browser.window_handles, browser.current_url.partition("#")[0]
+    charts = click_all(browser)
+    if name == "scene":
+        press(browser, browser.find_element("id", "space"))
+        charts |= click_all(browser)
+    if size == DESKTOP:
+        assert charts == (BUTTONS | SPACE_BUTTONS if name == "scene" else BUTTONS)
+        # the picture of a chart is made here and kept here
+        assert in_time(lambda: [*tmp_path.glob("*.png")])
+    else:
+        assert charts == set()
+    assert browser.window_handles == windows
+    assert browser.current_url.partition("#")[0] == address
+    assert [one for one in requests(browser) if not one.startswith(LOCAL)] == []
+    assert [one for one in complaints(browser) if "willReadFrequently" not in one and "GPU stall" not in one] == []
+
+
+def in_time(condition):
+    """Return what a condition becomes within half a minute: machines can be busy."""
+    last = time.monotonic() + 30.0
+    while not (found := condition()) and time.monotonic() < last:
+        time.sleep(0.05)
+    return found
+
+
+def click_all(browser):
+    """Click every button, link, row, choice, legend and chart; return what the buttons of the charts are called."""
+    from selenium.webdriver import ActionChains
+
+    names = {*browser.execute_script(CLICK_ALL)}
+    for one in browser.find_elements("css selector", ".traces:first-child .legendtoggle, .js-plotly-plot"):
+        browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", one)
+        ActionChains(browser).move_to_element(one).click().perform()
+    return names
+
+
+def test_no_script_opens_a_window(browser, pages):
+    """What plotly offers where there is no WebGL: a click that opens its help page."""
+    show(browser, pages / "scene.html")
+    windows = browser.window_handles
+    assert browser.execute_script("return window.open('about:blank') === null")
+    assert browser.window_handles == windows
