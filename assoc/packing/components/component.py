@@ -13,12 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._types import Floats
 from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.cover import Cover, chosen_columns, is_complete, weight_of
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
-from assoc.packing.neighbourhoods.insertion import search_arrays
+from assoc.packing.neighbourhoods.diving import Diver
+from assoc.packing.neighbourhoods.insertion import insert_and_eject, search_arrays
 from assoc.packing.neighbourhoods.large import LargeNeighbourhood
 from assoc.packing.neighbourhoods.neighbourhood import Neighbourhood
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
@@ -98,6 +100,8 @@ class Component(Priced):
     stalled: int = 0
     _searches: dict[type[Neighbourhood], Neighbourhood] = field(default_factory=dict)
     _arrays: PackingArrays | None = None
+    _diver: Diver | None = None
+    _may_dive: bool = True
 
     @property
     def arrays(self) -> PackingArrays:
@@ -162,6 +166,21 @@ class Component(Priced):
         trail = Trail.without_pheromone(self.prices, strictness, self.temperature)
         owner, _ = walk(self.arrays, self.prices, trail, 1, self.inserts, rng, self.deadline)
         return np.asarray(owner)
+
+    @property
+    def dives(self) -> bool:
+        """Whether covers are also built in the linear program."""
+        if self._diver is None and self._may_dive:
+            self._may_dive = self.refinement == "full" and Diver.pays(self.packing)
+        return self._may_dive and not self.closed and not self.late
+
+    def dive(self, trail: Floats, strictness: float, rng: np.random.Generator) -> Owner:
+        """Return a cover built in the linear program (`Diver.dive`), and completed by insertion."""
+        if self._diver is None:
+            self._diver = Diver(self, self.deadline)
+        owner = self._diver.dive(trail, strictness, rng, self.weight - self.tolerance, self.deadline)
+        insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
+        return owner
 
     def improve(
         self, owner: Owner, rng: np.random.Generator, clusters: int, moves: Sequence[Move] = NEIGHBOURHOODS

@@ -11,13 +11,9 @@ from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.errors import InvalidInputError
-<<<<<<< HEAD
-from assoc.plotting.report.page import Page, cards, check_report, controls, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.pheromone import add_pheromone
-=======
-from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
->>>>>>> main
 from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
 from assoc.scene.scene import Scene
 

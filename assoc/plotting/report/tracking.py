@@ -14,12 +14,8 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time
 from assoc.plotting.places import places
-<<<<<<< HEAD
-from assoc.plotting.report.page import Page, cards, check_report, controls, definitions, made_with, sortable_table
-=======
-from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
->>>>>>> main
 from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene

@@ -50,6 +50,7 @@ class Colony:
         # the best since the pheromone was laid anew
         self.recent: NDArray[np.int32] | None = None
         self.least = np.inf
+        self.dives = 0
         if component.best is not None:
             self._deposit(component.packing.cols, component.best, 1.0 - parameters.rho)
 
@@ -60,6 +61,11 @@ class Colony:
         inserts, deadline = component.inserts, component.deadline
         owner, _ = walk(component.arrays, component.prices, trail, p.ants, inserts, rng, deadline)
         weight = component.settle(owner, rng, p.clusters)
+        for _ in range(p.divers if component.dives else 0):
+            other = self._dive(component, rng)
+            reached = component.settle(other, rng, p.clusters)
+            if reached < weight and component.is_complete(other):
+                owner, weight = other, reached
         if weight < self.least and component.is_complete(owner):
             self.recent, self.least = owner, weight
         elite = self.recent if self.recent is not None and component.iterations % 3 == 2 else owner
@@ -69,6 +75,12 @@ class Colony:
             self.slack_pheromone[:] = 1.0
             self.recent, self.least = None, np.inf
         self._tell(component, self)
+
+    def _dive(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
+        """One ant builds its cover in the linear program; divers differ in strictness, as walkers do."""
+        strictness = self.parameters.beta * 2.0 ** (1 + self.dives % 4)
+        self.dives += 1
+        return component.dive(self.pheromone**self.parameters.alpha, strictness, rng)
 
     def _deposit(self, cols: NDArray[np.int32], owner: NDArray[np.int32], share: float) -> None:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)

@@ -24,6 +24,8 @@ class AcoParameters(SearchParameters):
         "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11 to the letter).
     ants : int
         Ants in a cycle; 15 in the paper.
+    divers : int
+        Mode mmas with refinement "full": further ants of each cycle, which build their covers in the linear program.
     alpha, beta : float
         Exponents of pheromone and visibility in eq. 8.
     rho : float
@@ -37,6 +39,7 @@ class AcoParameters(SearchParameters):
 
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
     ants: int = field(default=15, metadata={"help": "ants in a cycle"})
+    divers: int = field(default=1, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
     alpha: float = field(default=1.0, metadata={"help": "exponent of the pheromone, eq. 8"})
     beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
     rho: float = field(default=0.9, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
@@ -49,6 +52,7 @@ class AcoParameters(SearchParameters):
         super().__post_init__()
         self._require(self.mode in MODES, "mode", " or ".join(MODES))
         self._whole("ants", most=100_000)
+        self._whole("divers", least=0, most=100_000)
         self._number("alpha", "beta", least=0.0, most=20.0)
         self._require(is_number(self.rho) and 0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
