@@ -87,6 +87,8 @@ class Component(Priced):
         When time is over, by the kernels' clock (clock.py).
     refinement : str
         What improves covers (`SearchParameters`).
+    worker : int
+        Which of several workers searches it (team.py).
     iterations, stalled : int
         Iterations of a metaheuristic, and those since the best cover became better.
     """
@@ -96,6 +98,7 @@ class Component(Priced):
     weight: float = np.inf
     deadline: float = np.inf
     refinement: str = "full"
+    worker: int = 0
     iterations: int = 0
     stalled: int = 0
     _searches: dict[type[Neighbourhood], Neighbourhood] = field(default_factory=dict)

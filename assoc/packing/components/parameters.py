@@ -25,6 +25,9 @@ class SearchParameters(Parameters):
     clusters : int
         With refinement "full": exact sub-steps on each new cover, and for every 30 measurements on the best cover after
         each iteration.
+    workers : int
+        Searches at a time on each component, on threads, which exchange their best covers after every iteration. The
+        result depends on the seed and on their number.
     """
 
     iterations: int = field(default=1000, metadata={"help": "iterations on one component at the most"})
@@ -33,7 +36,9 @@ class SearchParameters(Parameters):
         default="full", metadata={"help": "what improves covers: none, local search, or full (exact sub-steps, too)"}
     )
     clusters: int = field(default=10, metadata={"help": "exact sub-steps on each new cover (refinement full)"})
+    workers: int = field(default=1, metadata={"help": "searches at a time, on threads, that exchange their best"})
 
     def __post_init__(self) -> None:
         self._whole("iterations", "patience", "clusters")
+        self._whole("workers", most=1000)
         self._require(self.refinement in REFINEMENTS, "refinement", ", ".join(REFINEMENTS))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +15,15 @@ from assoc.packing.components.component import Component
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.proof import bound_of_component
 from assoc.packing.components.splitting import split_component, split_components
+from assoc.packing.components.team import Make, Team
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 
 
-class Searcher(Protocol):
-    """A metaheuristic at work on one component."""
-
-    def iterate(self, component: Component, rng: np.random.Generator) -> None:
-        """Do one iteration and ``offer`` what it finds to the component."""
-
-
 def search_components(
-    make: Callable[[Component, np.random.Generator], Searcher],
+    make: Make,
     packing: Packing,
     run: Run,
     parameters: SearchParameters,
@@ -67,34 +61,37 @@ def search_components(
     cut_off = False
     root_bound = sum(component.bound for component in components)
     _record_all(run, done, weight, root_bound, components)
-    queue: list[tuple[Component, Searcher | None]] = [(component, None) for component in components]
-    while queue:
-        component, searcher = queue.pop(0)
-        # a component that has a cover takes no turn after time is over, or thousands of components would take one each
-        over = component.closed or (component.best is not None and run.should_stop())
-        if not over:
-            if searcher is None:
-                searcher = make(component, run.rng)
-            before, iterations_before = component.weight, component.iterations
-            over = _take_turn(component, searcher, run, parameters)
-            done += component.iterations - iterations_before
-            cut_off |= component.iterations >= parameters.iterations and not (
-                component.closed or component.stalled >= parameters.patience
-            )
-            if component.best is None and over:
-                complete_greedily(component, run)
-            if component.weight < before:
-                _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
-            smaller = None if over else split_component(component)
-            if smaller is not None:
-                queue.extend((one, None) for one in smaller)
-                continue
-        if over:
-            columns.append(component.origin[component.best_columns()])
-            bound += bound_of_component(component, run)
-            weight += component.weight
-        else:
-            queue.append((component, searcher))
+    queue: list[tuple[Component, Team | None]] = [(component, None) for component in components]
+    workers = parameters.workers
+    pool = ThreadPoolExecutor(workers, "assoc-search") if workers > 1 else None
+    with pool or nullcontext():
+        while queue:
+            component, team = queue.pop(0)
+            # who has a cover takes no turn after time is over, or thousands of components would take one each
+            over = component.closed or (component.best is not None and run.should_stop())
+            if not over:
+                if team is None:
+                    team = Team(make, component, run, parameters.clusters, workers, pool)
+                before, iterations_before = component.weight, component.iterations
+                over = _take_turn(component, team, run, parameters)
+                done += component.iterations - iterations_before
+                cut_off |= component.iterations >= parameters.iterations and not (
+                    component.closed or component.stalled >= parameters.patience
+                )
+                if component.best is None and over:
+                    complete_greedily(component, run)
+                if component.weight < before:
+                    _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
+                smaller = None if over else split_component(component)
+                if smaller is not None:
+                    queue.extend((one, None) for one in smaller)
+                    continue
+            if over:
+                columns.append(component.origin[component.best_columns()])
+                bound += bound_of_component(component, run)
+                weight += component.weight
+            else:
+                queue.append((component, team))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     run.record(done, weight, bound)
     if cut_off:
@@ -103,17 +100,19 @@ def search_components(
     return Outcome(chosen, done, bound, duals)
 
 
-def _take_turn(component: Component, searcher: Searcher, run: Run, limits: SearchParameters) -> bool:
-    """Give a component up to ten iterations; whether its search is over."""
+def _take_turn(component: Component, team: Team, run: Run, limits: SearchParameters) -> bool:
+    """Give a component up to ten iterations, until one improves its cover; whether its search is over."""
     for _ in range(10):
         before = component.weight
-        searcher.iterate(component, run.rng)
-        component.refine(run, limits.clusters)
+        team.iterate()
         component.iterations += 1
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
         ended = component.stalled >= limits.patience or component.iterations >= limits.iterations
         if component.closed or ended or run.should_stop():
             return True
+        if component.stalled == 0:
+            # fewer columns may do now
+            return False
     return False
 
 

@@ -51,12 +51,17 @@ class Colony:
         self.recent: NDArray[np.int32] | None = None
         self.least = np.inf
         self.dives = 0
+        # the least weight known after the last cycle
+        self.known = component.weight
         if component.best is not None:
             self._deposit(component.packing.cols, component.best, 1.0 - parameters.rho)
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One cycle: all ants walk, the best is improved, the pheromone evaporates and is laid."""
         packing, p = component.packing, self.parameters
+        if component.best is not None and component.weight < min(self.known, self.least) - component.tolerance:
+            # found by others since the last cycle: by refinement, or by another worker
+            self.recent, self.least = component.best.copy(), component.weight
         trail = Trail(self.pheromone, self.slack_pheromone, float(p.alpha), float(p.beta), component.temperature)
         inserts, deadline = component.inserts, component.deadline
         owner, _ = walk(component.arrays, component.prices, trail, p.ants, inserts, rng, deadline)
@@ -74,6 +79,7 @@ class Colony:
             self.pheromone[:] = 1.0
             self.slack_pheromone[:] = 1.0
             self.recent, self.least = None, np.inf
+        self.known = component.weight
         self._tell(component, self)
 
     def _dive(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:

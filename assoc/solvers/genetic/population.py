@@ -36,9 +36,18 @@ class Breeding:
         self.parameters = parameters
         self.members = np.empty((0, component.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)
+        # the least weight known after the last generation
+        self.known = np.inf
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One generation; the first one fills the population."""
+        if component.best is not None and component.weight < self.known - component.tolerance and self.fitness.size:
+            # found by others since: by refinement, or by another worker
+            self._admit(component, component.best.copy(), component.weight)
+        self._breed(component, rng)
+        self.known = component.weight
+
+    def _breed(self, component: Component, rng: np.random.Generator) -> None:
         if self.fitness.size == 0:
             self._populate(component, rng)
             return
