@@ -38,12 +38,15 @@ _CYCLE = "assoc/solvers/aco/cycle.py"
 _BREEDING = "assoc/solvers/genetic/population.py"
 _TABU = "assoc/solvers/tabu/moves.py"
 _SEARCH = "assoc/packing/components/search.py"
+_TEAM = "assoc/packing/components/team.py"
+_DIVER = "assoc/packing/neighbourhoods/diving.py"
 _COMPONENT = "assoc/packing/components/component.py"
 
 _OF_PAPER = "tests/solvers/test_aco_paper.py"
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
 _OF_TABU = "tests/solvers/test_tabu.py"
+_OF_DIVES = "tests/packing/test_diving.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
 FAULTS = (
@@ -253,7 +256,7 @@ FAULTS = (
     Fault(
         "the best known is no member",
         _BREEDING,
-        "if component.best is not None and not members and component.iterations == 0:",
+        "if component.best is not None and self.known == np.inf:",
         "if False:",
         _OF_GENETIC,
     ),
@@ -317,7 +320,31 @@ FAULTS = (
         _OF_SEARCH,
     ),
     Fault("iterations have no end", _SEARCH, " or component.iterations >= limits.iterations\n", "\n", _OF_SEARCH),
-    Fault("the best cover is not refined", _SEARCH, "        component.refine(run, limits.clusters)\n", "", _OF_SEARCH),
+    Fault("the best cover is not refined", _TEAM, "        component.refine(run, self._clusters)\n", "", _OF_SEARCH),
+    Fault("workers do not exchange", _TEAM, "own.offer(whole.best, whole.weight)", "pass", _OF_SEARCH),
+    Fault("what other workers find is lost", _TEAM, "whole.offer(own.best, own.weight)", "pass", _OF_SEARCH),
+    Fault("workers draw the same numbers", _TEAM, "Run(rng, time_limit", "Run(0, time_limit", _OF_SEARCH),
+    Fault(
+        "a colony learns nothing from others",
+        _COLONY,
+        "self.recent, self.least = component.best.copy(), component.weight",
+        "pass",
+        _OF_COLONY,
+    ),
+    Fault(
+        "a population learns nothing from others",
+        _BREEDING,
+        "            self._admit(component, component.best.copy(), component.weight)\n",
+        "            pass\n",
+        _OF_GENETIC,
+    ),
+    Fault("divers ignore the pheromone", _DIVER, "trail[open_columns] * relaxed", "relaxed", _OF_DIVES),
+    Fault("divers ignore the linear program", _DIVER, "relaxed.primal[open_columns] ** strictness", "1.0", _OF_DIVES),
+    Fault("divers fix nothing", _DIVER, "                slack[r] = False\n", "", _OF_DIVES),
+    Fault(
+        "what a diver fixed is not excluded", _DIVER, "row_ptr[r + 1]]] = False", "row_ptr[r + 1]]] = True", _OF_DIVES
+    ),
+    Fault("no ant dives", _COLONY, "p.divers if component.dives else 0", "0", _OF_DIVES),
     Fault(
         "a cover that is worse is kept",
         _COMPONENT,

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
+import assoc
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
+from assoc.packing.components.team import Team
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.simulation import simulate
 from experiments.common.oracles import gated_problem
 from tests.solvers.pieces import component, problems
 
@@ -77,3 +82,58 @@ def test_how_much_new_covers_are_improved(name):
     # the cover itself is improved by insertion unless refinement is none
     assert weights["none"][0] > weights["local"][0] + 1.0
     assert weights["local"][1] > weights["full"][1] + 1e-6
+
+
+class Lucky:
+    """A searcher that offers a cover that is given, once."""
+
+    def __init__(self, cover, worker):
+        self.cover, self.worker = cover, worker
+        self.seen, self.draws = [], []
+
+    def iterate(self, component, rng):
+        self.seen.append((component.worker, component.weight, component.iterations, component.stalled))
+        self.draws.append(rng.random())
+        if component.worker == self.worker and len(self.seen) == 3:
+            component.offer(self.cover, component.weight_of(self.cover))
+
+
+@pytest.mark.parametrize("lucky", [0, 2])
+def test_workers_exchange_their_best(lucky):
+    one = component(PROBLEM, "none")
+    one.offer_greedy()
+    before = one.weight
+    found = min((one.random_cover(1.0, np.random.default_rng(seed)) for seed in range(40)), key=one.weight_of)
+    after = one.weight_of(found)
+    assert after < before - 1e-6
+    members = []
+
+    def make(part, rng):
+        members.append(Lucky(found, lucky))
+        return members[-1]
+
+    with ThreadPoolExecutor(3) as pool:
+        team = Team(make, one, Run(4), 10, 3, pool)
+        for _ in range(5):
+            team.iterate()
+            one.iterations += 1
+    assert one.weight == pytest.approx(after) and one.best.tolist() == found.tolist()
+    assert [worker for member in members for worker, *_ in member.seen] == [0] * 5 + [1] * 5 + [2] * 5
+    for member in members:
+        # the cover of the third round is everyone's in the fourth
+        assert [weight for _, weight, *_ in member.seen] == pytest.approx([before] * 3 + [after] * 2)
+        assert [number for _, _, number, _ in member.seen] == [0, 1, 2, 3, 4]
+    assert len({draw for member in members for draw in member.draws}) == 15
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_the_same_seed_and_workers_give_the_same_search(solver):
+    """To the last bit, whichever thread was quicker."""
+    found = []
+    problem = assoc.build_problem(simulate("bearing-only", seed=4, targets=20, scans=1), 0)
+    for workers in (1, 2, 2, 3):
+        solution = assoc.assign(problem, solver, seed=3, workers=workers, refinement="none", iterations=4)
+        found.append([(point.iteration, point.cost) for point in solution.trace])
+        assert solution.cost == pytest.approx(problem.costs[solution.indices].sum())
+    assert found[1] == found[2]
+    assert len({str(one) for one in found}) > 1

@@ -155,3 +155,17 @@ def test_pheromone_by_tuple(mode):
         np.testing.assert_array_equal(history.visibility[one.number - 1, at], one.visibility[: len(at)])
     top = history.top(7)
     assert top.tuples.shape == (7, 3) and top.chosen.all()
+
+
+def test_a_colony_learns_what_others_found():
+    """A better cover from elsewhere is what every third cycle lays pheromone for."""
+    one = component(open_problem())
+    one.offer_greedy()
+    colony = Colony(one, AcoParameters(ants=1, beta=0.0, rho=0.5, refinement="none"), lambda *_: None)
+    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
+    assert one.offer(found, one.weight_of(found))
+    one.iterations = 2
+    colony.iterate(one, np.random.default_rng(0))
+    chosen = np.isin(np.arange(one.packing.num_columns), columns_of(found))
+    assert (colony.pheromone[chosen] >= 0.5 + 0.5 * colony.lowest - 1e-12).all()
+    assert colony.least == one.weight

@@ -168,3 +168,14 @@ def test_breeding_alone_finds_what_greedy_does_not():
     costs = [assoc.assign(problem, "genetic", seed=seed, refinement="none", patience=25).cost for seed in range(2)]
     assert greedy > best + 1.0
     assert min(costs) == pytest.approx(best, abs=1e-6)
+
+
+def test_a_population_learns_what_others_found():
+    """A better cover from elsewhere becomes a member."""
+    one = component(open_problem())
+    breeding = Breeding(one, GeneticParameters(population=4, offspring=1, refinement="none"))
+    breeding.iterate(one, np.random.default_rng(0))
+    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(200)), key=one.weight_of)
+    assert one.offer(found, one.weight_of(found))
+    breeding.iterate(one, np.random.default_rng(1))
+    assert found.tolist() in breeding.members.tolist()

@@ -177,10 +177,16 @@ class Component(Priced):
             self._may_dive = self.refinement == "full" and Diver.pays(self.packing)
         return self._may_dive and not self.closed and not self.late
 
-    def dive(self, trail: Floats, strictness: float, rng: np.random.Generator) -> Owner:
-        """Return a cover built in the linear program (`Diver.dive`), and completed by insertion."""
+    def dive(self, number: int, rng: np.random.Generator, trail: Floats | None = None, beta: float = 1.0) -> Owner:
+        """Return a cover built in the linear program (`Diver.dive`), and completed by insertion.
+
+        Dives of successive numbers differ in strictness. ``trail`` is tau_j^alpha of each column.
+        """
         if self._diver is None:
             self._diver = Diver(self, self.deadline)
+        if trail is None:
+            trail = np.ones(self.packing.num_columns)
+        strictness = beta * 2.0 ** (1 + number % 4)
         owner = self._diver.dive(trail, strictness, rng, self.weight - self.tolerance, self.deadline)
         insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
         return owner

@@ -67,7 +67,8 @@ class Colony:
         owner, _ = walk(component.arrays, component.prices, trail, p.ants, inserts, rng, deadline)
         weight = component.settle(owner, rng, p.clusters)
         for _ in range(p.divers if component.dives else 0):
-            other = self._dive(component, rng)
+            other = component.dive(self.dives, rng, self.pheromone**p.alpha, p.beta)
+            self.dives += 1
             reached = component.settle(other, rng, p.clusters)
             if reached < weight and component.is_complete(other):
                 owner, weight = other, reached
@@ -81,12 +82,6 @@ class Colony:
             self.recent, self.least = None, np.inf
         self.known = component.weight
         self._tell(component, self)
-
-    def _dive(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
-        """One ant builds its cover in the linear program; divers differ in strictness, as walkers do."""
-        strictness = self.parameters.beta * 2.0 ** (1 + self.dives % 4)
-        self.dives += 1
-        return component.dive(self.pheromone**self.parameters.alpha, strictness, rng)
 
     def _deposit(self, cols: NDArray[np.int32], owner: NDArray[np.int32], share: float) -> None:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)

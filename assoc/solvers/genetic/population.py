@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 # generations without improvement after which a population is renewed
 _RENEWAL = 10
+# members of a new population that come from the linear program
+_DIVES = 4
 
 
 class Breeding:
@@ -68,13 +70,17 @@ class Breeding:
     def _populate(self, component: Component, rng: np.random.Generator) -> None:
         members = [*self.members]
         fitness = [*self.fitness]
-        if component.best is not None and not members and component.iterations == 0:
+        if component.best is not None and self.known == np.inf:
+            # a first population, and not one that is to be without it
             members.append(component.best.copy())
             fitness.append(component.weight)
+        dives = _DIVES
         while len(members) < self.parameters.population:
-            # random greedy solutions, strict and loose ones by turns
-            owner = component.random_cover(2.0 ** (len(members) % 10), rng)
-            weight = component.settle(owner, rng, 0)
+            # some from the linear program, then random greedy solutions, strict and loose ones by turns
+            diver = dives > 0 and component.dives
+            dives -= diver
+            owner = component.dive(dives, rng) if diver else component.random_cover(2.0 ** (len(members) % 10), rng)
+            weight = component.settle(owner, rng, self.parameters.clusters if diver else 0)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
             if component.closed or component.late:

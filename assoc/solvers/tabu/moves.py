@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _FRESH = 3
 # new solutions of which the best is taken
 _COVERS = 12
+# those from the linear program, where covers are built there
+_DIVES = 3
 
 
 class _Rules(NamedTuple):
@@ -47,14 +49,16 @@ class TabuSearch:
         self.until = np.zeros(component.packing.num_columns, dtype=np.int64)
         self.clock = 1
         self.restarts = 0
-        self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
+        self.dives = 0
+        self.owner: NDArray[np.int32] | None = None
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """Some moves, then exact sub-steps on the best solution they met."""
         p = self.parameters
         forced = -1
         if self.owner is None:
-            self.owner = self._afresh(component, rng)
+            known = component.best
+            self.owner = self._afresh(component, rng) if known is None or component.dives else known.copy()
         elif component.best is not None and component.stalled and component.stalled % p.restart == 0:
             self.restarts += 1
             self.until[:] = 0
@@ -76,10 +80,12 @@ class TabuSearch:
                 self.owner = best
 
     def _afresh(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
-        """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
+        """Return the best of some covers, dives or random greedy ones, each improved by exact sub-steps."""
         best, least = component.best, np.inf
-        for number in range(_COVERS):
-            owner = component.random_cover(2.0 ** (number % 6), rng)
+        dives = component.dives
+        for number in range(_DIVES if dives else _COVERS):
+            self.dives += 1
+            owner = component.dive(self.dives, rng) if dives else component.random_cover(2.0 ** (number % 6), rng)
             weight = component.settle(owner, rng, self.parameters.clusters)
             if weight < least and component.is_complete(owner):
                 best, least = owner, weight
