@@ -126,7 +126,7 @@ def test_the_colony_dives(monkeypatch):
     monkeypatch.setattr(Diver, "dive", spy)
     problem = assoc.build_problem(simulate("bearing-only", seed=4, targets=20, scans=1), 0)
     assoc.assign(problem, "aco", iterations=5, divers=2, beta=0.5, clusters=1)
-    assert len(called) > 4 and {*called[:4]} == {1.0, 2.0, 4.0, 8.0}
+    assert len(called) > 4 and {*called[:4]} == {2.0, 4.0, 8.0, 16.0}
     called.clear()
     assoc.assign(problem, "aco", iterations=5, divers=0, clusters=1)
     assert not called

@@ -34,9 +34,8 @@ PASSES = 1000
 RELAXATION = 1.5
 # columns of a reduced cost of more temperatures than this weigh less than 1e-5
 NEAR = 12.0
-# columns visited between two looks at the clock: about a millisecond in a kernel, and some fifty between kernels
+# columns visited between two looks at the clock: about a millisecond
 _LOOK = 200_000
-_VISITS = 10_000_000
 
 
 class SmoothPoint(NamedTuple):
@@ -89,15 +88,11 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     temperature = START * spread(packing.arrays)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
     hard_pass(packing, duals, point.reduced, 1)
-    size = packing.row_cols.size
     deadline = math.inf if run is None else run.deadline()
     for _ in range(levels):
-        left = passes
-        while left > 0 and (run is None or run.remaining() > 0.0):
-            # under a time limit large problems come back for a look at the clock
-            turn = left if run is None or run.time_limit is None else min(left, max(6, _VISITS // max(size, 1)))
-            visits = smooth_passes(packing.arrays, point, temperature, turn, deadline)
-            left = left - turn if visits == turn * size else 0
+        if run is not None and run.remaining() <= 0.0:
+            break
+        smooth_passes(packing.arrays, point, temperature, passes, deadline)
         temperature *= COOLING
     hard_pass(packing, duals, point.reduced, 2)
     return duals

@@ -186,7 +186,7 @@ class Component(Priced):
             self._diver = Diver(self, self.deadline)
         if trail is None:
             trail = np.ones(self.packing.num_columns)
-        strictness = beta * 2.0 ** (1 + number % 4)
+        strictness = beta * 2.0 ** (2 + number % 4)
         owner = self._diver.dive(trail, strictness, rng, self.weight - self.tolerance, self.deadline)
         insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
         return owner

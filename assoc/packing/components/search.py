@@ -21,6 +21,9 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 
+# covers from the linear program with which a search begins
+_DIVES = 3
+
 
 def search_components(
     make: Make,
@@ -55,6 +58,12 @@ def search_components(
         component.offer_greedy()
         if not component.closed and not share.should_stop():
             component.sharpen(share)
+        for number in range(_DIVES):
+            # the first one whatever the share: what it finds is worth more than all that comes after it
+            if component.dives and (number == 0 or not share.should_stop()):
+                component.settle(component.dive(number, run.rng), run.rng, parameters.clusters)
+    # what no better cover can use is gone before the search begins
+    components = [part for whole in components for part in (split_component(whole) or [whole])]
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
     done = len(components)

@@ -30,9 +30,9 @@ from assoc.packing.simplex.dual import OPTIMAL
 from assoc.packing.simplex.linear_program import LinearProgram
 
 # rows for which a dive pays: fewer are solved exactly, and the inverse of more takes too long
-_LEAST, _MOST = 30, 1500
+_LEAST, _MOST = 30, 900
 # columns of the program for each row, those of least reduced cost
-_CORE = 20
+_CORE = 40
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
 

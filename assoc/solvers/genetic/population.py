@@ -74,18 +74,25 @@ class Breeding:
             # a first population, and not one that is to be without it
             members.append(component.best.copy())
             fitness.append(component.weight)
-        dives = _DIVES
         while len(members) < self.parameters.population:
-            # some from the linear program, then random greedy solutions, strict and loose ones by turns
-            diver = dives > 0 and component.dives
-            dives -= diver
-            owner = component.dive(dives, rng) if diver else component.random_cover(2.0 ** (len(members) % 10), rng)
-            weight = component.settle(owner, rng, self.parameters.clusters if diver else 0)
+            # random greedy solutions, strict and loose ones by turns
+            if component.dives:
+                # beside covers from the linear program the others are there to be different, not to be good
+                owner = self._differing(component, len(members), rng)
+                weight = component.weight_of(owner)
+                component.offer(owner, weight)
+            else:
+                owner = component.random_cover(2.0 ** (len(members) % 10), rng)
+                weight = component.settle(owner, rng, 0)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
             if component.closed or component.late:
                 break
         self.members, self.fitness = np.array(members, dtype=np.int32), np.array(fitness)
+
+    def _differing(self, component: Component, number: int, rng: np.random.Generator) -> NDArray[np.int32]:
+        """Return a cover of a new population: the first ones from the linear program."""
+        return component.dive(number, rng) if number < _DIVES else component.random_cover(2.0 ** (number % 10), rng)
 
     def _parent(self, rng: np.random.Generator) -> int:
         drawn = rng.integers(0, self.fitness.size, size=self.parameters.tournament)

@@ -50,15 +50,14 @@ class TabuSearch:
         self.clock = 1
         self.restarts = 0
         self.dives = 0
-        self.owner: NDArray[np.int32] | None = None
+        self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """Some moves, then exact sub-steps on the best solution they met."""
         p = self.parameters
         forced = -1
         if self.owner is None:
-            known = component.best
-            self.owner = self._afresh(component, rng) if known is None or component.dives else known.copy()
+            self.owner = self._afresh(component, rng)
         elif component.best is not None and component.stalled and component.stalled % p.restart == 0:
             self.restarts += 1
             self.until[:] = 0
