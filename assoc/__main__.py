@@ -8,6 +8,7 @@ _PROGRAMS = {
     "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
     "assoc.solve": "associate its measurements: python -m assoc.solve scene.npz --solver aco",
     "assoc.track": "make tracks of scenes or of radar plots: python -m assoc.track scene.npz -o tracks.csv",
+    "assoc.register": "find biases of sensors: python -m assoc.register scene.npz -o registered.npz",
     "assoc.sweep": "compare parameters: python -m assoc.sweep scene.npz --solver aco --grid alpha=1,2,3 -o study/",
 }
 

@@ -23,6 +23,7 @@ _PURPOSE = {
     "crowd": "many targets at random positions in a box",
     "bearing-only": "bearing sensors only, with many ghosts (false intersections of bearings)",
     "dubins-uav": "unmanned aircraft on Dubins paths around no-fly zones",
+    "rotating-radars": "airliners under three radars that turn at their own paces; each plot has its own time",
     "from-tracks": "recorded trajectories (CSV), measured by simulated radars",
     "rotating-radar": "plots (CSV) of one rotating radar: random traffic, or two close aircraft",
 }

@@ -140,6 +140,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     )
     add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
+    add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
     add("--all", action="store_true", help="also write tentative tracks")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
@@ -205,6 +206,10 @@ def _of_scene(
     for flag in ("rotation", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
+    if parsed["registration"] is not None:
+        if parsed["registration"] != "online":
+            raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
+        settings["registration"] = "online"
     scene = Scene.load(file)
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
@@ -219,6 +224,8 @@ def _of_plots(
     from assoc.tracking import TrackTable
     from assoc.tracking.plot_windows import step_windows
 
+    if parsed["registration"] is not None:
+        raise InvalidInputError("--registration: biases of one radar alone cannot be observed; it is for scenes")
     name = parsed["tracker"] or "mht"
     parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):

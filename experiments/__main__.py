@@ -50,6 +50,7 @@ EXPERIMENTS = (
     Experiment("filters.endurance", "covariances after 100,000 corrections", "docs/filters.md (consistency)"),
     Experiment("filters.tune", "tuning of the fuzzy rules and of the IMM", "assoc/filters/fuzzy/tuned_parameters.json"),
     Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
+    Experiment("trackers.biases", "registration of biased radars", "docs/registration.md (measured)"),
     Experiment("trackers.close_targets", "trackers where association is hard", "docs/tracking.md (close targets)"),
     Experiment("trackers.comparison", "our trackers side by side", "docs/tracking.md (measured)"),
     Experiment(

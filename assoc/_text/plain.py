@@ -11,3 +11,8 @@ def one_line(message: object) -> str:
 def printable(text: str) -> str:
     """Return text with control characters escaped; names of files may contain any."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
+def spreadsheet_text(text: str) -> str:
+    """Return text for a cell of a CSV file that no spreadsheet takes for a formula: names of files may be any text."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text

@@ -7,7 +7,7 @@ import io
 import os
 from collections.abc import Iterator, Sequence
 
-from assoc._text.plain import printable
+from assoc._text.plain import printable, spreadsheet_text
 from assoc.association.scan import ScanAssociation
 
 KEYS = ("file", "scan", "rank")
@@ -92,8 +92,9 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
         solution = scan.solution
         sizes = " ".join(map(str, scan.sizes))
         writer.writerow(
-            [file, scan.scan, *([rank] if ranked else []), scan.time, sizes, len(scan.targets), scan.false_alarms]
-            + [solution.cost, solution.lower_bound, solution.gap, solution.status, solution.runtime]
-            + [solution.stopped_by, solution.iterations, scan.true_tuples, scan.correct_tuples, scan.compile_time]
+            [spreadsheet_text(file), scan.scan, *([rank] if ranked else []), scan.time, sizes]
+            + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap]
+            + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
+            + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
         )
     return text.getvalue()

@@ -9,10 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from assoc._system.interrupts import interruptible
+from assoc._types import Array
+from assoc.costs import positions
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.gating import Gates, make_gates
 from assoc.costs.growth import grow
 from assoc.costs.limits import MAX_TUPLES
+from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
 from assoc.costs.range_rates import SPEED, range_rates
@@ -42,6 +45,9 @@ def build_problem(
     * all of them together pass the gate of their degrees of freedom,
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
 
+    Measurements that have times of their own are compared through the target's predicted motion: it flies straight,
+    with a velocity of which only the usual `speed` is known; the gates are those of a measurement given those before.
+
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
     heights are sought within three half heights of the middle of the scene's region.
@@ -58,7 +64,7 @@ def build_problem(
         The most candidate tuples that may be made.
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
-        against; without a sensor that measures range rate it has no effect.
+        against, and what a target may fly between measurements of different times; without either it has no effect.
 
     Returns
     -------
@@ -84,6 +90,8 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if not one.at_once:
+        return timed_problem(scene, one, probability, int(max_tuples), speed)
     sensors = sensor_arrays(scene)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
@@ -94,6 +102,63 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:
+    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+
+    Parameters
+    ----------
+    scene, scan
+        See `build_problem`.
+    tuples : array_like of int (K, S)
+        1-based measurement of each sensor, 0 where it missed the target.
+    speed : float or sequence of float
+        See `build_problem`.
+
+    Returns
+    -------
+    ndarray (K,)
+
+    Raises
+    ------
+    InvalidInputError
+        The tuples have the wrong shape, an index out of range, or no measurement.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.tuple_costs(scene, one, tuples, speed=speed)
+    return timed_costs(scene, one, tuples, speed)
+
+
+def positions_and_covariances(
+    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
+) -> tuple[Array, Array]:
+    """Positions of tuples at the scan's time, and their covariances.
+
+    Where all measurements are of that time, they are the maximum-likelihood positions (equation 4), and the speed has
+    no effect. What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    deviation half its width. So a position always exists.
+
+    Parameters
+    ----------
+    scene, scan, tuples, speed
+        See `tuple_costs`.
+
+    Returns
+    -------
+    positions (K, 3), covariances (K, 3, 3)
+        Metres; the covariance is the inverse information at the position.
+
+    Raises
+    ------
+    InvalidInputError
+        As `tuple_costs`.
+    """
+    one = scan_of(scene, scan)
+    if one.at_once:
+        return positions.positions_and_covariances(scene, one, tuples)
+    return timed_positions(scene, one, tuples, speed)
 
 
 _known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()

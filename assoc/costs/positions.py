@@ -17,29 +17,8 @@ from assoc.scene.scene import Scene
 from assoc.sensors.codes import POSITION
 
 
-def tuple_costs(
-    scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
-) -> Array:
-    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
-
-    Parameters
-    ----------
-    scene, scan
-        See `build_problem`.
-    tuples : array_like of int (K, S)
-        1-based measurement of each sensor, 0 where it missed the target.
-    speed : float or sequence of float
-        See `build_problem`.
-
-    Returns
-    -------
-    ndarray (K,)
-
-    Raises
-    ------
-    InvalidInputError
-        The tuples have the wrong shape, an index out of range, or no measurement.
-    """
+def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:
+    """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
     sensors = sensor_arrays(scene)
     rows, chi, positions, _ = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
@@ -52,26 +31,7 @@ def tuple_costs(
 
 
 def positions_and_covariances(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array]:
-    """Maximum-likelihood positions of tuples (equation 4) and their covariances.
-
-    What the measurements leave open is taken from the scene's region: mean in its middle, standard
-    deviation half its width. So a position always exists.
-
-    Parameters
-    ----------
-    scene, scan, tuples
-        See `tuple_costs`.
-
-    Returns
-    -------
-    positions (K, 3), covariances (K, 3, 3)
-        Metres; the covariance is the inverse information at the position.
-
-    Raises
-    ------
-    InvalidInputError
-        As `tuple_costs`.
-    """
+    """Maximum-likelihood positions of measurements of one time; see `assoc.costs.positions_and_covariances`."""
     _, _, positions, covariances = _fit_tuples(scene, scan, tuples)
     return positions, covariances
 
@@ -128,8 +88,24 @@ def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, A
     one = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
     measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
-    count, sizes = len(scene.sensors), one.sizes
-    wanted = np.asarray(tuples)
+    sizes = one.sizes
+    wanted = checked_tuples(tuples, sizes)
+    # bearings were sorted: from 1-based index to row
+    row_of = np.empty(len(index) + 1, dtype=np.int32)
+    row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
+    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
+    return (rows, *fit(sensors, measured, rows, False))
+
+
+def checked_tuples(tuples: Array, sizes: Array) -> Array:
+    """Tuples (K, S) of 1-based measurements of a scan with so many of each sensor (S,), 0 where one missed.
+
+    Raises
+    ------
+    InvalidInputError
+        The shape is another, an index is out of range, or a tuple has no measurement.
+    """
+    count, wanted = len(sizes), np.asarray(tuples)
     if wanted.size == 0:
         wanted = np.zeros((0, count), dtype=np.int64)
     if wanted.ndim != 2 or wanted.shape[1] != count or wanted.dtype.kind not in "iu":
@@ -139,13 +115,7 @@ def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, A
     wrong = (wanted < 0) | (wanted > sizes)
     if wrong.any():
         k, s = np.argwhere(wrong)[0]
-        raise InvalidInputError(
-            f"tuples: row {k} has index {wanted[k, s]} for sensor {s}, expected 0 to {sizes[s]}"
-        )
+        raise InvalidInputError(f"tuples: row {k} has index {wanted[k, s]} for sensor {s}, expected 0 to {sizes[s]}")
     if len(wanted) and not wanted.any(axis=1).all():
         raise InvalidInputError(f"tuples: row {int(np.argmin(wanted.any(axis=1)))} has no measurement")
-    # bearings were sorted: from 1-based index to row
-    row_of = np.empty(len(index) + 1, dtype=np.int32)
-    row_of[measured.start[measured.owner] + index - 1] = np.arange(len(index), dtype=np.int32)
-    rows = np.where(wanted > 0, row_of[np.maximum(measured.start[:-1] + wanted - 1, 0)], -1).astype(np.int32)
-    return (rows, *fit(sensors, measured, rows, False))
+    return wanted

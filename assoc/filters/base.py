@@ -127,6 +127,21 @@ class Filter(ABC, Generic[S]):
     def predict(self, state: S, dt: float) -> S:
         """Return the state dt seconds later."""
 
+    def predict_each(self, state: S, dt: Array) -> S:
+        """Return each state its own dt seconds later; `assoc.filters.batches.predict_each` is the door to it.
+
+        Parameters
+        ----------
+        state
+            B targets, at least one.
+        dt : array (B,)
+            Seconds, 0 or more, not all the same.
+        """
+        # batches knows of filters, and joins states of any kind
+        from assoc.filters.batches import predict_by_step
+
+        return predict_by_step(self, state, dt)
+
     @abstractmethod
     def update(self, state: S, measured: Array, sensor: Measurement) -> Update[S]:
         """Correct each target with a measurement of its own.

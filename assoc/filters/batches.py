@@ -90,6 +90,11 @@ def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
         raise InvalidInputError(f"dt must be a number >= 0, got {low!r}")
     if low == high:
         return filter.predict(state, low) if low > 0 else state
+    return filter.predict_each(state, dt)
+
+
+def predict_by_step(filter: Filter[Any], state: Any, dt: Array) -> Any:
+    """`predict_each` by one prediction for each time step that occurs, for any filter."""
     steps, which = np.unique(dt, return_inverse=True)
     order = np.argsort(which, kind="stable")
     bounds = np.searchsorted(which[order], np.arange(len(steps) + 1))

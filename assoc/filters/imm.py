@@ -60,6 +60,8 @@ class Mixture:
         return gaussian(np.ascontiguousarray(self.means[:, j]), np.ascontiguousarray(self.covariances[:, j]))
 
 
+# eigenvectors of the rates with a condition number below this give transitions to ten digits
+_WELL_APART = 1e4
 # time steps whose transitions are remembered
 _MOST_STEPS = 64
 
@@ -165,6 +167,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         self.interval = positive(interval, "interval")
         self.rates = transition_rates(self.transition, self.interval)
         self._known = {self.interval: self.transition}
+        self._eigen: tuple[Array, Array, Array | None] | None = None
         if weights is None:
             values, vectors = np.linalg.eig(self.transition.T)
             stationary = np.abs(vectors[:, np.argmax(values.real)].real)
@@ -193,9 +196,31 @@ class InteractingMultipleModel(Filter[Mixture]):
             known = self._known[dt] = expm(self.rates * dt)
         return known
 
+    def _transitions(self, dt: Array) -> Array:
+        """`transition_over` of each of k time steps, (k, m, m)."""
+        if self._eigen is None:
+            values, vectors = np.linalg.eig(self.rates)
+            self._eigen = values, vectors, np.linalg.inv(vectors) if np.linalg.cond(vectors) < _WELL_APART else None
+        values, vectors, inverse = self._eigen
+        if inverse is None:
+            return np.stack([self.transition_over(step) for step in dt.tolist()])
+        return np.asarray(np.real((vectors * np.exp(values * dt[:, None])[:, None]) @ inverse))
+
     def predict(self, state: Mixture, dt: float) -> Mixture:
         """Mix the models and predict each; see `Filter.predict`."""
         return self._predict(state, dt, False)[0]
+
+    def predict_each(self, state: Mixture, dt: Array) -> Mixture:
+        """Return each state its own dt seconds later; see `Filter.predict_each`."""
+        transition = self._transitions(dt)
+        weights = (state.weights[:, None] @ transition)[:, 0]
+        means, P = _mixed(state, weights, transition)
+        new_means, new_P = np.empty_like(means), np.empty_like(P)
+        for j, one in enumerate(self.filters):
+            mixed = gaussian(np.ascontiguousarray(means[:, j]), np.ascontiguousarray(P[:, j]))
+            moved = one.predict_each(mixed, dt)
+            new_means[:, j], new_P[:, j] = moved.mean, moved.covariance
+        return Mixture(new_means, new_P, weights)
 
     def move(self, state: Mixture, dt: float) -> tuple[Mixture, Array]:
         """`predict`, and the covariance of the mixtures before and after it, (B, n, n)."""
@@ -204,15 +229,8 @@ class InteractingMultipleModel(Filter[Mixture]):
     def _predict(self, state: Mixture, dt: float, crossing: bool) -> tuple[Mixture, Array]:
         transition = self.transition_over(dt)
         weights = state.weights @ transition
-        # share of model i in what model j starts from
-        share = state.weights[:, :, None] * transition / np.maximum(weights, 1e-300)[:, None, :]
-        means = share.transpose(0, 2, 1) @ state.means
-        away = state.means[:, :, None] - means[:, None]
-        # sum over i of share_ij (P_i + away away')
-        B, m, n = means.shape
-        P = (share.transpose(0, 2, 1) @ state.covariances.reshape(B, m, n * n)).reshape(B, m, n, n)
-        weighted = (share[..., None] * away).transpose(0, 2, 3, 1)
-        P += weighted @ away.transpose(0, 2, 1, 3)
+        means, P = _mixed(state, weights, transition)
+        B, _, n = means.shape
         new_means, new_P = np.empty_like(means), np.empty_like(P)
         cross = np.zeros((B, n, n))
         whole = state.mean
@@ -290,3 +308,17 @@ class InteractingMultipleModel(Filter[Mixture]):
             joint = each + np.log(state.weights)[:, :, None]
         result: Array = np.logaddexp.reduce(joint, axis=1)
         return result
+
+
+def _mixed(state: Mixture, weights: Array, transition: Array) -> tuple[Array, Array]:
+    """Means and covariances that each model starts from, given the new weights and transitions (m, m) or (B, m, m)."""
+    # share of model i in what model j starts from
+    share = state.weights[:, :, None] * transition / np.maximum(weights, 1e-300)[:, None, :]
+    means = share.transpose(0, 2, 1) @ state.means
+    away = state.means[:, :, None] - means[:, None]
+    # sum over i of share_ij (P_i + away away')
+    B, m, n = means.shape
+    P = (share.transpose(0, 2, 1) @ state.covariances.reshape(B, m, n * n)).reshape(B, m, n, n)
+    weighted = (share[..., None] * away).transpose(0, 2, 3, 1)
+    P += weighted @ away.transpose(0, 2, 1, 3)
+    return means, P

@@ -70,6 +70,20 @@ class GaussianFilter(Filter[Gaussian]):
         predict_kernel(before, state.covariance, F, Q, moved, mean, P)
         return gaussian(mean, P)
 
+    def predict_each(self, state: Gaussian, dt: Array) -> Gaussian:
+        """Return each state its own dt seconds later; see `Filter.predict_each`."""
+        linear = self._linear
+        if linear is None:
+            return super().predict_each(state, dt)
+        steps, which = np.unique(dt, return_inverse=True)
+        F, Q = linear.matrices_of_each(steps)
+        # noise that is drawn for each step, however short, is none where there is no step
+        Q[steps == 0.0] = 0.0
+        F, Q = F[which], Q[which]
+        mean, P = _empty(state.mean.shape), _empty(state.covariance.shape)
+        predict_kernel(state.mean, state.covariance, F, Q, _NOTHING2, mean, P)
+        return gaussian(mean, P)
+
     def step(self, state: Gaussian, dt: float, measured: Array, sensor: Measurement) -> Update[Gaussian]:
         """Predict and correct in one call; see `Filter.step`."""
         known = self._plan

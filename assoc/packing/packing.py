@@ -9,7 +9,7 @@ smallest dimension have no slack.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,6 +52,8 @@ class Packing:
         Each row's place in what this packing was made from.
     granularity : float
         1.0 where all weights are whole numbers, so that solutions differ by at least 1; else 0.0.
+    arrays : PackingArrays
+        The packing as kernels take it.
     """
 
     cols: NDArray[np.int32]
@@ -64,13 +66,13 @@ class Packing:
     origin: NDArray[np.int32]
     row_origin: NDArray[np.int32]
     granularity: float = 0.0
+    arrays: PackingArrays = field(init=False, repr=False, compare=False)
 
-    @property
-    def arrays(self) -> PackingArrays:
-        """The packing as kernels take it."""
-        return PackingArrays(
+    def __post_init__(self) -> None:
+        arrays = PackingArrays(
             self.cols, self.weights, self.slack, self.col_start, self.row_start, self.row_ptr, self.row_cols
         )
+        object.__setattr__(self, "arrays", arrays)
 
     @property
     def num_columns(self) -> int:

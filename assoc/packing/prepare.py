@@ -60,7 +60,7 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     if problem._prepared is not None:
         return problem._prepared
     sizes = problem.sizes.astype(np.int64)
-    offsets = np.cumsum(sizes) - sizes
+    offsets = sizes.cumsum() - sizes
     arrays: Any
     if problem.dummy:
         arrays, whole, single, single_cost = _prepare_with_dummies(

@@ -82,7 +82,7 @@ class Run:
 
     def runtime(self) -> float:
         """Seconds of the search alone: what results report."""
-        return self.elapsed() - self.compile_time()
+        return time.perf_counter() - self.started - self.compile_time()
 
     def remaining(self) -> float:
         """Seconds left; infinite without a time limit."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from assoc.plotting.metric import plot_metric
     from assoc.plotting.overview import plot_overview
     from assoc.plotting.pheromone import plot_pheromone
+    from assoc.plotting.residuals import plot_residuals
     from assoc.plotting.scene import plot_scene
     from assoc.plotting.solution import plot_solution
     from assoc.plotting.tracks import plot_tracks
@@ -28,6 +29,7 @@ __all__ = [
     "plot_metric",
     "plot_overview",
     "plot_pheromone",
+    "plot_residuals",
     "plot_scene",
     "plot_solution",
     "plot_tracks",
@@ -43,6 +45,7 @@ __getattr__, __dir__ = lazy_names(
         "plot_metric": "metric",
         "plot_overview": "overview",
         "plot_pheromone": "pheromone",
+        "plot_residuals": "residuals",
         "plot_scene": "scene",
         "plot_solution": "solution",
         "plot_tracks": "tracks",

@@ -132,7 +132,7 @@ class ComponentRanking:
 
 @njit
 def _sorted_store(store: Store) -> Any:
-    order = np.argsort(-store.key[: store.num[0]])
+    order = np.argsort(-store.key[: store.num[0]], kind="mergesort")
     weights = np.empty(order.size)
     columns = np.empty((order.size, store.columns.shape[1]), np.int32)
     for i in range(order.size):

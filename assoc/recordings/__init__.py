@@ -8,6 +8,7 @@ from assoc.recordings.radar import radar_of
 from assoc.recordings.reading import read_plots
 from assoc.recordings.recording import UNDECODED, Recording
 from assoc.recordings.rotation import estimate_rotation
+from assoc.recordings.several import scene_of_radars
 from assoc.recordings.windows import Window, clustering_time_window
 from assoc.recordings.writing import write_plots, write_tracks
 
@@ -24,6 +25,7 @@ __all__ = [
     "irregular_groups",
     "radar_of",
     "read_plots",
+    "scene_of_radars",
     "write_plots",
     "write_tracks",
 ]

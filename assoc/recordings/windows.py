@@ -124,7 +124,7 @@ def _by_antenna(recording: Recording, turn: float) -> Array:
     last = -1
     for rows in parts:
         turns = recording.times[rows] / turn - bearings[rows]
-        phase = _running_phase(recording.times[rows], turns, turn)
+        phase = running_phase(recording.times[rows], turns, turn)
         own = np.round(turns - phase).astype(np.int64)
         own += last + 1 - own.min()
         numbers[rows] = own
@@ -132,7 +132,7 @@ def _by_antenna(recording: Recording, turn: float) -> Array:
     return numbers
 
 
-def _running_phase(times: Array, turns: Array, turn: float) -> Array:
+def running_phase(times: Array, turns: Array, turn: float) -> Array:
     """Fraction of a turn by which the antenna is ahead (n,), followed slowly, unwrapped.
 
     The estimated rotation time is off by a little, and motors drift: the mean over the last turns keeps count.

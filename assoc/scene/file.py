@@ -14,7 +14,9 @@ from assoc.errors import InvalidInputError
 from assoc.sensors import KINDS
 
 FORMAT = "assoc.scene"
-VERSION = 1
+VERSION = 2
+# what only files of version 2 have; a scene without them is written as version 1, byte for byte as before
+_OWN_TIMES = ("measurement_times", "sectors")
 
 _FIELDS = {
     "name": Field("str", 0, required=False),
@@ -31,6 +33,8 @@ _FIELDS = {
     "measurement_values": Field("float", 1),
     "measurement_offsets": Field("int", 2),
     "measurement_sources": Field("int", 1, required=False),
+    "measurement_times": Field("float", 1, required=False),
+    "sectors": Field("float", 3, required=False),
     "truth_offsets": Field("int", 1, required=False),
     "truth_ids": Field("int", 1, required=False),
     "truth_positions": Field("float", 2, required=False),
@@ -39,7 +43,8 @@ _FIELDS = {
 
 def save_parts(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
     """Write the attributes of an `assoc.scene.Scene`; "truth" holds those of its `assoc.scene.Truth`, or None."""
-    save_npz(path, FORMAT, VERSION, _to_arrays(parts))
+    arrays = _to_arrays(parts)
+    save_npz(path, FORMAT, VERSION if any(name in arrays for name in _OWN_TIMES) else 1, arrays)
 
 
 def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -72,15 +77,29 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
             [np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1
         ),
     }
+    if parts["sectors"] is not None:
+        arrays["sectors"] = parts["sectors"]
+    if parts["measurement_times"] is not None:
+        arrays["measurement_times"] = _flat(parts["measurement_times"], len(sensors))
     truth = parts["truth"]
     if truth is not None:
         arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth["target_ids"])], dtype=np.int64)
         arrays["truth_ids"] = np.concatenate(truth["target_ids"])
         arrays["truth_positions"] = np.concatenate(truth["positions"])
         if truth["sources"] is not None:
-            flat = [scan[s] for s in range(len(sensors)) for scan in truth["sources"]]
-            arrays["measurement_sources"] = np.concatenate(flat)
+            arrays["measurement_sources"] = _flat(truth["sources"], len(sensors))
     return arrays
+
+
+def _flat(scans: Any, sensors: int) -> Array:
+    """One number for each measurement, sensor after sensor."""
+    return np.concatenate([scan[s] for s in range(sensors) for scan in scans])
+
+
+def _split(flat: Array, rows: Array, scans: int) -> list[list[Array]]:
+    """Undo `_flat`, given the offsets (S, K + 1) of the measurements."""
+    blocks = np.split(flat, np.cumsum(rows[:, -1])[:-1])
+    return [[block[row[k] : row[k + 1]] for block, row in zip(blocks, rows, strict=True)] for k in range(scans)]
 
 
 def _check_shape(arrays: dict[str, Array], name: str, shape: tuple[int, ...]) -> None:
@@ -132,6 +151,10 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
             raise InvalidInputError(f"sensor {s}: {error}") from error
         square, row = square + dim * dim, row + dim
     measurements, rows = _split_measurements(arrays, dims, scans)
+    times = None
+    if "measurement_times" in arrays:
+        _check_shape(arrays, "measurement_times", (sum(int(n) for n in rows[:, -1]),))
+        times = _split(arrays["measurement_times"], rows, scans)
     return {
         "sensors": sensors,
         "times": arrays["times"],
@@ -139,6 +162,8 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         "region": arrays.get("region"),
         "truth": _read_truth(arrays, scans, rows),
         "name": str(arrays["name"][()]) if "name" in arrays else "",
+        "measurement_times": times,
+        "sectors": arrays.get("sectors"),
     }
 
 
@@ -176,13 +201,8 @@ def _read_truth(arrays: dict[str, Array], scans: int, rows: Array) -> dict[str, 
     _check_shape(arrays, "truth_positions", (int(bounds[-1]), 3))
     sources = None
     if "measurement_sources" in arrays:
-        totals = [int(n) for n in rows[:, -1]]
-        _check_shape(arrays, "measurement_sources", (sum(totals),))
-        blocks = np.split(arrays["measurement_sources"], np.cumsum(totals)[:-1])
-        sources = [
-            [block[row[k] : row[k + 1]] for block, row in zip(blocks, rows, strict=True)]
-            for k in range(scans)
-        ]
+        _check_shape(arrays, "measurement_sources", (sum(int(n) for n in rows[:, -1]),))
+        sources = _split(arrays["measurement_sources"], rows, scans)
     return {
         "target_ids": [arrays["truth_ids"][bounds[k] : bounds[k + 1]] for k in range(scans)],
         "positions": [arrays["truth_positions"][bounds[k] : bounds[k + 1]] for k in range(scans)],

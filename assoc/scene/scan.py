@@ -12,7 +12,7 @@ from assoc._types import Array
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scan:
-    """All measurements of one instant.
+    """All measurements of one instant, or those up to it that have times of their own.
 
     Attributes
     ----------
@@ -22,6 +22,10 @@ class Scan:
     sources : tuple over sensors of int arrays (n_s,), or None
         Target id of each measurement, -1 for a false alarm; None where it is not known.
     truth_ids, truth_positions : arrays (T,) and (T, 3), or None
+    times : tuple over sensors of arrays (n_s,), or None
+        When each measurement was made, seconds; None: all at `time`.
+    sectors : array (S, 2), or None
+        Azimuths from which to which each sensor looked, see `assoc.Scene`; None: all looked everywhere.
     """
 
     index: int
@@ -30,11 +34,24 @@ class Scan:
     sources: tuple[Array, ...] | None = None
     truth_ids: Array | None = None
     truth_positions: Array | None = None
+    times: tuple[Array, ...] | None = None
+    sectors: Array | None = None
 
     @property
     def sizes(self) -> Array:
         """Measurements per sensor, int32 (S,)."""
         return np.array([len(z) for z in self.measurements], dtype=np.int32)
+
+    def own_times(self) -> tuple[Array, ...]:
+        """When each measurement was made, sequence over sensors of arrays (n_s,), seconds."""
+        if self.times is not None:
+            return self.times
+        return tuple(np.full(len(z), self.time) for z in self.measurements)
+
+    @property
+    def at_once(self) -> bool:
+        """Whether all sensors looked everywhere, at the scan's time."""
+        return self.times is None and self.sectors is None
 
     def true_tuples(self) -> NDArray[np.int32] | None:
         """The tuples of the targets that at least two sensors detected.

@@ -12,6 +12,7 @@ from assoc._text.html import escape, table
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.file import load_parts, save_parts
+from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
@@ -39,6 +40,13 @@ class Scene:
         fields of view, from the lowest sensor to 20 km above it.
     truth : Truth, optional
     name : str, optional
+    measurement_times : sequence over scans of sequences over sensors of arrays (n,), optional
+        When each measurement was made, seconds, not after its scan's time; left out, all are of their scan's time.
+        One from before the scan before is late: it arrived with this scan.
+    sectors : array_like (K, S, 2), optional
+        From which to which azimuth (radians, from +x towards +y) each sensor looked in each scan; the second is 0
+        to 2 pi above the first, and a sector without width means that the sensor did not look. Left out, all
+        sensors look everywhere in every scan. What was not looked at is not missed.
 
     Raises
     ------
@@ -52,6 +60,8 @@ class Scene:
     region: Array = None  # type: ignore[assignment]  # always an array once made
     truth: Truth | None = None
     name: str = ""
+    measurement_times: Sequence[Sequence[Array]] | None = None
+    sectors: Array | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -75,8 +85,25 @@ class Scene:
         put(self, "times", times)
         put(self, "measurements", self._checked_measurements())
         put(self, "region", self._checked_region())
+        if self.measurement_times is not None:
+            put(self, "measurement_times", self._checked_measurement_times(self.measurement_times))
+        if self.sectors is not None:
+            shape = (self.num_scans, len(self.sensors), 2)
+            given = finite_array(self.sectors, "sectors", shape)
+            for k, one in enumerate(given):
+                checked_sectors(one, len(self.sensors), f"sectors of scan {k}")
+            put(self, "sectors", given)
         if self.truth is not None:
             self._check_truth(self.truth)
+
+    def _checked_measurement_times(self, given: Sequence[Sequence[Array]]) -> tuple[tuple[Array, ...], ...]:
+        if len(given) != self.num_scans:
+            raise InvalidInputError(f"measurement_times: {len(given)} scans, but times has {self.num_scans}")
+        rows = zip(given, self.measurements, self.times.tolist(), strict=True)
+        return tuple(
+            checked_times(times, scan, end, f"measurement_times of scan {k}")
+            for k, (times, scan, end) in enumerate(rows)
+        )
 
     def _checked_measurements(self) -> tuple[tuple[Array, ...], ...]:
         if len(self.measurements) != self.num_scans:
@@ -151,6 +178,8 @@ class Scene:
             sources=None if truth is None or truth.sources is None else tuple(truth.sources[k]),
             truth_ids=None if truth is None else truth.target_ids[k],
             truth_positions=None if truth is None else truth.positions[k],
+            times=None if self.measurement_times is None else tuple(self.measurement_times[k]),
+            sectors=None if self.sectors is None else self.sectors[k],
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import fields
+from functools import cache
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -55,9 +56,14 @@ def certify(
         stopped_by=run.stopped_by or "converged",
         duals=_duals_by_sensor(problem, prepared, duals) if duals is not None else (),
         trace=tuple(run.trace),
-        parameters={f.name: getattr(parameters, f.name) for f in fields(parameters)},
+        parameters={name: getattr(parameters, name) for name in _field_names(parameters.__class__)},
         compile_time=run.compile_time(),
     )
+
+
+@cache
+def _field_names(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 @njit
@@ -113,7 +119,9 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
         for r in range(start[s], start[s + 1]):
             if found[r] >= 0 and exact:
                 indices[count] = found[r]
-                chosen[count] = tuples[found[r]]
+                # number by number: assigning a row would compile the text for shapes that differ
+                for k in range(num_sensors):
+                    chosen[count, k] = tuples[found[r], k]
                 prices[count] = costs[found[r]]
                 count += 1
     return exact, indices, chosen, prices, magnitude

@@ -7,9 +7,9 @@ imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the funct
 from __future__ import annotations
 
 import difflib
-import sys
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -98,14 +98,12 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         raise InvalidInputError(f"parameters of solver {name!r}: {error}") from None
 
 
+@cache
 def _module(name: str, part: str) -> ModuleType:
     if name not in _NAMES:
         raise InvalidInputError(f"solver: unknown name {name!r}; {_near(name, names())}")
-    path = f"assoc.solvers.{name}.{part}"
-    if path in sys.modules:
-        return import_module(path)  # which waits where another thread is still importing it
     with loading():
-        return import_module(path)
+        return import_module(f"assoc.solvers.{name}.{part}")
 
 
 def _near(name: object, known: list[str]) -> str:

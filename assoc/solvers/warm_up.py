@@ -30,8 +30,9 @@ _TUPLES = 2000
 _LIMITS = {"patience": 12, "nodes": 60}
 
 
-# what a second process compiles while this one compiles the kernels of the other solvers
-_HEURISTICS = ("aco", "genetic", "tabu")
+# what a second process compiles while this one compiles the kernels of the other solvers; each loads what the other has
+# compiled before
+_HEURISTICS = ("tabu", "genetic", "aco")
 
 
 def warm_up(solvers: Iterable[str] | None = None) -> float:
@@ -59,20 +60,19 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:
         registry.parameters(name)
-    # small problems first: their kernels are shared between two processes without compiling any twice
     beside = [name for name in names if name in _HEURISTICS]
     here = [name for name in names if name not in beside]
     with compiled_only(), _Line() as say:
         helper = _begin_beside(beside) if beside and here else None
         for name in here:
             say(name)
-            _solve_all(name, _easy_problems())
+            prepare([name])
         if helper is not None:
             say(", ".join(beside))
             helper.wait()
-        for name in names:
+        for name in beside:
             say(name)
-            _solve_all(name, _problems())
+            prepare([name])
         # only large problems sort so, and their time limits are the hardest to keep
         ascending(np.zeros(10_000))
     return time.perf_counter() - started
@@ -98,7 +98,7 @@ class _Line:
 
 def _begin_beside(names: list[str]) -> subprocess.Popen[bytes] | None:
     """Start a process that compiles the kernels of these solvers; None where none can be started."""
-    code = f"from assoc.solvers.warm_up import prepare_easy; prepare_easy({names!r})"
+    code = f"from assoc.solvers.warm_up import prepare; prepare({names!r})"
     command = [sys.executable, "-c", code]
     quiet: Any = subprocess.DEVNULL
     try:
@@ -107,11 +107,11 @@ def _begin_beside(names: list[str]) -> subprocess.Popen[bytes] | None:
         return None
 
 
-def prepare_easy(names: Iterable[str]) -> None:
-    """Compile what easy problems need of some solvers; for the second process of `warm_up`."""
+def prepare(names: Iterable[str]) -> None:
+    """Compile what some solvers need."""
     with compiled_only():
         for name in names:
-            _solve_all(name, _easy_problems())
+            _solve_all(name, _problems())
 
 
 def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
@@ -126,19 +126,18 @@ def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
             problem._prepared = None
 
 
-def _easy_problems() -> list[AssignmentProblem]:
-    """Problems too small for `exact` to call a metaheuristic, but not closed by their bound."""
-    rng = np.random.default_rng(2)
-    return [_random_problem(rng, 8, 150)]
-
-
 def _problems() -> list[AssignmentProblem]:
-    """Hard problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one."""
+    """Problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one.
+
+    The first is too small for `exact` to call a metaheuristic, but not closed by its bound: by the time that it needs
+    their kernels, the other process has compiled them.
+    """
+    small = _random_problem(np.random.default_rng(2), 8, 150)
     rng = np.random.default_rng(1)
     dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
     planar = AssignmentProblem.from_dense(rng.normal(size=(5, 6)))
-    return [dense, axial, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
+    return [small, axial, dense, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
 
 
 def _random_problem(rng: np.random.Generator, rows: int, count: int) -> AssignmentProblem:

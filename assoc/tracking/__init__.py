@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from assoc.tracking.initiation import Initiation
+from assoc.tracking.late_plots import LatePlots
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
@@ -30,6 +31,7 @@ __all__ = [
     "Decision",
     "HypothesisOrientedMHT",
     "Initiation",
+    "LatePlots",
     "LifeCycle",
     "MultiSensorTracker",
     "NearestNeighbourTracker",

@@ -23,6 +23,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import arrays_of
 from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import gaussian
+from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 from assoc.tracking.initiation import Initiation
@@ -175,9 +176,11 @@ class Checkpoint(ABC):
     life_cycle: LifeCycle
     initiation: Initiation
     gate_probability: float
+    registration: OnlineRegistration | None
     _place: Scene
     _time: float | None
     _pace: float
+    _turns: Array
     _scan: int
     _next_id: int
     _batch: TrackBatch
@@ -223,6 +226,7 @@ class Checkpoint(ABC):
             "life_cycle": repr(self.life_cycle),
             "initiation": repr(self.initiation),
             "gate_probability": repr(self.gate_probability),
+            **({} if self.registration is None else {"registration": repr(self.registration.parameters)}),
         }
 
     def _arrays(self) -> dict[str, Array]:
@@ -232,18 +236,25 @@ class Checkpoint(ABC):
             "time": np.array(math.nan if self._time is None else self._time),
             "scan": np.array(self._scan),
             "pace": np.array(self._pace),
+            "turns": self._turns,
             "next_id": np.array(self._next_id),
             "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
             **self._batch.arrays(PREFIX),
+            **({} if self.registration is None else self.registration.arrays()),
         }
 
     def _check(self, arrays: dict[str, Array]) -> None:
         """Refuse arrays that no tracker of these settings has saved."""
         check_progress(arrays, len(arrays[f"{PREFIX}track_id"]))
+        turns = arrays["turns"]
+        good = turns.shape == self._turns.shape and ((turns >= 0) & (turns <= 1 + 1e-6)).all()
+        require_field(good, "turns", f"{len(self.sensors)} shares of a turn")
         check_tracks(arrays, self.filter, max(sensor.dim for sensor in self.sensors))
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
             rng_state(rng, str(arrays["filter_rng"]))
+        if self.registration is not None:
+            self.registration.restored(arrays)
 
     def _take(self, arrays: dict[str, Array]) -> None:
         """Take over checked arrays."""
@@ -251,7 +262,10 @@ class Checkpoint(ABC):
         self._time = None if math.isnan(when) else when
         self._scan, self._next_id = int(arrays["scan"]), int(arrays["next_id"])
         self._pace = float(arrays["pace"])
+        self._turns = arrays["turns"]
         rng = getattr(self.filter, "rng", None)
         if rng is not None and str(arrays["filter_rng"]):
             rng.bit_generator.state = rng_state(rng, str(arrays["filter_rng"]))
         self._batch = self._batch.restored(arrays, PREFIX)
+        if self.registration is not None:
+            self.registration = self.registration.restored(arrays)

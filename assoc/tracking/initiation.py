@@ -50,13 +50,15 @@ class Initiation:
         for one in speeds:
             positive(one, "speed")
 
-    def start(self, filter: Filter[Any], positions: Array, covariances: Array) -> Any:
+    def start(self, filter: Filter[Any], positions: Array, covariances: Array, lag: Array | None = None) -> Any:
         """States of new tracks, of the filter's own kind.
 
         Parameters
         ----------
         filter : Filter
         positions, covariances : arrays (K, 3), (K, 3, 3)
+        lag : array (K,), optional
+            The states are those so many seconds before the targets were at these positions.
         """
         motion = filter.motion
         axes = len(motion.position)
@@ -67,6 +69,12 @@ class Initiation:
         covariance = np.empty((len(positions), *prior.shape))
         covariance[:] = prior
         covariance[:, place[:, None], place] = covariances[:, :axes, :axes]
+        if lag is not None and lag.any():
+            velocity = velocity_components(motion)
+            moving = place[: len(velocity)]
+            variances = prior[velocity, velocity]
+            covariance[:, moving, moving] += lag[:, None] ** 2 * variances
+            covariance[:, moving, velocity] = covariance[:, velocity, moving] = -lag[:, None] * variances
         return filter.start(gaussian(mean, covariance))
 
 

@@ -83,10 +83,15 @@ class Step(Decision):
         hypothesis trackers the scan that left the window, if any.
     ended : int64 array
         Confirmed tracks deleted in this step.
+    late, refused : int
+        Measurements that were older than the last scan and taken in, and those too old for that; see
+        `assoc.tracking.LatePlots`.
     """
 
     final: tuple[Decision, ...] = ()
     ended: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    late: int = 0
+    refused: int = 0
 
 
 def decision(scan: int, time: float, assigned: list[Array], confirmed_ids: Array) -> Decision:

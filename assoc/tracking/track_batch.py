@@ -141,8 +141,16 @@ class TrackBatch:
             np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
         return TrackBatch(states, numbers, self.counts)
 
-    def counted(self, detected: Array) -> TrackBatch:
-        """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor."""
+    def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
+        """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor.
+
+        With `looked` (bool (T,)) the scan counts only for tracks that any sensor looked at.
+        """
+        if looked is not None and not looked.all():
+            rows = np.flatnonzero(looked | detected)
+            counts = self.counts.copy()
+            counts[rows] = self[rows].counted(detected[rows]).counts
+            return TrackBatch(self.states, self.numbers, counts)
         counts = self.counts.copy()
         counts[:, BITS] = ((counts[:, BITS] << np.int64(1)) & MASK) | detected
         counts[:, MISSED] += 1

@@ -109,7 +109,7 @@ def track_scene(
     decisions: list[Decision] = []
     for k in range(scene.num_scans) if scans is None else scans:
         scan = scene.scan(k)
-        step = tracker.step(scan.time, scan.measurements)
+        step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
         decisions += step.final
         table.add(
             (track for track in tracker.tracks if track.confirmed or not confirmed), tracker.filter.motion.position

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -14,16 +14,18 @@ from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.positions import positions_and_covariances, single_positions
+from assoc.costs.tracks.own_times import Places, TimedScan
 from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.filters.batches import predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
+from assoc.registration.online import OnlineRegistration
+from assoc.scene.own_times import FULL_TURN, checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
-from assoc.sensors.base import finite_array
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
@@ -39,6 +41,35 @@ from assoc.tracking.track_batch import TrackBatch, empty_batch
 # and nodes at the least; counted, so that the answer does not depend on the machine
 _VISITS, _LEAST_NODES = 500_000, 10
 _FORGETTING = 0.05
+# of a turn in a scan; where no sensor looks any more, tracks wait
+_LEAST_TURN = 1e-3
+
+
+class Memory(NamedTuple):
+    """A tracker as it was once. Steps replace arrays and do not write to them, so that nothing need be copied."""
+
+    values: dict[str, Any]
+    rng: Any
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last step before, seconds."""
+        when: float | None = self.values["_time"]
+        return when
+
+    @property
+    def next_id(self) -> int:
+        """Tracks that began later have this id or a larger one."""
+        return int(self.values["_next_id"])
+
+    @property
+    def track_ids(self) -> set[int]:
+        """Ids of the tracks that lived."""
+        return set(self.values["_batch"].track_id.tolist())
+
+
+def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
 class Tracker(Checkpoint):
@@ -67,6 +98,9 @@ class Tracker(Checkpoint):
         Share of true measurements that a gate lets through, above 0 and below 1.
     max_tuples : int
         The most candidate tuples in a scan.
+    registration : "online" or OnlineRegistration, optional
+        Estimates the sensors' biases from the measurements that come in and corrects these by them; all measurements of
+        a scan must then be of one instant. Without it measurements are taken as they are.
 
     Raises
     ------
@@ -90,6 +124,7 @@ class Tracker(Checkpoint):
         initiation: Initiation | None = None,
         gate_probability: float = GATE_PROBABILITY,
         max_tuples: int = MAX_TUPLES,
+        registration: str | OnlineRegistration | None = None,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         self._place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
@@ -113,12 +148,19 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {gate_probability!r}")
         self.gate_probability = float(gate_probability)
         self.max_tuples = max_tuples
+        if registration == "online":
+            registration = OnlineRegistration(self.sensors, self._place.region)
+        if not (registration is None or isinstance(registration, OnlineRegistration)):
+            raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
+        self.registration = registration
         self.terms = score_terms(self.sensors, self.initiation.birth_rate)
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
         self._widest = self.initiation.widest * float(np.linalg.norm(np.diff(self._place.region, axis=1)))
         self._time: float | None = None
         self._pace = 0.0
+        self._turns = np.ones(len(self.sensors))
+        """Turns that each sensor does in a scan, on average."""
         self._scan = 0
         self._next_id = 1
         self._batch = empty_batch(self.filter)
@@ -181,7 +223,13 @@ class Tracker(Checkpoint):
     def _adopt(self, batch: TrackBatch) -> None:
         self._batch = batch
 
-    def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
+    def step(
+        self,
+        time: float,
+        measurements: Sequence[Array],
+        times: Sequence[Array] | None = None,
+        sectors: Array | None = None,
+    ) -> Step:
         """Take one scan in.
 
         Parameters
@@ -191,8 +239,12 @@ class Tracker(Checkpoint):
         measurements : sequence over sensors of arrays (n_s, d_s)
             n_s may be 0.
         times : sequence over sensors of arrays (n_s,), optional
-            Each measurement's own time, after the last scan's and not after `time`; for trackers that take
-            measurements one sensor after the other.
+            Each measurement's own time, not before the last scan's and not after `time`; left out, all are of `time`.
+            What is older belongs into `assoc.tracking.LatePlots`.
+        sectors : array_like (S, 2), optional
+            From which to which azimuth each sensor looked since the last scan, see `assoc.Scene`: what a sensor did
+            not look at it has not missed. No sensor may have looked at anything twice. Left out, all looked
+            everywhere.
 
         Returns
         -------
@@ -207,40 +259,51 @@ class Tracker(Checkpoint):
         when = self._checked_time(time)
         checked = checked_measurements(measurements, self.sensors)
         stamps = None if times is None else self._checked_stamps(times, checked, when)
-        before = self._snapshot()
+        looks = None if sectors is None else checked_sectors(sectors, len(self.sensors), "sectors")
+        if self.registration is not None and stamps is not None:
+            raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
+        before = self.remember()
         try:
+            if self.registration is not None:
+                self.registration = self.registration.after(when, checked)
+                checked = self.registration.correct(checked)
+            scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks)
             dt = self._elapsed(when)
             if dt > 0:
                 # a running mean that forgets: scans may change their pace
-                self._pace += (dt - self._pace) * max(1.0 / max(self._scan, 1), _FORGETTING)
+                share = max(1.0 / max(self._scan, 1), _FORGETTING)
+                self._pace += (dt - self._pace) * share
+                if looks is not None:
+                    turns = (looks[:, 1] - looks[:, 0]) / FULL_TURN
+                    self._turns = self._turns + (turns - self._turns) * share
             with interruptible():
-                step = self._step(when, checked, stamps)
+                step = self._step(scan)
         except (ArithmeticError, np.linalg.LinAlgError) as error:
-            self._go_back(before)
+            self.go_back(before)
             raise InvalidInputError(
                 f"the scan at {when:g} s, {dt:g} s after the last, leads to numbers out of range ({error}); expected "
                 "seconds, metres and radians"
             ) from error
         except BaseException:
-            self._go_back(before)
+            self.go_back(before)
             raise
         self._time = when
         self._scan += 1
         return step
 
-    def _snapshot(self) -> tuple[dict[str, Any], Any]:
-        """What a step may change: arrays are replaced, not written to, lists are changed in place."""
+    def remember(self) -> Memory:
+        """What a step may change, for `go_back`; costs next to nothing."""
         rng = getattr(self.filter, "rng", None)
-        kept = {name: list(value) if isinstance(value, list) else value for name, value in vars(self).items()}
-        return kept, None if rng is None else rng.bit_generator.state
+        return Memory(_with_own_lists(vars(self)), None if rng is None else rng.bit_generator.state)
 
-    def _go_back(self, snapshot: tuple[dict[str, Any], Any]) -> None:
-        vars(self).update(snapshot[0])
-        if snapshot[1] is not None:
-            self.filter.rng.bit_generator.state = snapshot[1]  # type: ignore[attr-defined]
+    def go_back(self, memory: Memory) -> None:
+        """Be again as when `remember` was called; the memory stays good for another time."""
+        vars(self).update(_with_own_lists(memory.values))
+        if memory.rng is not None:
+            self.filter.rng.bit_generator.state = memory.rng  # type: ignore[attr-defined]
 
     @abstractmethod
-    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
+    def _step(self, scan: Scan) -> Step:
         """Take a checked scan in."""
 
     def flush(self) -> tuple[Decision, ...]:
@@ -256,27 +319,35 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"time must not run backwards: got {when:g} s after {self._time:g} s")
         return when
 
-    def _checked_stamps(self, times: Sequence[Array], measurements: list[Array], when: float) -> list[Array]:
-        if not hasattr(times, "__len__") or len(times) != len(self.sensors):
-            raise InvalidInputError(f"times must be one array for each of {len(self.sensors)} sensors")
-        checked = []
-        for s, (stamps, z) in enumerate(zip(times, measurements, strict=True)):
-            array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, f"times of sensor {s}", (len(z),))
-            early = -math.inf if self._time is None else self._time
-            if len(array) and not (array.min() >= early and array.max() <= when):
-                wrong = array[(array < early) | (array > when)][0]
+    def _checked_stamps(self, times: Sequence[Array], measurements: list[Array], when: float) -> tuple[Array, ...]:
+        checked = checked_times(times, measurements, when, "times")
+        early = -math.inf if self._time is None else self._time
+        for s, array in enumerate(checked):
+            if len(array) and array.min() < early:
                 raise InvalidInputError(
-                    f"times of sensor {s} must lie from the last step's time, {early:g} s, to {when:g} s, got {wrong:g}"
+                    f"times of sensor {s} must lie from the last step's time, {early:g} s, to {when:g} s, "
+                    f"got {array.min():g}"
                 )
-            checked.append(array)
         return checked
 
-    def _instant(self, times: list[Array] | None) -> None:
-        if times is not None:
-            raise InvalidInputError(
-                f"times: the {self.name} tracker takes all sensors at one instant; give measurements the scan's time, "
-                "or use an mht or nearest-neighbour tracker"
-            )
+    def _timed(self, scan: Scan) -> TimedScan:
+        """The tracks and a scan whose measurements have times of their own."""
+        positions, covariances, fit, births = [], [], [], []
+        for s, z in enumerate(scan.measurements):
+            where, spread = single_positions(self._place, s, z)
+            positions.append(where)
+            covariances.append(np.asarray(spread))
+            fit.append(self._narrow(covariances[s]))
+            births.append(np.full(len(z), self.terms.birth[s]))
+
+        def start(where: Array, spread: Array, lag: Array) -> Any:
+            return self.initiation.start(self.filter, where, spread, lag)
+
+        before = scan.time if self._time is None else self._time
+        return TimedScan(
+            self.filter, self._batch.states, before, scan.measurements, scan.own_times(), self.sensors,
+            Places(positions, covariances, fit, births), start, scan.sectors, self.gate_probability,
+        )  # fmt: skip
 
     def _seed(self) -> np.random.SeedSequence:
         """Source of the randomness of this step alone, so that a restored tracker goes on alike."""
@@ -303,10 +374,12 @@ class Tracker(Checkpoint):
         return ids
 
     def _to_delete(self, batch: TrackBatch, time: float) -> Array:
-        return batch.to_delete(self.life_cycle, time, self.life_cycle.patience(self.terms.miss, self._pace))
-
-    def _scan_of(self, time: float, measurements: Sequence[Array]) -> Scan:
-        return Scan(index=self._scan, time=time, measurements=tuple(measurements))
+        # a look is a scan of which a sensor sees a part, the quickest sensor most
+        most = float(self._turns.max())
+        if most < _LEAST_TURN:
+            return np.zeros(len(batch), dtype=np.bool_)
+        patience = self.life_cycle.patience(self.terms.miss * (self._turns / most), self._pace / most)
+        return batch.to_delete(self.life_cycle, time, patience)
 
     def _fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
         """Positions, covariances, and which of them are narrow enough to start a track."""

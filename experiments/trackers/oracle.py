@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
 from assoc.scene import Scene
 from assoc.scene.scan import Scan
 from assoc.tracking import Step
@@ -33,20 +34,34 @@ class OracleTracker(SingleScanTracker):
         self._sources = scene.truth.sources
         self._target_of: dict[int, int] = {}
 
-    def step(self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None = None) -> Step:
+    def step(
+        self,
+        time: float,
+        measurements: Sequence[Array],
+        times: Sequence[Array] | None = None,
+        sectors: Array | None = None,
+    ) -> Step:
         """Take one scan in; see `Tracker.step`."""
         sources = self._sources[self._scan]
-        step = super().step(time, measurements, times)
+        step = super().step(time, measurements, times, sectors)
         for source, ids in zip(sources, step.assigned, strict=True):
             self._target_of |= {i: t for i, t in zip(ids.tolist(), source.tolist(), strict=True) if i}
         return step
 
-    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
+    def _true_rows(self, scan: Scan) -> tuple[Array, Array]:
+        """Measurements of each track, and of the targets without one."""
         sources = self._sources[scan.index]
         known = [self._target_of[i] for i in self._batch.track_id.tolist()]
-        rows = _rows(sources, known)
         fresh = sorted({t for source in sources for t in source.tolist() if t >= 0} - set(known))
-        gain = np.full(len(known), float(self.terms.miss.sum()))
+        return _rows(sources, known), _rows(sources, fresh)
+
+    def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
+        rows, fresh = self._true_rows(scan)
+        return self._outcome(scan, timed, timed.looked(scan.time), rows, fresh)
+
+    def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
+        rows, fresh = self._true_rows(scan)
+        gain = np.full(len(rows), float(self.terms.miss.sum()))
         for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
             seen = np.flatnonzero(rows[:, s])
             if not len(seen):
@@ -54,7 +69,7 @@ class OracleTracker(SingleScanTracker):
             done = self.filter.update(states[seen], np.ascontiguousarray(z[rows[seen, s] - 1]), sensor)
             gain[seen] += done.log_likelihood + self.terms.detection[s] - self.terms.miss[s]
             states = _with(states, seen, done.state)
-        return ScanOutcome(states, gain, rows, _rows(sources, fresh))
+        return ScanOutcome(states, gain, rows, fresh)
 
 
 def _rows(sources: Sequence[Array], targets: Sequence[int]) -> Array:

@@ -42,7 +42,7 @@ def through(tracker: Tracker, scene: Scene, scans: int | None = None) -> Run:
         scan = scene.scan(k)
         # CPU time: what else the machine does is not the tracker's
         begin = time.process_time()
-        tracker.step(scan.time, scan.measurements)
+        tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
         seconds.append(time.process_time() - begin)
         tracks = [track for track in tracker.tracks if track.confirmed]
         table.add(tracks, tracker.filter.motion.position)

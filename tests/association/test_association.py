@@ -10,6 +10,7 @@ import pytest
 import assoc
 from assoc.association import Association, associate
 from assoc.association.plan import Plan
+from assoc.association.table import to_csv
 from assoc.scene import Scene, Truth
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
@@ -191,3 +192,11 @@ def test_bad_arguments(by_hand, arguments, message):
         associate(by_hand, **arguments)
     with pytest.raises(assoc.InvalidInputError, match="scene: expected a Scene, got str"):
         associate("scene.npz")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["=1+1.npz", "+a.npz", "-a.npz", "@a.npz", "\ta.npz"])
+def test_a_file_name_is_no_formula_in_a_spreadsheet(by_hand, name):
+    scans = associate(by_hand).scans
+    row = to_csv(scans, [name] * len(scans)).splitlines()[1]
+    assert row.split(",")[0] == "'" + name
+    assert to_csv(scans, ["a=b.npz"] * len(scans)).splitlines()[1].startswith("a=b.npz,")

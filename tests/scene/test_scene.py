@@ -177,7 +177,7 @@ def test_bad_files_name_path_and_field(tmp_path):
         "truth_ids": (np.zeros(0, int), "'truth_ids' has shape"),
         "times": (np.array([0.0, 1, 2, 3]), "'measurement_offsets' has shape"),
         "region": (np.zeros((3, 3)), "region must have shape"),
-        "version": (np.array(2), "has version 2"),
+        "version": (np.array(3), "has version 3"),
     }
     for name, (value, words) in changes.items():
         np.savez(path, **(good | {name: value}))
@@ -196,3 +196,59 @@ def test_bad_files_name_path_and_field(tmp_path):
     np.savez(path, **(good | {"measurement_offsets": huge}))
     with pytest.raises(InvalidInputError, match="'measurement_values' has shape"):
         Scene.load(path)
+
+
+def own_times(scene, seed=1):
+    rng = np.random.default_rng(seed)
+    scans = zip(scene.times, scene.measurements, strict=True)
+    times = [[t - rng.uniform(0, 0.4, len(z)) for z in scan] for t, scan in scans]
+    low = rng.uniform(-3, 3, (scene.num_scans, len(scene.sensors)))
+    sectors = np.stack([low, low + rng.uniform(0, 2 * np.pi, low.shape)], axis=2)
+    return make(measurement_times=times, sectors=sectors)
+
+
+def test_own_times_and_sectors_survive_a_file_of_version_2(tmp_path):
+    scene = own_times(make())
+    scene.save(tmp_path / "timed.npz")
+    again = Scene.load(tmp_path / "timed.npz")
+    assert_same(scene, again)
+    for k in range(scene.num_scans):
+        for a, b in zip(scene.scan(k).own_times(), again.scan(k).own_times(), strict=True):
+            np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(scene.scan(k).sectors, again.scan(k).sectors)
+        assert not again.scan(k).at_once
+    with np.load(tmp_path / "timed.npz") as file:
+        assert file["version"] == 2
+
+
+def test_a_scene_without_own_times_is_a_file_of_version_1(tmp_path):
+    make().save(tmp_path / "plain.npz")
+    with np.load(tmp_path / "plain.npz") as file:
+        assert file["version"] == 1
+        assert not {"measurement_times", "sectors"} & set(file.files)
+    scan = Scene.load(tmp_path / "plain.npz").scan(1)
+    assert scan.at_once and scan.times is None and scan.sectors is None
+    assert [t.tolist() for t in scan.own_times()] == [[0.5] * len(z) for z in scan.measurements]
+
+
+def test_bad_own_times_are_named(tmp_path):
+    good = own_times(make())
+    late = [[t + 1.0 for t in scan] for scan in good.measurement_times]
+    short = [[t[:-1] for t in scan] for scan in good.measurement_times]
+    for changes, words in [
+        ({"measurement_times": late}, "measurement_times of scan 0 of sensor 0 must not be after the scan's time"),
+        ({"measurement_times": short}, "measurement_times of scan 0 of sensor 0 must have shape"),
+        ({"measurement_times": good.measurement_times[:1]}, "measurement_times: 1 scans, but times has 3"),
+        ({"measurement_times": [[np.zeros(0)]] * 3}, "must be one array for each of 4 sensors"),
+        ({"sectors": np.zeros((3, 4))}, "sectors must have shape"),
+        ({"sectors": good.sectors[..., ::-1]}, "sectors of scan 0: that of sensor 0 must be from an azimuth"),
+    ]:
+        with pytest.raises(InvalidInputError, match=words):
+            make(**changes)
+    good.save(tmp_path / "good.npz")
+    with np.load(tmp_path / "good.npz") as file:
+        arrays = dict(file)
+    for name, value in [("measurement_times", np.zeros(1)), ("sectors", np.zeros((3, 4, 1)))]:
+        np.savez(tmp_path / "bad.npz", **(arrays | {name: value}))
+        with pytest.raises(InvalidInputError, match=f"bad.npz: .*{name}"):
+            Scene.load(tmp_path / "bad.npz")

@@ -143,8 +143,3 @@ def test_static_fusion_keeps_its_tuples_together_and_updates_as_the_plain_filter
                 mean, cov, _ = plain.correct(mean, cov, z, SENSORS[s].covariance)
             np.testing.assert_allclose(track.mean, mean, rtol=1e-7, atol=1e-6)
             assert track.score == pytest.approx(score, abs=1e-6)
-
-
-def test_a_measurement_time_of_its_own_needs_another_tracker():
-    with pytest.raises(ValueError, match="times: the multi-sensor tracker takes all sensors at one instant"):
-        tracker().step(0.0, [np.zeros((0, 3))] * 2, [np.zeros(0)] * 2)

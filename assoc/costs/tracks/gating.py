@@ -67,26 +67,31 @@ def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int
     """Pairs whose components are all within reach, no more than one above ``most``; sorted by one component."""
     num, dim = h.shape
     reach = np.empty((num, dim))
+    total = np.zeros(dim)
     for t in range(num):
         for i in range(dim):
             reach[t, i] = math.sqrt(gate * covariance[t, i, i]) * (1.0 + 1e-9)
+            total[i] += reach[t, i]
     # the component in which a gate is the smallest share of all measurements; angles have no order
     axis, widest = -1, 0.0
     for i in range(dim):
         if not turning[i]:
-            share = (z[:, i].max() - z[:, i].min()) / max(reach[:, i].mean(), 1e-300)
+            share = (z[:, i].max() - z[:, i].min()) / max(total[i] / num, 1e-300)
             if share > widest:
                 axis, widest = i, share
     low, high = np.zeros(num, np.int64), np.full(num, z.shape[0], np.int64)
+    most_within = num * z.shape[0]
     order = np.arange(z.shape[0])
     if axis >= 0:
         order = np.argsort(z[:, axis], kind="mergesort")
         along = z[order, axis]
+        most_within = 0
         for t in range(num):
             low[t] = np.searchsorted(along, h[t, axis] - reach[t, axis], side="left")
             high[t] = np.searchsorted(along, h[t, axis] + reach[t, axis], side="right")
+            most_within += high[t] - low[t]
     # in a wide gate there are many more than are within reach
-    tracks = np.empty(min((high - low).sum(), 64 + 8 * num), np.int64)
+    tracks = np.empty(min(most_within, 64 + 8 * num), np.int64)
     found = np.empty(tracks.size, np.int64)
     count = 0
     for t in range(num):

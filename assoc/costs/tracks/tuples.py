@@ -133,7 +133,7 @@ def grow_track_tuples(
     for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True)):
         gate = gate_of(sensor, gate_probability)
         near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
-        parent, found = _join(track, *near, count)
+        parent, found = join(track, *near, count)
         if s:
             # what has corrected the track already narrows its gate
             angles = angular_components(sensor)
@@ -167,8 +167,8 @@ def _ahead(sensors: Sequence[Measurement], terms: ScoreTerms) -> Array:
     return np.append(np.cumsum(gain[::-1])[::-1], 0.0)
 
 
-def _join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:
-    """Partial tuples times the measurements near their tracks: row of the tuple, measurement."""
+def join(track: Array, near_track: Array, near_found: Array, count: int) -> tuple[Array, Array]:
+    """Partial tuples times the measurements near their tracks (sorted by track): row of the tuple, measurement."""
     first = np.searchsorted(near_track, np.arange(count + 1))
     low, high = first[track], first[track + 1]
     lengths = high - low

@@ -102,6 +102,11 @@ class LinearMotion(Motion):
             known = self._known[dt] = (both[0], both[1], both)
         return known
 
+    def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
+        """F and Q of each of k time steps, both (k, n, n)."""
+        models = [self.matrices(step) for step in dt.tolist()]
+        return np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
+
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""
         moved: Array = states @ self.matrices(dt)[0][0].T
@@ -175,6 +180,24 @@ class ConstantVelocity(LinearMotion):
             (order + 1) * dimensions,
             axes,
         )
+
+    def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
+        """F and Q of each of k time steps, both (k, n, n); the polynomials are taken of all steps at once."""
+        order, axes = self.order, len(self.position)
+        F, Q = np.zeros((2, len(dt), (order + 1) * axes, (order + 1) * axes))
+        # what the polynomials multiply the powers of the time step with
+        unit_F, unit_Q = polynomial(order, 1.0), polynomial_noise(order, 1.0, self.sigma, self.kind)
+        for i in range(order + 1):
+            for j in range(order + 1):
+                if self.kind == "discrete":
+                    power = max(2 - i, 0) + max(2 - j, 0)
+                else:
+                    power = 2 * order - i - j + 1
+                for axis in range(axes):
+                    if j >= i:
+                        F[:, i * axes + axis, j * axes + axis] = unit_F[i, j] * dt ** (j - i)
+                    Q[:, i * axes + axis, j * axes + axis] = unit_Q[i, j] * dt**power
+        return F, Q
 
 
 class ConstantAcceleration(ConstantVelocity):

@@ -34,8 +34,9 @@ PASSES = 1000
 RELAXATION = 1.5
 # columns of a reduced cost of more temperatures than this weigh less than 1e-5
 NEAR = 12.0
-# columns visited between two looks at the clock: about a millisecond
+# columns visited between two looks at the clock: about a millisecond in a kernel, and some fifty between kernels
 _LOOK = 200_000
+_VISITS = 10_000_000
 
 
 class SmoothPoint(NamedTuple):
@@ -84,23 +85,48 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     float array, shape (R,)
         Multipliers u; ``certified_bound(packing, u)`` is the bound.
     """
+    arrays = packing.arrays
     duals = np.zeros(packing.num_rows)
-    temperature = START * spread(packing.arrays)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
-    hard_pass(packing, duals, point.reduced, 1)
+    temperature = START * spread(arrays)
+    limited = run is not None and run.time_limit is not None
     deadline = math.inf if run is None else run.deadline()
-    for _ in range(levels):
-        if run is not None and run.remaining() <= 0.0:
-            break
-        smooth_passes(packing.arrays, point, temperature, passes, deadline)
-        temperature *= COOLING
-    hard_pass(packing, duals, point.reduced, 2)
+    done = -1
+    while done < levels:
+        done = _ascend(arrays, point, temperature, done, (levels, passes), deadline)
+        if limited and run is not None and run.remaining() <= 0.0:
+            deadline = -math.inf  # for systems where kernels cannot read the clock
     return duals
+
+
+@njit
+def _ascend(
+    packing: PackingArrays,
+    point: SmoothPoint,
+    temperature: Floats,
+    done: int,
+    course: tuple[int, int],
+    deadline: float,
+) -> int:
+    """Cool through levels until all are done or the visits are used up; how many are done (-1: none, not begun)."""
+    levels, passes = course
+    if done < 0:
+        hard_sweeps(packing, point.duals, point.reduced, 1)
+        done = 0
+    total = 0
+    while done < levels and total < _VISITS:
+        if not is_over(deadline):
+            # in one go: in turns the passes would begin plainly again and again
+            total += smooth_passes(packing, point, temperature, passes, deadline)
+        temperature *= COOLING
+        done += 1
+    if done == levels:
+        hard_sweeps(packing, point.duals, point.reduced, 2)
+    return done
 
 
 def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
     """Fill ``reduced`` from ``duals``, then raise ``duals`` by passes with the hard minimum (eq. above, T -> 0)."""
-    fill_reduced(packing.arrays, duals, reduced)
     hard_sweeps(packing.arrays, duals, reduced, sweeps)
 
 
@@ -162,7 +188,8 @@ def fill_reduced(packing: PackingArrays, duals: Floats, reduced: Floats) -> None
 
 @njit
 def hard_sweeps(packing: PackingArrays, duals: Floats, reduced: Floats, sweeps: int) -> None:
-    """Passes with the hard minimum: each row takes what the least reduced cost of its columns leaves."""
+    """Fill ``reduced``; then passes with the hard minimum: each row takes the least reduced cost of its columns."""
+    fill_reduced(packing, duals, reduced)
     slack, row_ptr, row_cols = packing.slack, packing.row_ptr, packing.row_cols
     for _ in range(sweeps):
         for r in range(slack.size):

@@ -127,7 +127,7 @@ def _greedy(packing: PackingArrays, node: Node, num: int, covered: Any, found: A
     covered[:] = False
     weight = 0.0
     count = 0
-    for a in np.argsort(node.reduced[:num]):
+    for a in np.argsort(node.reduced[:num], kind="mergesort"):
         j = active[a]
         free = True
         duty = False

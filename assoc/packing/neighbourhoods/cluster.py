@@ -249,7 +249,7 @@ def _search_clusters(
                 count = collect(packing, by_row, prices, rows[:num], local, limit, found)
             count, base = tighten(found, count, num, budget, max(0.15 * excess, 1e-12), sweep)
             if count > 0:
-                order = np.argsort(cost[:count])
+                order = np.argsort(cost[:count], kind="mergesort")
                 lists[0, 0] = count
                 for t in range(count):
                     e = order[t]

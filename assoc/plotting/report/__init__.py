@@ -8,15 +8,17 @@ from assoc._system.lazy import lazy_names
 
 if TYPE_CHECKING:
     from assoc.plotting.report.association import write_association_report
+    from assoc.plotting.report.registration import write_registration_report
     from assoc.plotting.report.sweep import write_sweep_report
     from assoc.plotting.report.tracking import write_tracking_report
 
-__all__ = ["write_association_report", "write_sweep_report", "write_tracking_report"]
+__all__ = ["write_association_report", "write_registration_report", "write_sweep_report", "write_tracking_report"]
 
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "write_association_report": "association",
+        "write_registration_report": "registration",
         "write_sweep_report": "sweep",
         "write_tracking_report": "tracking",
     },

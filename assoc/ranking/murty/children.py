@@ -211,7 +211,7 @@ def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node
         bounds = np.empty(num_rows - start)
         for t in range(start, num_rows):
             bounds[t - start] = -_way_round(graph, nodes, taboo, node, order[node, t])
-        order[node, start:] = order[node, start:][np.argsort(bounds)]
+        order[node, start:] = order[node, start:][np.argsort(bounds, kind="mergesort")]
     for t in range(first, num_rows):
         r = order[node, t]
         bound = node_cost[node] + _way_round(graph, nodes, taboo, node, r)

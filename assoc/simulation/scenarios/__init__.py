@@ -21,6 +21,7 @@ _MODULES = {
     "crowd": "assoc.simulation.scenarios.crowd",
     "bearing-only": "assoc.simulation.scenarios.bearing_only",
     "dubins-uav": "assoc.simulation.scenarios.dubins_uav",
+    "rotating-radars": "assoc.simulation.scenarios.rotating_radars",
     "from-tracks": "assoc.simulation.scenarios.from_tracks",
 }
 # the same for those that make a recording of plots, each with its own time, and not a scene

@@ -17,11 +17,13 @@ from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.scene import Scene
+from assoc.simulation.flights import STEP
 from assoc.simulation.geodesy import east_north_up
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe, velocities_from
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
+from assoc.simulation.turning import Path, observe_in_turns, parse_turns
 
 COLUMNS = {
     "time": ("time", "timestamp"),
@@ -65,6 +67,13 @@ class FromTracksParameters(Parameters):
         default=None, metadata={"help": "number of scans (without: the whole recording)"}
     )
     radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
+    turns: str | None = field(
+        default=None,
+        metadata={
+            "help": "seconds for a turn of each radar, with commas: each plot then has its own time "
+            "(without: all radars look at once)"
+        },
+    )
     spread: float = field(
         default=0.25,
         metadata={"help": "distance of the radars from the middle, as a share of the traffic's diagonal"},
@@ -85,6 +94,8 @@ class FromTracksParameters(Parameters):
             self._whole("scans", most=MAX_SCANS)
         self._number("interval", "max_gap", "noise", "false_alarms", above=0.0)
         self._number("spread", "range_rate_noise", least=0.0)
+        if self.turns is not None:
+            parse_turns(self.turns, self.radars)
         self._probability("detection_probability")
 
 
@@ -130,7 +141,25 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
         )
         for number, place in enumerate(places, start=1)
     ]
+    if p.turns is not None:
+        turns, start = parse_turns(p.turns, p.radars), float(times[0]) - p.interval
+        paths = _paths(recording, reports, p.max_gap)
+        return observe_in_turns(sensors, turns, start, times, paths, rng, region=region, name=name)
     return observe(sensors, times, ids, positions, rng, region=region, name=name, velocities=velocities)
+
+
+def _paths(recording: Recording, reports: Array, max_gap: float) -> list[Path]:
+    """The flights in fine steps, one path for each part without a gap."""
+    new = (np.diff(recording.target) != 0) | (np.diff(recording.time) > max_gap)
+    paths = []
+    for rows in np.split(np.arange(len(recording.time)), np.flatnonzero(new) + 1):
+        own, places = recording.time[rows], reports[rows]
+        count = max(math.ceil((own[-1] - own[0]) / STEP), 1)
+        if len(rows) > 1:
+            times = np.linspace(own[0], own[-1], count + 1)
+            fine = np.column_stack([np.interp(times, own, axis) for axis in places.T])
+            paths.append(Path(int(recording.target[rows[0]]), times, fine, np.gradient(fine, times, axis=0)))
+    return paths
 
 
 def read(parameters: FromTracksParameters) -> Recording:

@@ -24,7 +24,6 @@ from assoc.packing.bounds.dual_ascent import (
     SmoothPoint,
     bounds_by_component,
     certified_bound,
-    fill_reduced,
     hard_pass,
     hard_sweeps,
     smooth_passes,
@@ -142,7 +141,7 @@ class Reduction:
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
         state: _State = _start(self._whole.arrays)
         while counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
-            state = _reduce(state, closed, _PASSES, TOLERANCE, granularity, _VISITS, self._run.deadline())
+            state = _reduce(state, closed, granularity, self._run.deadline())
         self.closed_columns.append(closed.columns[: counts[1]])
         self.closed_bound = math.fsum(closed.values[: counts[2], 0])
         self.closed_weight = math.fsum(closed.values[: counts[2], 1])
@@ -167,7 +166,6 @@ def _start(packing: PackingArrays) -> _State:
     num, num_rows, num_components = packing.weights.size, packing.slack.size, packing.col_start.size - 1
     smooth = np.zeros(num_rows)
     reduced = np.empty(num)
-    fill_reduced(packing, smooth, reduced)
     hard_sweeps(packing, smooth, reduced, 1)
     return _State(
         packing,
@@ -183,35 +181,32 @@ def _start(packing: PackingArrays) -> _State:
 
 
 @njit
-def _reduce(
-    state: _State, done: _Closed, passes: Any, tolerance: float, granularity: float, most_visits: int, deadline: float
-) -> _State:
+def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> _State:
     """Go through temperatures until none is left, nothing is open or the visits are used up; the new state."""
     packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
     counts, closed_columns, closed, proof = done
     visits = 0
-    while counts[0] < passes.size and packing.weights.size > 0 and visits < most_visits:
+    while counts[0] < _PASSES.size and packing.weights.size > 0 and visits < _VISITS:
         num, num_rows = packing.weights.size, packing.slack.size
         reduced = np.empty(num)
         point = SmoothPoint(smooth, reduced, np.empty(num), np.empty(num_rows))
-        visits += smooth_passes(packing, point, temperature, passes[counts[0]], deadline)
+        visits += smooth_passes(packing, point, temperature, _PASSES[counts[0]], deadline)
         # the first cover and the first bound are worth being late for
         if counts[0] > 0 and is_over(deadline):
             break
         duals = smooth.copy()
-        fill_reduced(packing, duals, reduced)
         hard_sweeps(packing, duals, reduced, 2)
         new_owner = _round(packing, reduced, temperature, deadline)
         best = _Incumbent(bound, hard, owner, weight)
         new = _Incumbent(bounds_by_component(packing, duals), duals, new_owner, _cover_weights(packing, new_owner))
-        keep, alive = _compare(packing, best, new, reduced, tolerance, granularity)
+        keep, alive = _compare(packing, best, new, reduced, granularity)
         temperature = temperature * COOLING
         counts[0] += 1
         kept = 0
         for j in range(keep.size):
             kept += keep[j]
         # assembling anew pays when much is gone; till then what is closed is closed again at every temperature
-        if 3 * kept >= 2 * keep.size and counts[0] < passes.size:
+        if 3 * kept >= 2 * keep.size and counts[0] < _PASSES.size:
             continue
         row_start = packing.row_start
         for c in range(alive.size):
@@ -353,7 +348,7 @@ def best_of_both(
 
 @njit
 def _compare(
-    packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, tolerance: float, granularity: float
+    packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float
 ) -> Any:
     """Take over better bounds and covers; the columns worth keeping and the components still open."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
@@ -382,7 +377,7 @@ def _compare(
         step = 0.999 * granularity
         gap = weight[c] - new_bound[c] - step
         # the saved bound and multipliers may be better than these; either is a proof
-        if weight[c] - bound[c] <= max(tolerance * max(1.0, abs(bound[c])), step):
+        if weight[c] - bound[c] <= max(TOLERANCE * max(1.0, abs(bound[c])), step):
             alive[c] = False
             if granularity > 0.0:
                 bound[c] = max(bound[c], weight[c])

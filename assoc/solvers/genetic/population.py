@@ -8,6 +8,7 @@ replaces the worst member if it is better and no member costs the same.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -140,9 +141,9 @@ def _cross(
             if k >= 0 and first_row(cols, k) == r:
                 rest[count] = k
                 # exponential races: small reduced costs tend to come first
-                key[count] = reduced[k] / temperature - np.log(-np.log(rng.random() + 1e-300) + 1e-300)
+                key[count] = reduced[k] / temperature - math.log(-math.log(rng.random() + 1e-300) + 1e-300)
                 count += 1
-    order = np.argsort(key[:count])
+    order = np.argsort(key[:count], kind="mergesort")
     for i in order:
         j = rest[i]
         if fits(cols, owner, j):

@@ -36,16 +36,16 @@ class Hits(NamedTuple):
 
 
 class Roots(NamedTuple):
-    """New trees: ids, 0-based measurements, seconds, each (K,), and the score that they begin with."""
+    """New trees: ids, 0-based measurements, seconds, and the scores that they begin with, each (K,)."""
 
     ids: Array
     measurement: Array
     when: Array
-    score: float
+    score: Array
 
 
 def extend(
-    tables: Tables, miss: float, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
+    tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
 ) -> tuple[Array, Tables]:
     """Next branches, cut to those that matter to good global hypotheses.
 
@@ -53,8 +53,8 @@ def extend(
     ----------
     tables : Tables
         Before.
-    miss : float
-        What a miss adds to a score.
+    miss : array (B,)
+        What a miss adds to the score of each branch.
     hits, roots
     column : int
         Of the sensor in the history.
@@ -74,17 +74,17 @@ def extend(
 
 @njit
 def _extend(
-    numbers: Any, counts: Any, history: Any, born: Any, miss: float, branch: Any, measurement: Any, gain: Any,
-    when: Any, ids: Any, number: Any, since: Any, first: float, column: int, scan: int, most: int, drop: float,
+    numbers: Any, counts: Any, history: Any, born: Any, miss: Any, branch: Any, measurement: Any, gain: Any,
+    when: Any, ids: Any, number: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
 ) -> Any:  # fmt: skip
     old, hits = born.size, branch.size
     tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
     for i in range(old):
-        tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss
+        tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss[i]
     for i in range(hits):
         tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
     for i in range(ids.size):
-        tree[old + hits + i], score[old + hits + i] = ids[i], first
+        tree[old + hits + i], score[old + hits + i] = ids[i], first[i]
     wide = np.zeros((score.size, history.shape[1]), np.int32)
     for i in range(old):
         wide[i] = history[i]
@@ -100,7 +100,7 @@ def _extend(
         row = kept[k]
         if row >= old + hits:
             i = row - old - hits
-            new_numbers[k, SCORE] = new_numbers[k, BEST] = first
+            new_numbers[k, SCORE] = new_numbers[k, BEST] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
             new_counts[k, ID] = ids[i]
             new_history[k, column] = number[i] + 1
@@ -119,12 +119,17 @@ def _extend(
 
 
 @njit
-def count_scan(counts: Any, history: Any, sensors: int) -> None:
-    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history."""
+def count_scan(counts: Any, history: Any, sensors: int, looked: Any) -> None:
+    """Count, in place, who was detected by any of the scan's sensors, the first columns of the history.
+
+    The scan counts for branches that a sensor looked at (bool (B,)).
+    """
     for i in range(counts.shape[0]):
         seen = False
         for s in range(sensors):
             seen = seen or history[i, s] > 0
+        if not (seen or looked[i]):
+            continue
         counts[i, BITS] = (counts[i, BITS] << 1) & MASK | seen
         counts[i, MISSED] = 0 if seen else counts[i, MISSED] + 1
         counts[i, HITS] += seen

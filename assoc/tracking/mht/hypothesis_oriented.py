@@ -30,6 +30,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
+from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
 from assoc.tracking.gated_pairs import gated_pairs
 from assoc.tracking.mht.pruning import MOST_SCANS
@@ -95,8 +96,9 @@ class HypothesisOrientedMHT(Tracker):
         self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
         self._members = [np.arange(len(batch))]
 
-    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
-        if times is not None and len(self.sensors) > 1:
+    def _step(self, scan: Scan) -> Step:
+        time, measurements, times = scan.time, scan.measurements, scan.times
+        if scan.sectors is not None or (times is not None and len(self.sensors) > 1):
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
         count = len(self.sensors)
         before = time if self._time is None else self._time

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
-from assoc.packing.bounds.dual_ascent import SmoothPoint, fill_reduced, hard_sweeps, smooth_passes
+from assoc.packing.bounds.dual_ascent import SmoothPoint, hard_sweeps, smooth_passes
 from assoc.packing.packing import PackingArrays, assembled
 
 # temperatures of the smoothed ascent, in nats: losses are needed to a fraction of the limits they are held against
@@ -124,13 +124,11 @@ def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, in
     duals, reduced = np.zeros(free.size), np.empty(count)
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
     # trees come first in every component: they take what their best branches score, and the rest is differences
-    fill_reduced(packing, duals, reduced)
     hard_sweeps(packing, duals, reduced, 1)
     temperature = np.full(col_start.size - 1, _HOTTEST)
     for _ in range(_LEVELS):
         smooth_passes(packing, point, temperature, _PASSES, np.inf)
         temperature *= 0.5
-    fill_reduced(packing, duals, reduced)
     hard_sweeps(packing, duals, reduced, 2)
     for r in range(free.size):
         price[row_origin[r]] = min(duals[r], 0.0)

@@ -22,17 +22,18 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.costs.tracks.tuples import require_states
+from assoc.costs.tracks.own_times import score_costs
+from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
 from assoc.errors import InvalidInputError, LimitExceededError
-from assoc.filters.batches import concatenate, predict_each
+from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
+from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
-from assoc.tracking.gated_pairs import gated_pairs
 from assoc.tracking.mht.best_hypothesis import choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
@@ -42,8 +43,7 @@ class TrackOrientedMHT(Tracker):
     Parameters
     ----------
     sensors, filter, ...
-        As for `Tracker`. Sensors of a scan are taken in one after the other; with a single sensor each
-        measurement may have its own time.
+        As for `Tracker`. Sensors of a scan are taken in one after the other.
     depth : int
         Scans in the window, N: a measurement's track is final N - 1 scans later. 1 decides at once.
     max_branches : int
@@ -87,10 +87,12 @@ class TrackOrientedMHT(Tracker):
         self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
         self._born, self._chosen = np.full(len(batch), -1), np.ones(len(batch), dtype=np.bool_)
 
-    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
-        if times is not None and len(self.sensors) > 1:
-            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        self._grow(time, measurements, times)
+    def _step(self, scan: Scan) -> Step:
+        time, measurements = scan.time, scan.measurements
+        if scan.at_once:
+            self._grow(time, measurements)
+        else:
+            self._grow_in_order(scan)
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
         self._chosen = self._best_hypothesis()
         self._confirm()
@@ -99,50 +101,81 @@ class TrackOrientedMHT(Tracker):
         ended = self._delete_tracks(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
-    def _grow(self, time: float, measurements: list[Array], times: list[Array] | None) -> None:
+    def _grow(self, time: float, measurements: tuple[Array, ...]) -> None:
         """Grow every branch by the measurements in its gate and by misses, and start trees."""
         count = len(self.sensors)
-        batch, before = self._batch, time if self._time is None else self._time
-        history = np.zeros_like(self._history)
-        history[:, count:] = self._history[:, : history.shape[1] - count]
-        states, tables = batch.states, Tables(batch.numbers, batch.counts, history, self._born)
+        batch = self._predicted(self._batch, self._elapsed(time))
+        states, tables = batch.states, self._tables()
         for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
-            stamps = None if times is None else times[s]
-            gated = gated_pairs(self.filter, states, before, time, z, stamps, sensor, self.gate_probability)
-            pairs = gated.pairs
+            pairs = track_pairs(self.filter, states, z, sensor, gate_of(sensor, self.gate_probability))
             gain = pairs.log_likelihood + self.terms.detection[s]
-            begun, roots = self._roots(s, z, time, stamps)
-            kept, tables = extend(
-                tables, float(self.terms.miss[s]), Hits(pairs.track, pairs.measurement, gain, gated.when), roots,
-                s, self._scan, self.max_branches, self.branch_drop,
-            )  # fmt: skip
+            begun, roots = self._roots(s, z, time)
+            missed = np.full(len(states), self.terms.miss[s])
+            when = np.full(len(gain), time)
+            kept, tables = self._extended(tables, missed, Hits(pairs.track, pairs.measurement, gain, when), roots, s)
             require_states(states, len(kept))
-            states = concatenate([gated.predicted, pairs.states, begun])[kept]
-            before = time
-            if len(kept) > self.max_tuples:
-                raise LimitExceededError(
-                    f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
-                    "lower gate_probability, depth or max_branches, or raise max_tuples"
-                )
-        count_scan(tables.counts, tables.history, count)
+            states = concatenate([states, pairs.states, begun])[kept]
+        count_scan(tables.counts, tables.history, count, np.ones(len(states), dtype=np.bool_))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born = tables.history, tables.born
 
-    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[Any, Roots]:
+    def _grow_in_order(self, scan: Scan) -> None:
+        """`_grow` where measurements have times of their own: each branch is filtered in their order."""
+        count, timed = len(self.sensors), self._timed(scan)
+        looked = timed.looked(scan.time)
+        # the sensors that have been taken in: only they can have missed a branch
+        past = np.zeros_like(looked)
+        tables, gained = self._tables(), np.zeros(len(self._batch))
+        anchor = parent_row = np.arange(len(self._batch))
+        done: list[int] = []
+        for s in timed.order:
+            past[:, s] = looked[:, s]
+            grown = timed.grown(s, done, anchor, parent_row, tables.history[:, :count])
+            total = -score_costs(timed, grown.followed, grown.rows, self.terms, past[anchor[grown.parent]])
+            missed = looked[anchor, s] * self.terms.miss[s]
+            own = np.flatnonzero(timed.places.fit[s])
+            own_anchor, since = timed.offsets[s] + own, timed.times[s][own]
+            score = timed.places.births[s][own] + past[own_anchor] @ self.terms.miss - self.terms.miss[s]
+            ids = np.empty(len(own), dtype=np.int64)
+            ids[np.lexsort((*timed.places.positions[s][own].T, since))] = self._new_ids(len(own))
+            hits = Hits(grown.parent, grown.measurement, total - gained[grown.parent], grown.followed.when)
+            kept, tables = self._extended(tables, missed, hits, Roots(ids, own, since, score), s)
+            gained = np.concatenate([gained + missed, total, score])[kept]
+            anchor = np.concatenate([anchor, anchor[grown.parent], own_anchor])[kept]
+            parent_row = np.concatenate([parent_row, parent_row[grown.parent], np.full(len(own), -1)])[kept]
+            done.append(s)
+        rows = tables.history[:, :count]
+        followed = timed.follow(parent_row, rows)
+        states = timed.at(followed, np.arange(len(rows)), scan.time)
+        new = np.flatnonzero(parent_row < 0)
+        tables.numbers[new, STARTED] = followed.first[new]
+        count_scan(tables.counts, tables.history, count, looked[anchor].any(axis=1))
+        self._batch = TrackBatch(states, tables.numbers, tables.counts)
+        self._history, self._born = tables.history, tables.born
+
+    def _tables(self) -> Tables:
+        """The branches, with room for this scan in their histories."""
+        count, history = len(self.sensors), np.zeros_like(self._history)
+        history[:, count:] = self._history[:, : history.shape[1] - count]
+        return Tables(self._batch.numbers, self._batch.counts, history, self._born)
+
+    def _extended(self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int) -> tuple[Array, Tables]:
+        kept, tables = extend(tables, missed, hits, roots, s, self._scan, self.max_branches, self.branch_drop)
+        if len(kept) > self.max_tuples:
+            raise LimitExceededError(
+                f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
+                "lower gate_probability, depth or max_branches, or raise max_tuples"
+            )
+        return kept, tables
+
+    def _roots(self, s: int, z: Array, time: float) -> tuple[Any, Roots]:
         """New trees, one for each measurement that tells a position, and their states."""
         states, fit, positions = self._singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
-        if stamps is None:
-            when = np.full(len(numbers), time)
-            order = np.lexsort(positions.T)
-        else:
-            when = stamps[numbers]
-            order = np.lexsort((*positions.T, when))
-            states = predict_each(self.filter, states, time - when)
         ids = np.empty(len(numbers), dtype=np.int64)
-        ids[order] = self._new_ids(len(numbers))
-        return states, Roots(ids, numbers, when, float(self._birth[s]))
+        ids[np.lexsort(positions.T)] = self._new_ids(len(numbers))
+        return states, Roots(ids, numbers, np.full(len(numbers), time), np.full(len(numbers), self._birth[s]))
 
     def _best_hypothesis(self) -> Array:
         """Branches of the best global hypothesis, as a mask."""

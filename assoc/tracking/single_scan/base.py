@@ -10,11 +10,12 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
+from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.scores import log_birth
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
@@ -29,24 +30,35 @@ class ScanOutcome(NamedTuple):
     """Their measurements, 1-based, 0 missed, (T, S)."""
     born: Array
     """Tuples of the measurements that no track took, (K, S)."""
+    when: Array | None = None
+    """Time of each track's last detection, NaN where it was missed, (T,); None: all at the scan's time."""
+    looked: Array | None = None
+    """Whether any sensor looked at each track, bool (T,); None: all did."""
 
 
 class SingleScanTracker(Tracker):
     """Predict, associate (which the children do), start tracks, confirm, delete."""
 
-    def _step(self, time: float, measurements: list[Array], times: list[Array] | None) -> Step:
-        self._instant(times)
-        scan = self._scan_of(time, measurements)
-        batch = self._predicted(self._batch, self._elapsed(time))
-        outcome = self._associate(scan, batch.states, batch.score)
+    def _step(self, scan: Scan) -> Step:
+        if scan.at_once:
+            predicted = self._predicted(self._batch, self._elapsed(scan.time))
+            outcome = self._associate(scan, predicted.states, predicted.score)
+            new, rows = self._begin(scan, outcome.born)
+        else:
+            timed = self._timed(scan)
+            outcome = self._associate_timed(scan, timed, self._batch.score)
+            new, rows = self._begin_timed(scan, timed, outcome.born)
         seen = outcome.rows.any(axis=1)
-        batch = batch.scored(outcome.states, outcome.gain, np.where(seen, time, np.nan))
-        new, rows = self._begin(scan, outcome.born)
-        batch = TrackBatch.concatenate([batch, new]).counted(np.concatenate([seen, np.ones(len(new), dtype=np.bool_)]))
+        when = np.where(seen, scan.time, np.nan) if outcome.when is None else outcome.when
+        batch = TrackBatch.concatenate([self._batch.scored(outcome.states, outcome.gain, when), new])
+        looked = None
+        if outcome.looked is not None:
+            looked = np.concatenate([outcome.looked, np.ones(len(new), dtype=np.bool_)])
+        batch = batch.counted(np.concatenate([seen, np.ones(len(new), dtype=np.bool_)]), looked)
         rows = np.concatenate([outcome.rows, rows])
         batch = batch.confirm(self.life_cycle)
         now = self._decision(scan, batch, rows)
-        gone = self._to_delete(batch, time)
+        gone = self._to_delete(batch, scan.time)
         self._batch = batch[~gone]
         ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
@@ -54,6 +66,35 @@ class SingleScanTracker(Tracker):
     @abstractmethod
     def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         """Associate a scan with predicted tracks of these scores."""
+
+    @abstractmethod
+    def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
+        """Associate a scan whose measurements have times of their own with tracks of these scores."""
+
+    def _outcome(self, scan: Scan, timed: TimedScan, looked: Array, rows: Array, born: Array) -> ScanOutcome:
+        """What becomes of the tracks when they take these measurements (T, S)."""
+        track = np.arange(len(rows))
+        followed = timed.follow(track, rows)
+        gain = -score_costs(timed, followed, rows, self.terms, looked[track])
+        when = np.where(rows.any(axis=1), followed.when, np.nan)
+        at_all = np.asarray(looked[track].any(axis=1))
+        return ScanOutcome(timed.at(followed, track, scan.time), gain, rows, born, when, at_all)
+
+    def _begin_timed(self, scan: Scan, timed: TimedScan, tuples: Array) -> tuple[TrackBatch, Array]:
+        """New tracks of tuples that tell a position, numbered by place."""
+        tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
+        fit = [np.append(one, False)[tuples[:, s] - 1] for s, one in enumerate(timed.places.fit)]
+        rows = tuples[np.any(fit, axis=0)]
+        if not len(rows):
+            return self._batch[:0], rows
+        followed = timed.follow(np.full(len(rows), -1), rows)
+        states = timed.at(followed, np.arange(len(rows)), scan.time)
+        looked = timed.looked(scan.time)[timed.anchors(rows, followed.lead)]
+        score = -score_costs(timed, followed, rows, self.terms, looked)
+        order = np.lexsort(states.mean[:, list(self.filter.motion.position)].T)
+        batch = TrackBatch.new(states[order], self._new_ids(len(order)), score[order], followed.when[order])
+        batch.numbers[:, STARTED] = followed.first[order]
+        return batch, rows[order]
 
     def _problem(self, scan: Scan) -> AssignmentProblem:
         """Which measurements of a scan may be a target, whether there is a track of it or not."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
 from assoc.costs.tracks.scores import doubted_gain, log_birth
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
@@ -52,6 +53,21 @@ class MultiSensorTracker(SingleScanTracker):
         kept = np.sort(solution.indices[solution.indices < len(known)])
         born = solution.tuples[solution.tuples[:, 0] == 0][:, 1:]
         return ScanOutcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
+
+    def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
+        looked = timed.looked(scan.time)
+        tuples = grow_timed_tuples(timed, self.terms, looked, self.max_tuples)
+        known = tuples.track >= 0
+        value = -tuples.costs
+        value[known] = doubted_gain(scores[tuples.track[known]], value[known])
+        # where false alarms are rarer than new targets a single measurement is one, too
+        good = np.flatnonzero(known | (value > 0))
+        columns = np.column_stack([tuples.track + 1, tuples.rows])[good]
+        problem = AssignmentProblem(columns, -value[good], np.concatenate([[len(scores)], scan.sizes]))
+        solution = self._assign(problem)
+        mine = solution.tuples[solution.tuples[:, 0] > 0]
+        rows = mine[np.argsort(mine[:, 0]), 1:].astype(np.int32)
+        return self._outcome(scan, timed, looked, rows, solution.tuples[solution.tuples[:, 0] == 0][:, 1:])
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""

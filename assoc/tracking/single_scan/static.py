@@ -9,6 +9,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
+from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import gate_of, require_states
 from assoc.filters.batches import concatenate
@@ -51,6 +52,33 @@ class StaticFusionTracker(SingleScanTracker):
         free[chosen] = False
         after = concatenate([corrected, states])[kept]
         return ScanOutcome(after, gain[kept], rows, fused[free[1:]])
+
+    def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
+        looked = timed.looked(scan.time)
+        fused = np.asarray(self._assign(self._problem(scan)).tuples, dtype=np.int32)
+        count = len(scores)
+        track, which = [np.arange(count)], [np.full(count, -1)]
+        lead = np.argmax(fused > 0, axis=1)
+        for s in range(len(self.sensors)):
+            mine = np.flatnonzero(lead == s)
+            owner = np.full(len(scan.measurements[s]), -1)
+            owner[fused[mine, s] - 1] = mine
+            near, found = timed.near(s)
+            track.append(near[owner[found] >= 0])
+            which.append(owner[found][owner[found] >= 0])
+        pairs, fused_of = np.concatenate(track), np.concatenate(which)
+        rows = np.concatenate([fused, np.zeros((1, fused.shape[1]), dtype=np.int32)])[fused_of]
+        followed = timed.follow(pairs, rows)
+        gain = -score_costs(timed, followed, rows, self.terms, looked[pairs])
+        good = np.flatnonzero(followed.inside)
+        value = doubted_gain(scores[pairs[good]], gain[good])
+        columns = np.stack([pairs[good] + 1, fused_of[good] + 1], axis=1)
+        solution = self._assign(AssignmentProblem(columns, -value, [count, len(fused)]))
+        mine = good[solution.indices[solution.indices < len(good)]]
+        mine = mine[np.argsort(pairs[mine])]
+        free = np.ones(len(fused) + 1, dtype=np.bool_)
+        free[fused_of[mine]] = False
+        return self._outcome(scan, timed, looked, rows[mine], fused[free[:-1]])
 
     def _pairs(self, scan: Scan, states: Any, fused: Array) -> tuple[Array, Array, Array, Any]:
         """Tracks and tuples within the gates: rows of both, costs, and the corrected states."""

@@ -1,0 +1,351 @@
+"""Candidate tuples of a scan whose measurements have times of their own.
+
+A tuple is filtered in the order of its measurements' times: predicted to each, corrected by it. So its measurements are
+compared through the target's predicted motion, with all its uncertainty, and the logarithms of the predictive densities
+add up to that of all of them together. A tuple without a track begins with its first measurement that tells a
+position, and with the velocity that the beginning of a track is given.
+
+Which pairs may pass a gate at all is asked with the boxes that a track's gate passes through between the first and the
+last measurement of a sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.gating import angular_components, near_pairs
+from assoc.costs.tracks.scores import ScoreTerms
+from assoc.costs.tracks.tuples import gate_of, join, require_states
+from assoc.errors import LimitExceededError
+from assoc.filters.base import Expected, Filter
+from assoc.filters.batches import arrays_of, concatenate, state_from
+from assoc.scene.own_times import looked_at
+from assoc.sensors import Sensor
+
+# a gate moves on a curve where the box takes a straight line: this much more than the way
+_CURVED = 1.3
+
+
+class Places(NamedTuple):
+    """What the measurements of each sensor say of positions, and which may begin a track."""
+
+    positions: list[Array]
+    """(n_s, 3)."""
+    covariances: list[Array]
+    """(n_s, 3, 3)."""
+    fit: list[Array]
+    """Whether it is narrow enough for that, bool (n_s,)."""
+    births: list[Array]
+    """Score of each as a new target, misses of other sensors apart, (n_s,)."""
+
+
+class Followed(NamedTuple):
+    """M tuples filtered through all their measurements."""
+
+    states: Any
+    """At the time of the last measurement of each."""
+    when: Array
+    """That time, seconds (M,)."""
+    first: Array
+    """Time of the first measurement, (M,)."""
+    lead: Array
+    """Sensor whose measurement began the track, (M,); -1 where there was a track."""
+    log_likelihood: Array
+    """Of all measurements but the lead's, (M,)."""
+    inside: Array
+    """Whether each measurement passed its gate, bool (M,)."""
+
+
+class Grown(NamedTuple):
+    """K partial tuples with one more measurement."""
+
+    parent: Array
+    """Row of the tuple before, (K,)."""
+    measurement: Array
+    """0-based, (K,)."""
+    rows: Array
+    """(K, S)."""
+    followed: Followed
+
+
+class TimedTuples(NamedTuple):
+    """M candidate tuples; every track has one in which all sensors missed it."""
+
+    track: Array
+    """Row of the track, int (M,); -1: a new target."""
+    rows: Array
+    """1-based measurement of each sensor, 0 where it missed, int32 (M, S)."""
+    costs: Array
+    """(M,); of a new target with the density of births at its lead's measurement."""
+
+
+class TimedScan:
+    """T tracks and the measurements since, each with its own time.
+
+    Parameters
+    ----------
+    filter : Filter
+    states
+        T states.
+    before : float or array (T,)
+        Their times, none after the measurements', seconds.
+    measurements, times : sequences over sensors of arrays (n_s, d_s), (n_s,)
+    sensors : sequence of Sensor
+    places : Places
+    start : callable (positions, covariances, lag) -> states
+        Begins tracks at a time `lag` (n,) seconds before that of the positions.
+    sectors : array (S, 2) or None
+        See `assoc.Scene`.
+    gate_probability : float
+    """
+
+    def __init__(
+        self,
+        filter: Filter[Any],
+        states: Any,
+        before: float | Array,
+        measurements: Sequence[Array],
+        times: Sequence[Array],
+        sensors: Sequence[Sensor],
+        places: Places,
+        start: Callable[[Array, Array, Array], Any],
+        sectors: Array | None,
+        gate_probability: float,
+    ) -> None:
+        self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
+        self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
+        self.measurements, self.times, self.start, self.sectors = measurements, times, start, sectors
+        self.gates = [gate_of(sensor, gate_probability) for sensor in sensors]
+        sizes = [len(z) for z in measurements]
+        self.offsets = np.cumsum([len(states), *sizes])
+        """Where each sensor's measurements begin among anchors: tracks, then measurements that began one."""
+        # tracks begin with sensors that tell positions: these come first
+        self.order = sorted(range(len(sensors)), key=lambda s: not places.fit[s].any())
+
+    def stamps(self, rows: Array) -> Array:
+        """Times of the measurements of tuples, (M, S), infinite where there is none."""
+        return np.stack(
+            [np.append(times, np.inf)[rows[:, s] - 1] for s, times in enumerate(self.times)], axis=1
+        ).reshape(rows.shape)
+
+    def follow(self, track: Array, rows: Array) -> Followed:
+        """Filter tuples in the order of their measurements' times.
+
+        Parameters
+        ----------
+        track : int array (M,)
+            Row of the track, -1 for a new target, which has a measurement that may begin a track.
+        rows : int array (M, S)
+        """
+        stamps = self.stamps(rows)
+        turn = np.argsort(stamps, axis=1, kind="stable")
+        count = np.count_nonzero(rows, axis=1)
+        first = stamps.min(axis=1, initial=np.inf)
+        fresh, old = np.flatnonzero(track < 0), np.flatnonzero(track >= 0)
+        require_states(self.states, len(track))
+        lead, begun = self._begin(rows[fresh], turn[fresh], stamps[fresh], first[fresh])
+        leads = np.full(len(track), -1, dtype=np.int64)
+        leads[fresh] = lead
+        when = np.empty(len(track))
+        when[fresh], when[old] = first[fresh], self.before[track[old]]
+        back = np.argsort(np.concatenate([old, fresh]), kind="stable")
+        states = concatenate([self.states[track[old]], begun])[back]
+        log_likelihood, inside = np.zeros(len(track)), np.ones(len(track), dtype=np.bool_)
+        for k in range(rows.shape[1]):
+            due = (count > k) & (turn[:, k] != leads)
+            for s, sensor in enumerate(self.sensors):
+                here = np.flatnonzero(due & (turn[:, k] == s))
+                if not len(here):
+                    continue
+                now = stamps[here, s]
+                moved = self._moved(states[here], now - when[here])
+                z = np.ascontiguousarray(self.measurements[s][rows[here, s] - 1])
+                done = self.filter.update(moved, z, sensor)
+                states, when[here] = _put(states, here, done.state), now
+                log_likelihood[here] += done.log_likelihood
+                inside[here] &= done.nis <= self.gates[s]
+        return Followed(states, when, first, leads, log_likelihood, inside)
+
+    def _moved(self, states: Any, dt: Array) -> Any:
+        """Each state its own dt seconds later; even equal steps are new ones, of which nothing is remembered."""
+        return self.filter.predict_each(states, dt) if len(states) else states
+
+    def _begin(self, rows: Array, turn: Array, stamps: Array, first: Array) -> tuple[Array, Any]:
+        """The sensor that begins each new track, and the tracks, at the time of their first measurements."""
+        able = np.stack([np.append(fit, False)[rows[:, s] - 1] for s, fit in enumerate(self.places.fit)], axis=1)
+        ordered = np.take_along_axis(able.reshape(rows.shape), turn, axis=1)
+        lead = turn[np.arange(len(rows)), np.argmax(ordered, axis=1)] if len(rows) else np.zeros(0, dtype=np.int64)
+        positions, covariances = np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 3))
+        for s in range(rows.shape[1]):
+            mine = np.flatnonzero(lead == s)
+            number = rows[mine, s] - 1
+            positions[mine], covariances[mine] = self.places.positions[s][number], self.places.covariances[s][number]
+        return lead, self.start(positions, covariances, stamps[np.arange(len(rows)), lead] - first)
+
+    def at(self, followed: Followed, rows: Array, time: float) -> Any:
+        """States of these rows of `followed` at a later time."""
+        return self._moved(followed.states[rows], time - followed.when[rows])
+
+    def looked(self, time: float) -> Array:
+        """Whether each sensor looked where each track and each measurement (as anchors) is, bool (A, S)."""
+        total = int(self.offsets[-1])
+        result = np.ones((total, len(self.sensors)), dtype=np.bool_)
+        if self.sectors is None:
+            return result
+        places = np.zeros((total, 3))
+        axes = self.filter.motion.position
+        tracks = self._moved(self.states, np.maximum(time - self.before, 0.0))
+        places[: len(tracks), : len(axes)] = tracks.mean[:, list(axes)]
+        places[len(tracks) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
+        for s, (sensor, sector) in enumerate(zip(self.sensors, self.sectors, strict=True)):
+            away = places - sensor.position
+            result[:, s] = looked_at(sector, np.arctan2(away[:, 1], away[:, 0]))
+            # a measurement is made where its sensor looks, whatever rounding says
+            result[self.offsets[s] : self.offsets[s + 1], s] = True
+        return result
+
+    def anchors(self, rows: Array, lead: Array) -> Array:
+        """The measurement, as anchor, with which each new target began, (M,)."""
+        return self.offsets[lead] + np.take_along_axis(rows, lead[:, None], axis=1)[:, 0] - 1
+
+    def grown(self, s: int, done: Sequence[int], anchor: Array, track: Array, rows: Array) -> Grown:
+        """Partial tuples with one more measurement, of sensor s, that passes all gates.
+
+        Parameters
+        ----------
+        s : int
+        done : sequence of int
+            Sensors whose measurements may have begun new targets.
+        anchor, track, rows : arrays (M,), (M,), (M, S)
+            Of the partial tuples: the track, or the measurement (as anchor) that began a new target; row of the track
+            or -1; measurements.
+        """
+        near_anchor, near_found = self.near(s)
+        for r in done:
+            first, second = self.near_beginnings(r, s)
+            near_anchor, near_found = np.append(near_anchor, self.offsets[r] + first), np.append(near_found, second)
+        order = np.lexsort((near_found, near_anchor))
+        parent, found = join(anchor, near_anchor[order], near_found[order], int(self.offsets[-1]))
+        new = rows[parent]
+        new[:, s] = found + 1
+        followed = self.follow(track[parent], new)
+        good = np.flatnonzero(followed.inside)
+        chosen = Followed(followed.states[good], *(one[good] for one in followed[1:]))
+        return Grown(parent[good], found[good], new[good], chosen)
+
+    def near(self, s: int) -> tuple[Array, Array]:
+        """Tracks and measurements of sensor s that may pass the gate, ordered by track."""
+        nothing = np.zeros(0, dtype=np.int64)
+        times = self.times[s]
+        if not len(self.states) or not len(times):
+            return nothing, nothing
+        sensor, gate = self.sensors[s], self.gates[s]
+        early, late = (
+            self.filter.expected(self._moved(self.states, time - self.before), sensor)
+            for time in (float(times.min()), float(times.max()))
+        )
+        angles = angular_components(sensor)
+        way = late.mean - early.mean
+        turning = np.array(angles)
+        way[:, turning] -= 2 * np.pi * np.round(way[:, turning] / (2 * np.pi))
+        spread = np.sqrt(gate * np.maximum(*(np.einsum("bii->bi", one.covariance) for one in (early, late))))
+        box = Expected(early.mean + 0.5 * way, _diagonal((spread + 0.5 * _CURVED * np.abs(way)) ** 2 / gate))
+        return near_pairs(box, self.measurements[s], angles, gate)
+
+    def near_beginnings(self, r: int, s: int) -> tuple[Array, Array]:
+        """Measurements of sensor r that may begin a track, and of sensor s that may be of it, ordered by the first."""
+        nothing = np.zeros(0, dtype=np.int64)
+        able = np.flatnonzero(self.places.fit[r])
+        if not len(able) or not len(self.times[s]):
+            return nothing, nothing
+        own, ends = self.times[r][able], (float(self.times[s].min()), float(self.times[s].max()))
+        lag = np.maximum(np.abs(own - ends[0]), np.abs(own - ends[1]))
+        wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)
+        sensor = self.sensors[s]
+        expected = self.filter.expected(wide, sensor)
+        first, second = near_pairs(expected, self.measurements[s], angular_components(sensor), self.gates[s])
+        return able[first], second
+
+
+def _diagonal(variances: Array) -> Array:
+    covariance = np.zeros((*variances.shape, variances.shape[1]))
+    np.einsum("bii->bi", covariance)[:] = variances
+    return covariance
+
+
+def _put(states: Any, rows: Array, new: Any) -> Any:
+    """The states, those in `rows` replaced."""
+    if len(rows) == len(states):
+        return new
+    parts, arrays = arrays_of(new), {name: np.array(value) for name, value in arrays_of(states).items()}
+    if any(parts[name].shape[1:] != value.shape[1:] for name, value in arrays.items()):
+        # what a filter keeps of measurements has no width before the first one
+        rest = np.setdiff1d(np.arange(len(states)), rows)
+        return concatenate([new, states[rest]])[np.argsort(np.concatenate([rows, rest]), kind="stable")]
+    for name, value in arrays.items():
+        value[rows] = parts[name]
+    return state_from(type(states), arrays)
+
+
+def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tuples: int) -> TimedTuples:
+    """Candidate tuples of tracks, or of new targets, and one measurement or none of each sensor.
+
+    Parameters
+    ----------
+    scan : TimedScan
+    terms : ScoreTerms
+        Of its sensors.
+    looked : bool array (A, S)
+        `TimedScan.looked`; a sensor that did not look has not missed.
+    max_tuples : int
+        The most tuples that may be made.
+
+    Raises
+    ------
+    LimitExceededError
+        There are more tuples than `max_tuples`.
+    """
+    count, width = len(scan.states), len(scan.sensors)
+    track, anchor = np.arange(count), np.arange(count)
+    rows = np.zeros((count, width), dtype=np.int32)
+    costs = -(looked[:count] @ terms.miss)
+    alone = costs.copy()
+    done: list[int] = []
+    for s in scan.order:
+        new = scan.grown(s, done, anchor, track, rows)
+        if len(new.parent) + len(track) > max_tuples:
+            raise LimitExceededError(
+                f"{len(new.parent) + len(track)} candidate tuples of tracks and measurements, "
+                f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
+            )
+        value = score_costs(scan, new.followed, new.rows, terms, looked[anchor[new.parent]])
+        own = np.flatnonzero(scan.places.fit[s])
+        single = np.zeros((len(own), width), dtype=np.int32)
+        single[:, s] = own + 1
+        own_anchor = scan.offsets[s] + own
+        begun = terms.miss[s] - looked[own_anchor] @ terms.miss - scan.places.births[s][own]
+        costs = np.concatenate([costs, value, begun])
+        rows = np.concatenate([rows, new.rows, single])
+        track = np.concatenate([track, track[new.parent], np.full(len(own), -1)])
+        anchor = np.concatenate([anchor, anchor[new.parent], own_anchor])
+        done.append(s)
+    # a track that would do better with all missed: its measurements are better declared false alarms, at cost 0
+    good = (track < 0) | ~rows.any(axis=1)
+    good[~good] = costs[~good] < alone[track[~good]]
+    order = np.flatnonzero(good)
+    order = order[np.lexsort((*rows[order].T[::-1], track[order]))]
+    return TimedTuples(track[order], rows[order], costs[order])
+
+
+def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTerms, looked: Array) -> Array:
+    """Costs of followed tuples, given which sensors looked at each, bool (M, S)."""
+    seen = rows > 0
+    gain = followed.log_likelihood + seen @ terms.detection + (looked & ~seen) @ terms.miss
+    for s, births in enumerate(scan.places.births):
+        mine = np.flatnonzero(followed.lead == s)
+        gain[mine] += births[rows[mine, s] - 1] - terms.detection[s]
+    return np.asarray(-gain)

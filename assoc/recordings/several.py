@@ -1,0 +1,97 @@
+"""Recordings of several radars, each turning at its own pace, as one scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc._parameters import positive
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.recordings.recording import Recording
+from assoc.recordings.rotation import estimate_rotation
+from assoc.recordings.windows import running_phase
+from assoc.scene.scene import Scene
+from assoc.sensors import Radar2D
+from assoc.sensors.base import wrap_angle
+
+FULL_TURN = 2.0 * math.pi
+MOST_SCANS = 1_000_000
+
+
+def scene_of_radars(
+    recordings: Sequence[Recording],
+    radars: Sequence[Radar2D],
+    *,
+    rotations: Sequence[float] | None = None,
+    interval: float | None = None,
+) -> Scene:
+    """Put the plots of several radars into one scene, each with its own time.
+
+    A scan holds what all radars measured since the one before. The sectors that a radar looked at follow from its
+    rotation and from the azimuths and times of its own plots, so that a radar is not said to have missed what it did
+    not look at; before its first plot and after its last it does not look.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of one clock.
+    radars : sequence of Radar2D
+        The radar of each, in the scene's frame; `assoc.recordings.radar_of` reads noise and reach off a recording.
+    rotations : sequence of float, optional
+        Seconds for a turn of each; left out, they are estimated.
+    interval : float, optional
+        Seconds from scan to scan, at most the shortest turn; by default half of it.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidInputError
+        There are no plots, or arguments are not as described.
+    """
+    if not len(recordings) or len(recordings) != len(radars) or not all(len(one) for one in recordings):
+        raise InvalidInputError(
+            f"recordings: expected at least one, each with plots and a radar, got {len(recordings)} with "
+            f"{len(radars)} radars"
+        )
+    if rotations is not None and len(rotations) != len(recordings):
+        raise InvalidInputError(f"rotations: expected one for each of {len(recordings)} recordings")
+    turns = [positive(one, "rotations") for one in rotations or [estimate_rotation(one) for one in recordings]]
+    pace = 0.5 * min(turns) if interval is None else positive(interval, "interval")
+    if pace > min(turns) * (1 + 1e-9):
+        raise InvalidInputError(f"interval: expected at most the shortest turn, {min(turns):g} s, got {pace:g}")
+    start, end = min(float(one.times[0]) for one in recordings), max(float(one.times[-1]) for one in recordings)
+    if (end - start) / pace > MOST_SCANS:
+        raise InvalidInputError(f"interval: {pace:g} s makes more than {MOST_SCANS} scans of {end - start:g} s")
+    edges = start + pace * np.arange(math.floor((end - start) / pace) + 2)
+    blocks = []
+    for one in recordings:
+        # a plot on an edge belongs to the scan before it, but for the first
+        cut = np.searchsorted(one.times, edges, side="right")
+        cut[0] = 0
+        blocks.append([slice(a, b) for a, b in zip(cut[:-1], cut[1:], strict=True)])
+    scans = range(len(edges) - 1)
+    return Scene(
+        radars, edges[1:],
+        [[one.measurements[block[k]] for one, block in zip(recordings, blocks, strict=True)] for k in scans],
+        measurement_times=[[one.times[block[k]] for one, block in zip(recordings, blocks, strict=True)] for k in scans],
+        sectors=np.stack([_sectors(one, turn, edges) for one, turn in zip(recordings, turns, strict=True)], axis=1),
+        name=" + ".join(one.name for one in recordings if one.name),
+    )  # fmt: skip
+
+
+def _sectors(recording: Recording, turn: float, edges: Array) -> Array:
+    """Azimuths from which to which an antenna looked between the edges, (K, 2)."""
+    times = recording.times
+    phase = running_phase(times, times / turn - recording.bearings / FULL_TURN, turn)
+    # bearings go clockwise from north, azimuths from +x towards +y
+    ahead = edges / turn - np.interp(edges, times, phase)
+    azimuth = math.pi / 2 - FULL_TURN * np.mod(ahead, 1.0)
+    swept = np.clip(np.minimum(edges[1:], times[-1]) - np.maximum(edges[:-1], times[0]), 0.0, None)
+    low = wrap_angle(azimuth[1:])
+    return np.stack([low, low + np.minimum(FULL_TURN * swept / turn, FULL_TURN)], axis=1)

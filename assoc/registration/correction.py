@@ -1,0 +1,125 @@
+"""Measurements freed of biases, or given them: of one sensor, of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.registration.terms import AXES, Term
+from assoc.scene.scene import Scene
+from assoc.sensors import PositionSensor, Sensor
+from assoc.sensors.base import wrap_angle
+
+
+def own_biases(terms: Sequence[Term], biases: Array, sensor: int) -> dict[str, float]:
+    """Biases of one sensor by component."""
+    pairs = zip(terms, biases.tolist(), strict=True)
+    return {term.component: value for term, value in pairs if term.sensor == sensor}
+
+
+def corrected_sensor(sensor: Sensor, biases: Mapping[str, float]) -> Sensor:
+    """The sensor at its true place; one that reports positions stays where it is."""
+    if isinstance(sensor, PositionSensor):
+        return sensor
+    offset = np.array([biases.get(axis, 0.0) for axis in AXES])
+    return replace(sensor, position=sensor.position - offset) if offset.any() else sensor
+
+
+def corrected_measurements(
+    sensor: Sensor,
+    measured: Array,
+    biases: Mapping[str, float],
+    velocities: Array | None = None,
+    late: Array | float = 0.0,
+) -> Array:
+    """Measurements without the sensor's biases, and at the time at which they are wanted.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    measured : array (n, d)
+    biases : mapping of component to value
+        Metres, radians, seconds.
+    velocities : array (n, 3), optional
+        Of the targets, m/s; NaN where they are not known: the clock's bias is then left in.
+    late : array (n,) or float
+        By how much a measurement's own time is before the time wanted, seconds.
+
+    Returns
+    -------
+    array (n, d)
+    """
+    z = np.array(measured, dtype=np.float64)
+    named = AXES if isinstance(sensor, PositionSensor) else sensor.components
+    for i, component in enumerate(named[: sensor.dim]):
+        z[:, i] -= biases.get(component, 0.0)
+        if sensor.angular[i]:
+            z[:, i] = wrap_angle(z[:, i])
+    shift = np.broadcast_to(np.asarray(late, dtype=np.float64) + biases.get("time", 0.0), (len(z),))
+    if velocities is None or not len(z) or not shift.any():
+        return z
+    known = ~np.isnan(velocities[:, 0]) & (shift != 0.0)
+    if known.any():
+        located = corrected_sensor(sensor, biases).position_part
+        d = located.dim
+        here = pointed_at(located, z[known, :d])
+        there = here + shift[known, None] * velocities[known]
+        moved = z[known]
+        moved[:, :d] += located.residual(located.measure(there), located.measure(here))
+        z[known] = moved
+        for i in range(d):
+            if sensor.angular[i]:
+                z[:, i] = wrap_angle(z[:, i])
+    return z
+
+
+def pointed_at(sensor: Sensor, z: Array) -> Array:
+    """Positions (n, 3) that measurements point at; on the sensor's own height where they leave it open."""
+    if isinstance(sensor, PositionSensor):
+        heights = z[:, 2] if sensor.dim == 3 else np.zeros(len(z))
+        return np.stack([z[:, 0], z[:, 1], heights], axis=1)
+    elevation = z[:, 2] if sensor.dim >= 3 else np.zeros(len(z))
+    ground = z[:, 0] * np.cos(elevation)
+    along = [ground * np.cos(z[:, 1]), ground * np.sin(z[:, 1]), z[:, 0] * np.sin(elevation)]
+    return sensor.position + np.stack(along, axis=1)
+
+
+def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
+    """Give the measurements of a scene biases, for experiments and tests; those of clocks are not known here.
+
+    Parameters
+    ----------
+    scene : Scene
+    biases : sequence over sensors of mappings of component to value
+        range, azimuth, elevation, and x, y, z of the stated place; metres and radians.
+
+    Returns
+    -------
+    Scene
+    """
+    negative = [{name: -value for name, value in own.items()} for own in biases]
+    return _changed(scene, negative, scene.name)
+
+
+def without_biases(
+    scene: Scene, biases: Sequence[Mapping[str, float]], velocities: Sequence[Sequence[Array]] | None = None
+) -> Scene:
+    """Free the measurements of a scene of biases; see `with_biases`."""
+    return _changed(scene, biases, scene.name, velocities)
+
+
+def _changed(
+    scene: Scene, biases: Sequence[Mapping[str, float]], name: str, velocities: Sequence[Sequence[Array]] | None = None
+) -> Scene:
+    sensors = [corrected_sensor(sensor, own) for sensor, own in zip(scene.sensors, biases, strict=True)]
+    measurements = [
+        [
+            corrected_measurements(sensor, z, own, None if velocities is None else velocities[k][s])
+            for s, (sensor, z, own) in enumerate(zip(scene.sensors, scan, biases, strict=True))
+        ]
+        for k, scan in enumerate(scene.measurements)
+    ]
+    return replace(scene, sensors=sensors, measurements=measurements, name=name)

@@ -1,0 +1,59 @@
+"""Which biases the measurements tell of, and which they leave open, by the information matrix.
+
+References
+----------
+Y. Bar-Shalom, P. Willett, X. Tian, Tracking and Data Fusion, 2011, chapter 9 (registration); S. Blackman, R. Popoli,
+Design and Analysis of Modern Tracking Systems, 1999, section 10.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.registration.terms import Term, label_of
+from assoc.sensors import Sensor
+
+OPEN = 0.5
+"""A bias, or a sum of biases, counts as observed when its spread has shrunk to less than this share."""
+_SHARE = 0.2
+_MOST_NAMED = 4
+
+
+def observed_shares(information: Array, spreads: Array) -> Array:
+    """What is left of each bias's spread after the measurements, (n,): 1 is nothing learned, 0 is all."""
+    scaled = information * np.outer(spreads, spreads)
+    left: Array = np.sqrt(np.diagonal(np.linalg.inv(scaled + np.eye(len(spreads)))))
+    return left
+
+
+def open_directions(information: Array, spreads: Array) -> Array:
+    """Sums of biases that the measurements do not tell, (m, n) with rows of length one, in spreads of each bias."""
+    scaled = information * np.outer(spreads, spreads)
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    found: Array = vectors[:, 1.0 / np.sqrt(1.0 + np.maximum(values, 0.0)) > OPEN].T
+    if len(found) < 2:
+        return found
+    # any mixture of open sums is open too: those that name few biases say most
+    from scipy.linalg import qr
+
+    _, upper, order = qr(found, pivoting=True)
+    few = np.zeros_like(found)
+    few[:, order] = np.linalg.solve(upper[:, : len(found)], upper)
+    shortened: Array = few / np.linalg.norm(few, axis=1, keepdims=True)
+    return shortened
+
+
+def describe(direction: Array, terms: Sequence[Term], sensors: Sequence[Sensor]) -> str:
+    """Say in words which biases move together in a direction that nothing tells of."""
+    order = np.argsort(-np.abs(direction), kind="stable")
+    order = order[np.abs(direction[order]) > _SHARE]
+    first = np.sign(direction[order[0]])
+    parts = []
+    for number in order[:_MOST_NAMED]:
+        term, sign = terms[number], first * direction[number]
+        parts.append(f"{'+' if sign > 0 else '-'} {term.component} of {label_of(sensors, term.sensor)}")
+    text = " ".join(parts).removeprefix("+ ")
+    return text + (" ..." if len(order) > _MOST_NAMED else "")

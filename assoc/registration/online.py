@@ -1,0 +1,189 @@
+"""Registration scan by scan, with biases that drift: what a live tracker corrects its measurements by."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.registration.correction import corrected_measurements, own_biases
+from assoc.registration.estimation import Estimate, estimate
+from assoc.registration.looks import one_look
+from assoc.registration.pairing import Chosen, Looks, choose_tuples, widened
+from assoc.registration.parameters import RegistrationParameters
+from assoc.registration.register import make_problem
+from assoc.registration.result import is_significant
+from assoc.registration.terms import Term
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
+
+HOUR = 3600.0
+PREFIX = "registration_"
+_STATE = ("biases", "covariance", "information", "time", "scans", "kept_times", "kept_sizes", "kept_values")
+_MOST_KEPT = 32
+"""Scans that are kept at the beginning, and estimated together."""
+
+
+class OnlineRegistration:
+    """Biases that are estimated while measurements come in.
+
+    At first scans are kept, and estimated together after 1, 2, 4, 8, 16 and 32 of them, as
+    `assoc.registration.register` does. From then on, and between these, each scan is associated with the biases known
+    so far and corrects them, as a Kalman filter whose state are the biases; memory does not grow. Biases drift as a
+    random walk. Measurements are corrected only once a bias is significant.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    region : array_like (3, 2), optional
+        See `assoc.Scene`.
+    parameters : RegistrationParameters, optional
+        Clocks' biases cannot be found scan by scan and are refused; so are those of places, which correct the
+        sensors and not the measurements.
+    """
+
+    def __init__(
+        self, sensors: Sequence[Sensor], region: Array | None = None, parameters: RegistrationParameters | None = None
+    ) -> None:
+        self.parameters = parameters or RegistrationParameters()
+        for one in ("time", "position"):
+            if one in self.parameters.components:
+                raise InvalidInputError(f"components: {one!r} is not estimated online; register a recording for it")
+        empty = [[np.zeros((0, sensor.dim)) for sensor in sensors]]
+        place = Scene(sensors, np.zeros(1), empty, region)  # type: ignore[arg-type]
+        self._problem = make_problem(place, self.parameters)
+        n = len(self._problem.terms)
+        nothing = Chosen(np.zeros(0, dtype=np.int64), np.zeros((0, len(place.sensors)), dtype=np.int64))
+        self._now = Estimate(np.zeros(n), np.diag(self._problem.spreads**2), np.zeros((n, n)), nothing)
+        self._kept: tuple[Looks, ...] = ()
+        self._time: float | None = None
+        self._scans = 0
+
+    @property
+    def biases(self) -> Array:
+        """Biases now, (n,), in the order of `terms`; metres and radians."""
+        return self._now.biases
+
+    @property
+    def covariance(self) -> Array:
+        """Their covariance, (n, n)."""
+        return self._now.covariance
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What each bias is of."""
+        return self._problem.terms
+
+    @property
+    def significant(self) -> bool:
+        """Whether there is a bias at all, as `Registration.significant`."""
+        return is_significant(self.biases, self.covariance)
+
+    def correct(self, measurements: Sequence[Array]) -> list[Array]:
+        """Measurements without the biases known so far."""
+        if not self.significant:
+            return list(measurements)
+        terms, sensors = self._problem.terms, self._problem.sensors
+        return [
+            corrected_measurements(sensor, z, own_biases(terms, self.biases, s))
+            for s, (sensor, z) in enumerate(zip(sensors, measurements, strict=True))
+        ]
+
+    def after(self, time: float, measurements: Sequence[Array]) -> OnlineRegistration:
+        """What is known after one more scan; this object stays as it is.
+
+        Parameters
+        ----------
+        time : float
+            Seconds.
+        measurements : sequence over sensors of arrays (n_s, d_s)
+            As they came, with their biases.
+        """
+        later = copy.copy(self)
+        looks = one_look(Scan(self._scans, time, tuple(measurements)))
+        apart = 0.0 if self._time is None else max(time - self._time, 0.0)
+        drift = (self.parameters.drift * self._problem.spreads) ** 2 * apart / HOUR
+        later._now = replace(self._now, covariance=self._now.covariance + np.diag(drift))
+        later._time, later._scans = time, self._scans + 1
+        if later._scans > _MOST_KEPT:
+            later._now = later._corrected(looks)
+            return later
+        kept = (*self._kept, looks)
+        # together after 1, 2, 4, 8 ... scans
+        together = later._scans & (later._scans - 1) == 0
+        later._now = estimate(self._problem, kept) if together else later._corrected(looks)
+        later._kept = () if later._scans == _MOST_KEPT else kept
+        return later
+
+    def _corrected(self, looks: Looks) -> Estimate:
+        """The biases after one more scan: one step of a filter in information form."""
+        now, problem = self._now, self._problem
+        wide = widened(problem.scene([looks], now.biases), problem.terms, np.sqrt(np.diagonal(now.covariance)))
+        chosen = choose_tuples(wide, problem.parameters)
+        if not len(chosen):
+            return now
+        sums = problem.equations([looks], chosen, now.biases)
+        covariance = np.linalg.inv(np.linalg.inv(now.covariance) + sums.information)
+        covariance = 0.5 * (covariance + covariance.T)
+        found = now.biases + covariance @ sums.gradient
+        return Estimate(found, covariance, now.information + sums.information, chosen)
+
+    def arrays(self) -> dict[str, Array]:
+        """The state as arrays; `restored` reads it."""
+        sizes = [[len(z) for z in looks.measurements] for looks in self._kept]
+        values = [np.asarray(z).ravel() for looks in self._kept for z in looks.measurements]
+        state = {
+            "biases": self.biases,
+            "covariance": self.covariance,
+            "information": self._now.information,
+            "time": np.array(math.nan if self._time is None else self._time),
+            "scans": np.array(self._scans),
+            "kept_times": np.array([looks.time for looks in self._kept]),
+            "kept_sizes": np.array(sizes, dtype=np.int64).reshape(-1, len(self._problem.sensors)),
+            "kept_values": np.concatenate([np.zeros(0), *values]),
+        }
+        return {f"{PREFIX}{name}": value for name, value in state.items()}
+
+    def restored(self, arrays: Mapping[str, Array]) -> OnlineRegistration:
+        """Take over a state that `arrays` has given.
+
+        Raises
+        ------
+        InvalidInputError
+            The arrays are of no such state.
+        """
+        own = {name: arrays[f"{PREFIX}{name}"] for name in _STATE}
+        n, sensors = len(self._problem.terms), self._problem.sensors
+        shapes = {"biases": (n,), "covariance": (n, n), "information": (n, n), "time": (), "scans": ()}
+        shapes["kept_sizes"] = (len(own["kept_times"]), len(sensors))
+        for name, shape in shapes.items():
+            if own[name].shape != shape:
+                raise InvalidInputError(f"the field '{PREFIX}{name}' has shape {own[name].shape}, expected {shape}")
+        dims = np.array([sensor.dim for sensor in sensors])
+        numbers = [own[name] for name in ("biases", "covariance", "information", "kept_times", "kept_values")]
+        sizes, scans = own["kept_sizes"], int(own["scans"])
+        good = all(np.isfinite(value).all() for value in numbers) and not math.isinf(float(own["time"]))
+        good &= bool((sizes >= 0).all()) and int((sizes.astype(object) * dims).sum()) == own["kept_values"].size
+        good &= len(sizes) == (scans if scans < _MOST_KEPT else 0) and scans >= 0
+        good &= bool((np.linalg.eigvalsh(0.5 * (own["covariance"] + own["covariance"].T)) > 0).all()) if good else False
+        if not good:
+            raise InvalidInputError(f"the fields '{PREFIX}...' are no state of a registration")
+        later = copy.copy(self)
+        later._now = replace(
+            self._now, biases=own["biases"], covariance=own["covariance"], information=own["information"]
+        )
+        later._time = None if math.isnan(float(own["time"])) else float(own["time"])
+        later._scans = scans
+        blocks = np.split(own["kept_values"], np.cumsum((sizes * dims).ravel())[:-1]) if sizes.size else []
+        each = len(sensors)
+        later._kept = tuple(
+            one_look(Scan(k, time, tuple(blocks[k * each + s].reshape(-1, dims[s]) for s in range(each))))
+            for k, time in enumerate(own["kept_times"].tolist())
+        )
+        return later

@@ -1,0 +1,68 @@
+"""What registration may assume of the biases that it looks for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from assoc._parameters import Parameters
+from assoc.errors import InvalidInputError
+
+COMPONENTS = ("range", "azimuth", "elevation", "time", "position")
+"""Biases that can be asked for."""
+
+
+@dataclass(frozen=True)
+class RegistrationParameters(Parameters):
+    """Which biases are estimated, and how large they may be.
+
+    Spreads are the standard deviations of biases before anything was measured: biases of up to about two of them are
+    found. Wider ones find larger biases, and confuse targets that fly closer together.
+
+    Attributes
+    ----------
+    components : tuple of str
+        Of `COMPONENTS`; those that a sensor does not measure are passed over. "position" is an error of a sensor's
+        stated place; sensors that report positions are always estimated in x, y (and z).
+    reference : tuple of str
+        Names of sensors (where it has none: its number from 1) that are taken for free of bias.
+    range_spread, angle_spread, time_spread, position_spread : float
+        Metres, radians, seconds, metres.
+    drift : float
+        Of biases while time goes on, only online: their change in an hour, as a share of their spread.
+    max_tuples : int
+        Scans with more candidate tuples are passed over.
+    seed : int
+        Of the solver's randomness.
+    """
+
+    components: tuple[str, ...] = ("range", "azimuth", "elevation")
+    reference: tuple[str, ...] = ()
+    range_spread: float = 300.0
+    angle_spread: float = math.radians(0.3)
+    time_spread: float = 1.0
+    position_spread: float = 300.0
+    drift: float = 0.1
+    max_tuples: int = 200_000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("components", "reference"):
+            value = getattr(self, name)
+            if isinstance(value, str) or not all(isinstance(one, str) for one in value):
+                raise InvalidInputError(f"{name}: expected names, got {value!r}")
+            object.__setattr__(self, name, tuple(value))
+        for one in self.components:
+            if one not in COMPONENTS:
+                raise InvalidInputError(f"components: unknown {one!r}; known: {', '.join(COMPONENTS)}")
+        self._number("range_spread", "angle_spread", "time_spread", "position_spread", above=0.0)
+        self._number("drift", least=0.0)
+        self._whole("max_tuples")
+        self._whole("seed", least=0)
+
+    def spread(self, component: str) -> float:
+        """Standard deviation of the biases of a component: range, azimuth, elevation, time, x, y or z."""
+        named = {"range": self.range_spread, "time": self.time_spread}
+        if component in ("azimuth", "elevation"):
+            return self.angle_spread
+        return named.get(component, self.position_spread)

@@ -1,0 +1,211 @@
+"""What registration found: biases, how sure they are, which are open, and what they leave of the residuals."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._files.output import write_json
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.registration.correction import own_biases, without_biases
+from assoc.registration.observability import describe, observed_shares, open_directions
+from assoc.registration.terms import Term, label_of
+from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OBSERVED = 0.5
+"""A bias is observed when its standard deviation is below this share of its spread."""
+SIGNIFICANCE = 0.01
+"""Without biases measurements seem to have some with this probability."""
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What is left of the measurements of one sensor beside the positions of their tuples.
+
+    Attributes
+    ----------
+    time : array (n,)
+        Seconds.
+    before, after : arrays (n, d)
+        Metres and radians, with the measurements as they came, and without the biases.
+    """
+
+    time: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Registration:
+    """Biases of sensors: what a sensor states, less what is true.
+
+    Attributes
+    ----------
+    sensors : tuple of Sensor
+        As they were stated.
+    terms : tuple of Term
+        What each bias is of: number of the sensor, component.
+    biases : array (n,)
+        Metres, radians, seconds.
+    covariance : array (n, n)
+        Of the biases; it holds also where the noise is not what the sensors say.
+    spreads : array (n,)
+        Standard deviations assumed before.
+    information : array (n, n)
+        What the measurements alone tell.
+    tuples : int
+        Targets found in single scans by two or more sensors, all scans together.
+    skipped : int
+        Scans passed over because they had too many candidate tuples.
+    noise : float
+        Residuals after, as a multiple of what the sensors' noise makes expect.
+    residuals : tuple over sensors of Residuals
+    """
+
+    sensors: tuple[Sensor, ...]
+    terms: tuple[Term, ...]
+    biases: Array
+    covariance: Array
+    spreads: Array
+    information: Array
+    tuples: int
+    skipped: int
+    noise: float
+    residuals: tuple[Residuals, ...]
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the biases, (n,)."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @cached_property
+    def observed(self) -> Array:
+        """Which biases the measurements tell of, bool (n,)."""
+        return np.asarray(observed_shares(self.information, self.spreads) < OBSERVED)
+
+    @cached_property
+    def open(self) -> tuple[str, ...]:
+        """Sums of biases that the measurements leave open, in words."""
+        directions = open_directions(self.information, self.spreads)
+        return tuple(describe(one, self.terms, self.sensors) for one in directions)
+
+    @property
+    def significant(self) -> bool:
+        """Whether there is a bias at all: without any, chance says so with a probability of 0.01."""
+        return is_significant(self.biases, self.covariance)
+
+    def of(self, sensor: int) -> dict[str, float]:
+        """Biases of one sensor by component; metres, radians, seconds."""
+        if not 0 <= sensor < len(self.sensors):
+            raise InvalidInputError(f"sensor {sensor} does not exist, there are 0 to {len(self.sensors) - 1}")
+        return own_biases(self.terms, self.biases, sensor)
+
+    def correct(self, scene: Scene) -> Scene:
+        """Free a scene of the same sensors of the biases; where none is significant it stays as it is.
+
+        Raises
+        ------
+        InvalidInputError
+            It has other sensors.
+        """
+        if scene.sensors != self.sensors:
+            raise InvalidInputError("scene: its sensors are not those that were registered")
+        if not self.significant:
+            return scene
+        velocities = None
+        if any(term.component == "time" for term in self.terms):
+            from assoc.registration.looks import scene_velocities
+
+            velocities = scene_velocities(scene)
+        return without_biases(scene, [self.of(s) for s in range(len(self.sensors))], velocities)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table: sensor, component, unit, bias, sigma, observed; angles in degrees."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a dictionary for each bias, angles in degrees."""
+        values = zip(self.terms, self.biases.tolist(), self.deviations.tolist(), self.observed.tolist(), strict=True)
+        return [
+            {
+                "sensor": label_of(self.sensors, term.sensor),
+                "component": term.component,
+                "unit": term.shown_unit,
+                "bias": term.scale * bias,
+                "sigma": term.scale * sigma,
+                "observed": observed,
+            }
+            for term, bias, sigma, observed in values
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what a JSON file holds."""
+        scales = np.array([term.scale for term in self.terms])
+        return {
+            "format": "assoc.registration",
+            "version": 1,
+            "biases": self.rows(),
+            "covariance": (self.covariance * np.outer(scales, scales)).tolist(),
+            "open": list(self.open),
+            "significant": self.significant,
+            "tuples": self.tuples,
+            "scans_passed_over": self.skipped,
+            "noise": self.noise,
+        }
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write the biases as JSON; angles in degrees."""
+        write_json(path, self.to_dict())
+
+    def summary(self) -> str:
+        """Say in a few lines what was found."""
+        lines = [
+            f"{len(self.terms)} biases from {self.tuples} tuples; what is left of the residuals is {self.noise:.3g} "
+            "times what the sensors' noise says"
+        ]
+        if not self.tuples:
+            lines = ["no two sensors have a target in common: no bias can be observed"]
+        elif not self.significant:
+            lines.append("no bias is significant: measurements stay as they are")
+        lines += [f"not observable: {one}" for one in self.open] if self.tuples else []
+        if self.skipped:
+            lines.append(f"{self.skipped} scans had too many candidate tuples and were passed over")
+        if self.tuples and self.noise > 1.5:
+            lines.append(
+                "the residuals are larger than the noise: biases that were not asked for, or noise understated"
+            )
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"Registration({len(self.terms)} biases of {len(self.sensors)} sensors, {self.tuples} tuples)"
+
+
+def is_significant(biases: Array, covariance: Array) -> bool:
+    """Whether biases (n,) are larger together than chance makes them with probability `SIGNIFICANCE`."""
+    from scipy.special import gammaincc
+
+    square = float(biases @ np.linalg.solve(covariance, biases))
+    return float(gammaincc(len(biases) / 2.0, square / 2.0)) < SIGNIFICANCE
+
+
+def noise_factor(chi: Array, freedom: Array) -> float:
+    """Residuals as a multiple of what is expected: by the median, which outliers hardly move."""
+    good = freedom > 0
+    if not good.any():
+        return math.nan
+    from scipy.special import gammaincinv
+
+    middle = 2.0 * gammaincinv(freedom[good] / 2.0, 0.5)
+    return float(np.sqrt(np.median(chi[good] / middle)))

@@ -1,0 +1,113 @@
+"""The biases that are looked for, in the order in which vectors and matrices hold them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.registration.parameters import RegistrationParameters
+from assoc.sensors import BearingSensor, PositionSensor, Radar3D, Sensor
+from assoc.sensors.base import ANGLES
+from assoc.sensors.codes import CODES
+
+AXES = ("x", "y", "z")
+MEASURED, PLACE, TIME = 0, 1, 2
+"""Kinds of terms in kernels: of a component that is measured, of a place along an axis, of the clock."""
+
+
+class Term(NamedTuple):
+    """One bias: what a sensor states, less what is true."""
+
+    sensor: int
+    """Number of the sensor, from 0."""
+    component: str
+    """range, azimuth, elevation, time, or x, y, z."""
+
+    @property
+    def unit(self) -> str:
+        """m, rad or s."""
+        return "rad" if self.component in ANGLES else "s" if self.component == "time" else "m"
+
+    @property
+    def shown_unit(self) -> str:
+        """m, deg or s: what people read."""
+        return "deg" if self.component in ANGLES else self.unit
+
+    @property
+    def scale(self) -> float:
+        """What values are multiplied by to be shown."""
+        return math.degrees(1.0) if self.component in ANGLES else 1.0
+
+
+def label_of(sensors: Sequence[Sensor], number: int) -> str:
+    """Name of a sensor, or its number from 1."""
+    return sensors[number].name or f"sensor {number + 1}"
+
+
+def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) -> tuple[Term, ...]:
+    """List the biases of sensors that parameters ask for.
+
+    Raises
+    ------
+    InvalidInputError
+        A reference is no sensor, or nothing is left to estimate.
+    """
+    known = [{sensor.name, str(s + 1)} - {""} for s, sensor in enumerate(sensors)]
+    for one in parameters.reference:
+        if not any(one in names for names in known):
+            every = ", ".join(label_of(sensors, s) for s in range(len(sensors)))
+            raise InvalidInputError(f"reference: no sensor {one!r}; there are {every}")
+    terms = []
+    for s, sensor in enumerate(sensors):
+        if type(sensor) not in CODES:
+            raise InvalidInputError(f"sensor {s}: biases of a {type(sensor).__name__} are not known to registration")
+        if not known[s] & {*parameters.reference}:
+            terms += [Term(s, component) for component in _components(sensor, parameters.components)]
+    if not terms:
+        raise InvalidInputError("components: no sensor has a bias to estimate")
+    return tuple(terms)
+
+
+def _components(sensor: Sensor, wanted: Sequence[str]) -> list[str]:
+    if isinstance(sensor, PositionSensor):
+        found = list(AXES[: sensor.dim])
+    else:
+        found = [name for name in sensor.components[:3] if name in wanted]
+        if "position" in wanted:
+            found += AXES if isinstance(sensor, Radar3D) else AXES[:2]
+    # a bearing alone tells of no motion
+    if "time" in wanted and not isinstance(sensor, BearingSensor):
+        found.append("time")
+    return found
+
+
+class TermArrays(NamedTuple):
+    """Terms in the form that kernels take."""
+
+    sensor: Array
+    """int64 (n,)."""
+    kind: Array
+    """MEASURED, PLACE or TIME, int64 (n,)."""
+    entry: Array
+    """Component of the measurement, or axis, int64 (n,)."""
+
+
+def term_arrays(terms: Sequence[Term], sensors: Sequence[Sensor]) -> TermArrays:
+    """Terms as flat arrays."""
+    kind, index = [], []
+    for term in terms:
+        if term.component == "time":
+            kind.append(TIME)
+            index.append(0)
+        elif term.component in AXES:
+            kind.append(PLACE)
+            index.append(AXES.index(term.component))
+        else:
+            kind.append(MEASURED)
+            index.append(sensors[term.sensor].components.index(term.component))
+    return TermArrays(*(np.array(x, dtype=np.int64) for x in ([t.sensor for t in terms], kind, index)))

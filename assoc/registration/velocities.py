@@ -1,0 +1,116 @@
+"""Velocities of targets from one sensor's own measurements: three looks in a row that a straight line explains.
+
+A sensor's own bias moves all its plots alike, so that differences between them are nearly free of it. What fits into
+no line, or into several, has no velocity: false alarms are of this kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from assoc._types import Array
+from assoc.registration.correction import pointed_at
+from assoc.sensors import BearingSensor, Sensor
+
+FASTEST = 700.0
+"""Targets are taken to fly no faster, m/s."""
+_SIGMAS = 4.0
+_NEIGHBOURS = ((-1, 1), (-1, 2), (1, -2), (1, 2), (-1, -2), (2, -2))
+_ACCELERATION = 20.0
+"""And to change their speed by no more, m/s^2."""
+
+
+def look_velocities(sensor: Sensor, times: Sequence[Array], measurements: Sequence[Array]) -> list[Array]:
+    """Velocity of the target of each measurement of a sensor.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    times : sequence over looks of arrays (n,)
+        Seconds.
+    measurements : sequence over looks of arrays (n, d)
+
+    Returns
+    -------
+    list over looks of arrays (n, 3)
+        m/s, NaN where it is not known. Sensors that leave the height open tell of no vertical speed: it is 0.
+    """
+    unknown = [np.full((len(z), 3), np.nan) for z in measurements]
+    if isinstance(sensor, BearingSensor) or len(measurements) < 2:
+        return unknown
+    located = sensor.position_part
+    places = [pointed_at(located, np.asarray(z)[:, : located.dim]) for z in measurements]
+    sigma = _sigma(located, places)
+    found = unknown
+    for k in range(len(places)):
+        own = (places[k], times[k])
+        # looks before and after, nearer ones first: a target is now and then missed, and scenes have ends
+        for one, other in _NEIGHBOURS:
+            open_ones = np.isnan(found[k][:, 0])
+            if not open_ones.any():
+                break
+            near, far = k + one, k + other
+            if not (0 <= min(near, far) and max(near, far) < len(places)):
+                continue
+            fresh = np.full((len(places[k]), 3), np.nan)
+            _fill(fresh, own, (places[near], times[near]), (places[far], times[far]), sigma)
+            found[k][open_ones] = fresh[open_ones]
+    return found
+
+
+def _sigma(sensor: Sensor, places: Sequence[Array]) -> float:
+    """Standard deviation of a position along its worst axis, at the farthest usual distance, metres."""
+    every = np.concatenate(places)
+    if not len(every):
+        return 0.0
+    deviations = np.sqrt(np.diagonal(sensor.covariance))
+    if "range" not in sensor.components:
+        return float(deviations.max())
+    distance = float(np.percentile(np.linalg.norm(every - sensor.position, axis=1), 90))
+    return float(max(deviations[0], distance * deviations[1:].max()))
+
+
+def _fill(
+    velocity: Array, own: tuple[Array, Array], near: tuple[Array, Array], far: tuple[Array, Array], sigma: float
+) -> None:
+    """Write velocities at the looks `own` from those in `near` and `far` that lie on a line with them."""
+    if not (len(own[0]) and len(near[0]) and len(far[0])):
+        return
+    longest = float(max(np.abs(near[1].max() - own[1].min()), np.abs(own[1].max() - near[1].min())))
+    pairs = cKDTree(own[0]).sparse_distance_matrix(
+        cKDTree(near[0]), FASTEST * longest + _SIGMAS * sigma, output_type="ndarray"
+    )
+    i, j = pairs["i"], pairs["j"]
+    dt = near[1][j] - own[1][i]
+    good = (np.abs(dt) > 1e-6) & (pairs["v"] <= FASTEST * np.abs(dt) + _SIGMAS * sigma)
+    i, j, dt = i[good], j[good], dt[good]
+    if not len(i):
+        return
+    rate = (near[0][j] - own[0][i]) / dt[:, None]
+    # each look has nearly the same time as its neighbours far away: a first guess, then the time of the one found
+    there = own[0][i] + rate * (np.median(far[1]) - own[1][i])[:, None]
+    tree = cKDTree(far[0])
+    for _ in range(2):
+        m = np.asarray(tree.query(there)[1])
+        ahead = far[1][m] - own[1][i]
+        there = own[0][i] + rate * ahead[:, None]
+    apart = np.linalg.norm(far[0][m] - there, axis=1)
+    share = np.abs(ahead / dt)
+    allowed = _SIGMAS * sigma * np.sqrt(1.0 + share**2 + (1.0 + share) ** 2)
+    allowed += 0.5 * _ACCELERATION * np.abs(ahead * (ahead - dt))
+    good = (apart <= allowed) & (np.abs(ahead - dt) > 1e-6)
+    i, j, m, dt, apart = i[good], j[good], m[good], dt[good], apart[good]
+    # of several lines through a look the straightest, if it is much straighter than the next
+    order = np.lexsort((apart, i))
+    i, j, m, dt, apart = (x[order] for x in (i, j, m, dt, apart))
+    first = np.ones(len(i), dtype=np.bool_)
+    first[1:] = i[1:] != i[:-1]
+    rivalled = np.zeros(len(i), dtype=np.bool_)
+    rivalled[:-1] = first[:-1] & (i[1:] == i[:-1]) & (apart[1:] < 2.0 * apart[:-1] + sigma)
+    chosen = first & ~rivalled
+    i, j, m = i[chosen], j[chosen], m[chosen]
+    span = far[1][m] - near[1][j]
+    velocity[i] = (far[0][m] - near[0][j]) / np.where(np.abs(span) > 1e-6, span, np.nan)[:, None]

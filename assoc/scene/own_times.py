@@ -1,0 +1,75 @@
+"""Measurements with times of their own, and where a sensor looked in a scan: what is asked of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.sensors.base import finite_array
+
+FULL_TURN = 2.0 * math.pi
+# an antenna that takes exactly a scan for a turn may come out a rounding error above it
+_SLACK = 1e-9
+
+
+def checked_times(times: object, measurements: Sequence[Array], end: float, where: str) -> tuple[Array, ...]:
+    """Times of a scan's measurements, read-only arrays (n_s,), none of them after the scan's own time.
+
+    Parameters
+    ----------
+    times : sequence over sensors of array_like (n_s,)
+    measurements : sequence over sensors of arrays (n_s, d_s)
+    end : float
+        Time of the scan, seconds.
+    where : str
+        What messages begin with.
+
+    Raises
+    ------
+    InvalidInputError
+        The shape is another, a time is not finite, or lies after `end`.
+    """
+    count = len(measurements)
+    known = isinstance(times, (list, tuple)) or (isinstance(times, np.ndarray) and times.ndim > 0)
+    if not known or len(times) != count:  # type: ignore[arg-type]
+        raise InvalidInputError(f"{where} must be one array for each of {count} sensors")
+    result = []
+    for s, (one, z) in enumerate(zip(times, measurements, strict=True)):  # type: ignore[call-overload]
+        what = f"{where} of sensor {s}"
+        array = finite_array(np.zeros(0) if np.size(one) == 0 else one, what, (len(z),))
+        if len(array) and array.max() > end:
+            raise InvalidInputError(f"{what} must not be after the scan's time, {end:g} s, got {array.max():g}")
+        result.append(array)
+    return tuple(result)
+
+
+def checked_sectors(sectors: object, sensors: int, where: str) -> Array:
+    """The sectors that sensors looked at in a scan, read-only (S, 2).
+
+    Raises
+    ------
+    InvalidInputError
+        The shape is another, a number is not finite, or a sector is wider than a turn.
+    """
+    array = finite_array(sectors, where, (sensors, 2))
+    width = array[:, 1] - array[:, 0]
+    wrong = (width < 0) | (width > FULL_TURN * (1 + _SLACK))
+    if wrong.any():
+        s = int(np.argmax(wrong))
+        raise InvalidInputError(
+            f"{where}: that of sensor {s} must be from an azimuth to one 0 to 2 pi above it, got "
+            f"{array[s, 0]:g} to {array[s, 1]:g} rad"
+        )
+    return array
+
+
+def looked_at(sector: Array, azimuths: Array) -> Array:
+    """Which azimuths (n,), rad, lie in a sector (2,); none if it has no width."""
+    width = sector[1] - sector[0]
+    if width >= FULL_TURN * (1 - _SLACK):
+        return np.ones(len(azimuths), dtype=np.bool_)
+    return np.asarray((np.mod(azimuths - sector[0], FULL_TURN) <= width) & (width > 0.0))

@@ -1,0 +1,164 @@
+"""Biased radars: how exactly registration finds the biases, and what trackers gain by it.
+
+    python -m experiments.trackers.biases [FILE.csv] [--quick] [--seed N] [--json FILE] [--figure FILE]
+
+Three radars whose ranges and azimuths are off by up to 300 m and 0.3 degrees, each with signs of its own. First the
+errors of the biases found from about 1,000 plots, then GOSPA of the multi-sensor tracker over 60 scans: without biases,
+with them, with a scene that was registered, with registration online. On simulated flights, and on recorded
+trajectories (scenario from-tracks) if a file is given. No truth is used but to judge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc import simulation
+from assoc._types import Array
+from assoc.metrics import Trajectories, gospa_over_time
+from assoc.registration import register, with_biases
+from assoc.scene import Scene
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import on_circle, radar_over
+from assoc.tracking import TRACKERS
+from experiments.common.claims import Claim
+from experiments.common.command import make_parser, mean_interval, run
+from experiments.trackers.running import through
+
+SIZES = ((0.0, 0.0), (100.0, 0.1), (200.0, 0.2), (300.0, 0.3))
+"""Biases of range and azimuth, metres and degrees."""
+PLOTS, SCANS, SEEDS, CUTOFF = 1_000, 60, 10, 500.0
+RANGE_GOAL, AZIMUTH_GOAL, GOSPA_GOAL = 10.0, 0.01, 1.02
+AIRCRAFT, INTERVAL, REGION = 30, 4.0, np.array([[-75e3, 75e3], [-75e3, 75e3], [0.0, 12e3]])
+
+Simulate = Callable[[int], Scene]
+
+
+def flights(seed: int) -> Scene:
+    """Thirty aircraft in straight flight, seen by three radars of 50 m and 0.057 degrees."""
+    rng = np.random.default_rng(seed)
+    times = INTERVAL * np.arange(SCANS)
+    start = rng.uniform([-45e3, -45e3, 3e3], [45e3, 45e3, 11e3], (AIRCRAFT, 3))
+    heading, speed = rng.uniform(-np.pi, np.pi, AIRCRAFT), rng.uniform(120.0, 250.0, AIRCRAFT)
+    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(AIRCRAFT)], axis=1)
+    paths = start[None] + (times - times.mean())[:, None, None] * velocity[None]
+    sensors = [
+        radar_over(
+            REGION, place, range_noise=50.0, angle_noise=1e-3, detection_probability=0.9, false_alarm_rate=5.0,
+            name=f"radar {number}",
+        )
+        for number, place in enumerate(on_circle(np.zeros(3), 60e3, 3), start=1)
+    ]  # fmt: skip
+    return observe(sensors, times, [np.arange(AIRCRAFT)] * SCANS, list(paths), rng, region=REGION)
+
+
+def biased(scene: Scene, size: tuple[float, float], seed: int) -> tuple[Scene, Array]:
+    """The scene with biases of this size and random signs, and the biases (S, 2), metres and degrees."""
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (len(scene.sensors), 2))
+    wrong = signs * np.array(size)
+    return with_biases(scene, [{"range": one[0], "azimuth": np.radians(one[1])} for one in wrong]), wrong
+
+
+def first_plots(scene: Scene, count: int) -> Scene:
+    """The first scans that hold so many plots together."""
+    totals = np.cumsum([sum(len(z) for z in scan) for scan in scene.measurements])
+    scans = min(int(np.searchsorted(totals, count)) + 1, scene.num_scans)
+    return Scene(scene.sensors, scene.times[:scans], scene.measurements[:scans], scene.region)
+
+
+def errors(scene: Scene, wrong: Array) -> Array:
+    """Errors of the biases found in a scene, (S, 2), metres and degrees."""
+    found = register(scene)
+    own = [found.of(s) for s in range(len(scene.sensors))]
+    return np.array([[one["range"], np.degrees(one["azimuth"])] for one in own]) - wrong
+
+
+def gospa(scene: Scene, truth: Scene, registration: str | None = None) -> float:
+    """Mean GOSPA of the multi-sensor tracker, metres."""
+    done = through(TRACKERS["multi-sensor"].for_scene(scene, registration=registration), scene)
+    times, values = gospa_over_time(Trajectories.from_scene(truth), done.tracks, CUTOFF)
+    by_time = dict(zip(times.tolist(), values, strict=True))
+    return float(np.mean([by_time[t].distance if t in by_time else 0.0 for t in scene.times.tolist()]))
+
+
+def accuracy(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim]:
+    """Errors of the biases from about 1,000 plots."""
+    claims = []
+    for size in SIZES:
+        off = np.array([errors(first_plots(scene, PLOTS), wrong) for scene, wrong in _cases(simulate, size, seeds)])
+        for i, (name, unit, goal) in enumerate((("range", "m", RANGE_GOAL), ("azimuth", "deg", AZIMUTH_GOAL))):
+            each = np.sqrt((off[..., i] ** 2).mean(axis=1))
+            what = f"{label}, {size[0]:g} m, {size[1]:g} deg: RMS error of {name}"
+            claims.append(Claim(what, unit, goal, float(each.mean()), interval=mean_interval(each), band=(None, goal)))
+    return claims
+
+
+def _cases(simulate: Simulate, size: tuple[float, float], seeds: Sequence[int]) -> list[tuple[Scene, Array]]:
+    return [biased(simulate(seed), size, seed) for seed in seeds]
+
+
+def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> tuple[list[Claim], dict[str, list[float]]]:
+    """GOSPA with biases, registered before, and online, as multiples of that without biases."""
+    claims: list[Claim] = []
+    shown: dict[str, list[float]] = {"with biases": [], "registered": [], "online": []}
+    plain = np.array([gospa(scene, scene) for scene in map(simulate, seeds)])
+    claims.append(Claim(f"{label}, no biases: GOSPA", "m", ours=float(plain.mean()), interval=mean_interval(plain)))
+    for size in SIZES:
+        found: dict[str, list[float]] = {name: [] for name in shown}
+        for seed, (scene, _) in zip(seeds, _cases(simulate, size, seeds), strict=True):
+            truth = simulate(seed)
+            found["with biases"].append(gospa(scene, truth))
+            found["registered"].append(gospa(register(scene).correct(scene), truth))
+            found["online"].append(gospa(scene, truth, "online"))
+        for name, values in found.items():
+            ratio = np.array(values) / plain
+            shown[name].append(float(np.mean(values)))
+            what = f"{label}, {size[0]:g} m, {size[1]:g} deg, {name}: GOSPA / without biases"
+            band = None if name == "with biases" else (None, GOSPA_GOAL)
+            claims.append(Claim(what, "", ours=float(ratio.mean()), interval=mean_interval(ratio), band=band))
+    return claims, shown
+
+
+def experiment(file: str | None, quick: bool, seed: int) -> tuple[list[Claim], dict[str, dict[str, list[float]]]]:
+    """Simulated flights, and the file's."""
+    seeds = [seed + k for k in range(2 if quick else SEEDS)]
+    kinds: dict[str, Simulate] = {"simulated": flights}
+    if file is not None:
+        kinds["recorded"] = lambda one: simulation.simulate("from-tracks", one, file=file, scans=SCANS)
+    claims, shown = [], {}
+    for label, simulate in kinds.items():
+        claims += accuracy(label, simulate, seeds)
+        more, shown[label] = tracking(label, simulate, seeds)
+        claims += more
+    return claims, shown
+
+
+def draw(figure: Any, shown: dict[str, dict[str, list[float]]]) -> None:
+    """GOSPA over the size of the biases."""
+    for axes, (label, curves) in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown.items(), strict=True):
+        for (name, values), style in zip(curves.items(), ("o-", "s--", "^:"), strict=True):
+            axes.plot([size[0] for size in SIZES], values, style, label=name)
+        axes.set_title(label, fontsize=10, loc="left")
+        axes.set_xlabel("bias of range, m (of azimuth: deg / 1000)")
+        axes.set_ylabel("GOSPA, m")
+        axes.set_ylim(bottom=0)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8, frameon=False)
+
+
+NAME, TITLE = "trackers.biases", "Biased radars"
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    parser = make_parser(NAME, TITLE)
+    parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
+    chosen = parser.parse_args(arguments)
+    size = (5.5 if chosen.file is None else 11.0, 4.0)
+    return run(parser, chosen, NAME, TITLE, lambda quick, rng: experiment(chosen.file, quick, chosen.seed), draw, size)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

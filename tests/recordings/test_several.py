@@ -1,0 +1,54 @@
+"""Recordings of several radars as one scene: nothing lost, own times, and sectors that hold the plots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.recordings import radar_of, scene_of_radars
+from assoc.scene.own_times import looked_at
+from assoc.simulation import simulate_recording
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    exact = {"range_step": 0.0, "bearing_step": 0.0, "duration": 120.0, "aircraft": 6}
+    return [
+        simulate_recording("rotating-radar", seed, rotation=turn, **exact).recording
+        for seed, turn in ((1, 4.0), (2, 5.5))
+    ]
+
+
+def radars(recordings):
+    return [radar_of(one, range_noise=80.0, azimuth_noise=1e-3) for one in recordings]
+
+
+def test_every_plot_is_in_the_scene_at_its_time_and_in_the_sector(recordings):
+    scene = scene_of_radars(recordings, radars(recordings))
+    assert np.diff(scene.times) == pytest.approx(2.0, rel=0.01)
+    for s, (one, turn) in enumerate(zip(recordings, (4.0, 5.5), strict=True)):
+        times = np.concatenate([scan[s] for scan in scene.measurement_times])
+        np.testing.assert_array_equal(times, one.times)
+        np.testing.assert_array_equal(np.concatenate([scan[s] for scan in scene.measurements]), one.measurements)
+        inside = total = 0
+        for k in range(scene.num_scans):
+            wide = scene.sectors[k, s] + [-0.05, 0.05]
+            inside += int(looked_at(wide, scene.measurements[k][s][:, 1]).sum())
+            total += len(scene.measurements[k][s])
+        assert inside > 0.98 * total
+        widths = scene.sectors[5:-5, s, 1] - scene.sectors[5:-5, s, 0]
+        np.testing.assert_allclose(widths, 2 * np.pi * 2.0 / turn, rtol=0.01)
+
+
+def test_what_is_refused(recordings):
+    one, radar = recordings[0], radars(recordings)[0]
+    for arguments, options, words in [
+        (([], []), {}, "recordings: expected at least one"),
+        (([one], [radar, radar]), {}, "recordings: expected at least one"),
+        (([one], [radar]), {"rotations": [4.0, 5.0]}, "rotations: expected one for each"),
+        (([one], [radar]), {"rotations": [4.0], "interval": 5.0}, "interval: expected at most the shortest turn"),
+        (([one], [radar]), {"rotations": [4.0], "interval": 1e-9}, "makes more than"),
+    ]:
+        with pytest.raises(InvalidInputError, match=words):
+            scene_of_radars(*arguments, **options)

@@ -1,0 +1,104 @@
+"""Online: the biases of a whole recording, drift followed, trackers corrected, saved and restored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.registration import OnlineRegistration, RegistrationParameters, register, with_biases
+from assoc.tracking import MultiSensorTracker
+from tests.registration.common import BIASES, REGION, biased_scene, radars, scene_of
+
+
+def went_through(online, scene):
+    for time, scan in zip(scene.times, scene.measurements, strict=True):
+        online = online.after(float(time), scan)
+    return online
+
+
+def test_as_good_as_all_at_once():
+    scene = biased_scene(scans=40)
+    online = went_through(OnlineRegistration(scene.sensors, REGION, RegistrationParameters(drift=0.0)), scene)
+    at_once = register(scene)
+    assert (np.abs(online.biases - at_once.biases) < 1.5 * at_once.deviations).all()
+    np.testing.assert_allclose(np.sqrt(np.diag(online.covariance)), at_once.deviations, rtol=0.3)
+
+
+def test_what_it_knew_stays_as_it_was():
+    scene = biased_scene(scans=3)
+    before = OnlineRegistration(scene.sensors, REGION)
+    went_through(before, scene)
+    assert (before.biases == 0).all() and not before.significant
+    z = scene.measurements[0]
+    assert all(a is b for a, b in zip(before.correct(z), z, strict=True))
+
+
+def test_drift_is_followed():
+    """Range of one radar, 0 to 150 m in 100 scans of 36 s: the last scans' biases, not the mean of all."""
+    plain = scene_of(radars(), 2, 100)
+    online = OnlineRegistration(plain.sensors, REGION, RegistrationParameters(drift=0.5))
+    for k in range(100):
+        one = with_biases(plain, [{"range": 1.5 * k}, {}, {}])
+        online = online.after(36.0 * k, one.measurements[k])
+    assert online.biases[0] == pytest.approx(150.0, abs=25.0)
+    assert online._kept == ()
+
+
+@pytest.mark.parametrize("saved_after", [3, 40])
+def test_tracker_saved_and_restored(tmp_path, saved_after):
+    scene = biased_scene(scans=saved_after + 3)
+    one = MultiSensorTracker.for_scene(scene, registration="online")
+    for k in range(saved_after):
+        one.step(scene.times[k], scene.measurements[k])
+    one.save(tmp_path / "tracker.npz")
+    other = MultiSensorTracker.for_scene(scene, registration="online")
+    other.restore(tmp_path / "tracker.npz")
+    for k in range(saved_after, saved_after + 3):
+        one.step(scene.times[k], scene.measurements[k])
+        other.step(scene.times[k], scene.measurements[k])
+    assert np.array_equal(one.registration.biases, other.registration.biases)
+    assert all(np.array_equal(a.mean, b.mean) for a, b in zip(one.tracks, other.tracks, strict=True))
+    with pytest.raises(InvalidInputError, match="other settings"):
+        MultiSensorTracker.for_scene(scene).restore(tmp_path / "tracker.npz")
+    with np.load(tmp_path / "tracker.npz") as file:
+        arrays = dict(file)
+    arrays["registration_kept_sizes"] = arrays["registration_kept_sizes"] - 1
+    arrays["registration_covariance"] = -arrays["registration_covariance"]
+    np.savez(tmp_path / "spoiled.npz", **arrays)
+    with pytest.raises(InvalidInputError, match="registration"):
+        other.restore(tmp_path / "spoiled.npz")
+
+
+def test_tracker_with_biases_tracks_as_without():
+    plain = scene_of(radars(), 4, 25)
+    wrong = with_biases(plain, BIASES)
+    counts = {}
+    for name, scene, how in (("plain", plain, None), ("wrong", wrong, None), ("online", wrong, "online")):
+        tracker = MultiSensorTracker.for_scene(scene, registration=how)
+        for k in range(25):
+            tracker.step(scene.times[k], scene.measurements[k])
+        truth = plain.scan(24).truth_positions
+        confirmed = np.array([track.position for track in tracker.tracks if track.confirmed])
+        apart = np.linalg.norm(truth[:, None] - confirmed[None], axis=2).min(axis=1)
+        counts[name] = (len(confirmed), np.median(apart))
+    assert counts["online"][1] < 1.3 * counts["plain"][1] < counts["wrong"][1]
+    assert abs(counts["online"][0] - counts["plain"][0]) <= 1
+
+
+def test_a_refused_scan_changes_nothing():
+    scene = biased_scene(scans=4)
+    tracker = MultiSensorTracker.for_scene(scene, registration="online")
+    tracker.step(scene.times[0], scene.measurements[0])
+    before = tracker.registration
+    with pytest.raises(InvalidInputError):
+        tracker.step(scene.times[1], [z[:, :2] for z in scene.measurements[1]])
+    assert tracker.registration is before
+
+
+def test_bad_input():
+    scene = biased_scene(scans=2)
+    with pytest.raises(InvalidInputError, match="registration: expected 'online'"):
+        MultiSensorTracker.for_scene(scene, registration="batch")
+    with pytest.raises(InvalidInputError, match="'time' is not estimated online"):
+        OnlineRegistration(scene.sensors, REGION, RegistrationParameters(components=("time",)))

@@ -1,0 +1,295 @@
+"""Registration against biases that were put in, against scipy's least squares, and where nothing can be known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from assoc import Scene, build_problem
+from assoc.errors import InvalidInputError
+from assoc.registration import RegistrationParameters, register, with_biases
+from assoc.registration.correction import corrected_measurements
+from assoc.sensors import BearingSensor, PositionSensor, Radar2D
+from assoc.simulation import simulate
+from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
+
+
+def truth_of(found, biases):
+    return np.array([biases[term.sensor].get(term.component, 0.0) for term in found.terms])
+
+
+@pytest.fixture(scope="module")
+def found():
+    return register(biased_scene())
+
+
+def test_large_biases_are_found_within_what_it_says(found):
+    off = found.biases - truth_of(found, BIASES)
+    assert (np.abs(off) < 4.5 * found.deviations).all()
+    in_range = [term.component == "range" for term in found.terms]
+    assert np.abs(off[in_range]).max() < 25.0 and np.degrees(np.abs(off[np.logical_not(in_range)]).max()) < 0.03
+    assert found.observed.all() and found.open == () and found.significant
+    assert 0.9 < found.noise < 1.1
+
+
+def test_residuals_before_and_after(found):
+    for s, sensor in enumerate(found.sensors):
+        own = found.residuals[s]
+        assert len(own.time) == len(own.before) == len(own.after) > 100
+        # fitted residuals are smaller than the noise; those before show the bias
+        assert (own.after.std(axis=0) < np.sqrt(np.diagonal(sensor.covariance))).all()
+        assert np.abs(own.before[:, 0].mean()) > 3.0 * np.abs(own.after[:, 0].mean()) + 5.0
+
+
+def test_errors_agree_with_the_covariance():
+    """Normalised squared errors over seeds: their mean is 1, and 99 % of such means lie in this interval."""
+    squares, n = [], 0
+    for seed in range(8):
+        result = register(biased_scene(seed, 8))
+        off = result.biases - truth_of(result, BIASES)
+        squares.append(off @ np.linalg.solve(result.covariance, off))
+        n = len(off)
+    from scipy.stats import chi2
+
+    assert chi2.ppf(0.005, 8 * n) < sum(squares) < chi2.ppf(0.995, 8 * n)
+
+
+def test_estimate_is_the_least_squares_solution():
+    """All positions and biases at once by scipy, true tuples, no false alarms, against positions eliminated."""
+    scene = with_biases(scene_of(radars(false_alarms=1e-9), 3, 3, aircraft=6), BIASES)
+    ours = register(scene)
+    tuples = [(k, row) for k in range(3) for row in scene.scan(k).true_tuples()]
+    assert ours.tuples == len(tuples)
+    starts = [scene.scan(k).truth_positions for k in range(3)]
+    x0 = np.concatenate([np.zeros(9)] + [starts[k][_target(scene, k, row)] for k, row in tuples])
+    scale = np.array([sensor_scale(s, c) for s in range(3) for c in range(3)])
+
+    def cost(x):
+        biases, rest = x[:9].reshape(3, 3), x[9:].reshape(-1, 3)
+        parts = [x[:9] / scale]
+        for (k, row), place in zip(tuples, rest, strict=True):
+            for s in np.flatnonzero(row):
+                sensor = scene.sensors[s]
+                z = scene.measurements[k][s][row[s] - 1] - biases[s]
+                parts.append(
+                    sensor.residual(z[None], sensor.measure(place[None]))[0] / np.sqrt(np.diag(sensor.covariance))
+                )
+        return np.concatenate(parts)
+
+    sizes = np.concatenate([np.tile([100.0, 1e-3, 1e-3], 3), np.full(len(x0) - 9, 100.0)])
+    best = least_squares(cost, x0, x_scale=sizes, xtol=1e-12, ftol=1e-12)
+    # beyond the 95 % of tuples that count fully we count less: a fraction of a standard deviation
+    assert (np.abs(ours.biases - best.x[:9]) < 0.35 * ours.deviations).all()
+    covariance = np.linalg.inv(best.jac.T @ best.jac)[:9, :9]
+    np.testing.assert_allclose(ours.deviations, np.sqrt(np.diag(covariance)), rtol=0.5)
+
+
+def sensor_scale(s, c):
+    return (300.0, np.radians(0.3), np.radians(0.3))[c]
+
+
+def _target(scene, k, row):
+    s = int(np.flatnonzero(row)[0])
+    return int(scene.truth.sources[k][s][row[s] - 1])
+
+
+def test_unbiased_scenes_stay_as_they_are():
+    scene = scene_of(radars(), 5)
+    result = register(scene)
+    assert not result.significant and result.correct(scene) is scene
+    assert "stay as they are" in result.summary()
+
+
+def test_registered_scene_is_the_unbiased_one(found):
+    scene = biased_scene()
+    after, plain = found.correct(scene), scene_of(radars())
+    for z, y in zip(after.measurements[2], plain.measurements[2], strict=True):
+        np.testing.assert_allclose(z[:, 0], y[:, 0], atol=25.0)
+        np.testing.assert_allclose(z[:, 1:], y[:, 1:], atol=np.radians(0.03))
+    assert after.truth is scene.truth and after.sensors == scene.sensors
+    with pytest.raises(InvalidInputError, match="sensors"):
+        found.correct(scene_of(radars(2)))
+
+
+def test_two_radars_at_one_place():
+    place = np.array([-60e3, 0.0, 0.0])
+    result = register(scene_of(radars(places=[place, place]), 1, 10))
+    assert not result.observed.any() and not result.significant
+    assert sorted(result.open) == sorted(
+        f"{component} of radar {one} + {component} of radar {3 - one}"
+        for component, one in zip(("range", "azimuth", "elevation"), _leads(result), strict=True)
+    )
+    # differences are known well
+    for i in range(3):
+        both = np.zeros(6)
+        both[i], both[i + 3] = 1.0, -1.0
+        assert np.sqrt(both @ result.covariance @ both) < 0.1 * result.spreads[i]
+
+
+def _leads(result):
+    """Which radar each line names first: either is right."""
+    first = {line.split()[0]: int(line.split()[3]) for line in result.open}
+    return [first[component] for component in ("range", "azimuth", "elevation")]
+
+
+def test_a_radar_alone():
+    result = register(scene_of(radars(1), 1, 5))
+    assert result.tuples == 0 and not result.observed.any() and not result.significant
+    assert (result.biases == 0).all() and "no bias can be observed" in result.summary()
+
+
+def test_clocks_only_by_their_differences():
+    clocks = (0.5, -0.7, 0.2)
+    scene = late_scene(radars(), clocks, scans=20)
+    result = register(scene, components=("range", "azimuth", "elevation", "time"))
+    own = np.array([result.of(s)["time"] for s in range(3)])
+    np.testing.assert_allclose(own - own.mean(), np.array(clocks) - np.mean(clocks), atol=0.06)
+    assert len(result.open) == 1 and result.open[0].count("time of") == 3
+    again = register(result.correct(scene), components=("range", "azimuth", "elevation", "time"))
+    left = np.array([again.of(s)["time"] for s in range(3)])
+    assert np.abs(left - left.mean()).max() < 0.1
+
+
+def test_clocks_with_a_reference():
+    scene = late_scene(radars(), (0.0, -0.7, 0.2), scans=20)
+    result = register(scene, components=("time",), reference=("radar 1",))
+    assert result.open == () and result.of(0) == {}
+    assert result.of(1)["time"] == pytest.approx(-0.7, abs=0.06)
+
+
+def test_places_need_a_reference():
+    wrong = [{}, {"x": 200.0, "y": -150.0, "z": 80.0}, {"range": 100.0}]
+    scene = with_biases(scene_of(radars(), 2, 20), wrong)
+    result = register(scene, components=("range", "azimuth", "position"), reference=("1",))
+    assert result.observed.all()
+    off = result.biases - truth_of(result, wrong)
+    assert (np.abs(off) < 4.5 * result.deviations).all()
+    moved = result.correct(scene).sensors[1].position
+    np.testing.assert_allclose(moved, scene_of(radars(), 2, 2).sensors[1].position, atol=120.0)
+    free = register(scene, components=("range", "azimuth", "position"))
+    named = " ".join(free.open)
+    assert all(f"{axis} of radar" in named for axis in "xyz")
+
+
+def test_sensors_that_report_positions():
+    view = np.array(REGION, dtype=float)
+    sensors = [
+        PositionSensor(position=np.zeros(3), noise=np.full(3, 60.0), field_of_view=view, name=name) for name in "ab"
+    ]
+    scene = with_biases(scene_of(sensors, 4), [{}, {"x": 200.0, "y": -100.0, "z": 50.0}])
+    result = register(scene, reference=("a",))
+    np.testing.assert_allclose(result.biases, [200.0, -100.0, 50.0], atol=4.0 * 60.0 * np.sqrt(2.0 / 200))
+
+
+def test_range_and_azimuth_without_heights():
+    flat = [
+        Radar2D(
+            position=one.position, noise=np.array([50.0, 1e-3]), field_of_view=one.field_of_view[:2],
+            false_alarm_rate=2.0, name=one.name,
+        )
+        for one in radars()
+    ]  # fmt: skip
+    wrong = [{"range": 100.0, "azimuth": np.radians(0.1)}, {"azimuth": np.radians(-0.15)}, {"range": -100.0}]
+    scene = with_biases(scene_of(flat, 6, 30), wrong)
+    result = register(scene, range_spread=100.0, angle_spread=np.radians(0.15))
+    off = (result.biases - truth_of(result, wrong)).reshape(3, 2)
+    assert np.degrees(np.abs(off[:, 1]).max()) < 0.03 and np.abs(off[:, 0]).max() < 60.0
+
+
+def test_bearings_beside_radars():
+    sensors = radars(2) + [
+        BearingSensor(
+            position=[0.0, -60e3, 0.0], noise=np.array([2e-3]), false_alarm_rate=2.0,
+            field_of_view=np.array([[0.0, np.pi]]), name="bearings",
+        )
+    ]  # fmt: skip
+    wrong = [{"range": 100.0}, {"azimuth": np.radians(0.1)}, {"azimuth": np.radians(-0.3)}]
+    result = register(with_biases(scene_of(sensors, 7, 20), wrong))
+    assert np.degrees(result.of(2)["azimuth"]) == pytest.approx(-0.3, abs=0.05)
+
+
+def test_measurements_with_times_of_their_own():
+    """Antennas that turn in 4, 5 and 5.5 s: looks are moved to one time by their targets' motion."""
+    scene = with_biases(simulate("rotating-radars", 1, duration=80.0), BIASES)
+    result = register(scene)
+    off = result.biases - truth_of(result, BIASES)
+    assert (np.abs(off) < 4.5 * result.deviations).all() and result.deviations[0] < 8.0
+    assert result.noise < 1.2
+
+
+def test_false_alarms_do_not_disturb():
+    scene = with_biases(scene_of(radars(false_alarms=150.0), 8), BIASES)
+    result = register(scene)
+    assert (np.abs(result.biases - truth_of(result, BIASES)) < 4.5 * result.deviations).all()
+
+
+def test_pairs_of_the_wrong_targets_count_little():
+    """A third of the targets seen by the third radar 900 m off, too far for noise: the others decide."""
+    scene = scene_of(radars(), 9, 20)
+    measurements = [list(scan) for scan in scene.measurements]
+    for k, scan in enumerate(measurements):
+        away = scene.truth.sources[k][2] % 3 == 0
+        z = np.array(scan[2])
+        z[away, 0] += 900.0
+        scan[2] = z
+    result = register(Scene(scene.sensors, scene.times, measurements, REGION))
+    assert np.abs([result.of(s)["range"] for s in range(3)]).max() < 40.0
+
+
+def test_bad_input():
+    scene = scene_of(radars(2), 1, 2)
+    for values, match in (
+        ({"components": "range"}, "components"),
+        ({"components": ("height",)}, "components: unknown 'height'"),
+        ({"components": ("time",), "reference": ("1", "2")}, "no sensor has a bias"),
+        ({"reference": ("nobody",)}, "reference: no sensor 'nobody'; there are radar 1, radar 2"),
+        ({"range_spread": 0.0}, "range_spread"),
+        ({"angle_spread": float("nan")}, "angle_spread"),
+        ({"drift": -1.0}, "drift"),
+        ({"size": 1.0}, "size"),
+    ):
+        with pytest.raises(InvalidInputError, match=match):
+            register(scene, **values)
+    with pytest.raises(InvalidInputError, match="Scene"):
+        register("scene.npz")
+    with pytest.raises(InvalidInputError, match="sensor 7"):
+        register(scene).of(7)
+    assert RegistrationParameters(components=["range"]).components == ("range",)
+
+
+def test_scans_with_too_many_tuples_are_passed_over():
+    scene = scene_of(radars(), 1, 4)
+    count = build_problem(scene, 0).num_tuples
+    result = register(scene, max_tuples=count // 4)
+    assert result.skipped > 0 and "passed over" in result.summary()
+
+
+def test_correction_undoes_itself():
+    scene = scene_of(radars(), 1, 2)
+    there = with_biases(scene, BIASES)
+    back = with_biases(there, [{name: -value for name, value in own.items()} for own in BIASES])
+    for z, y in zip(back.measurements[0], scene.measurements[0], strict=True):
+        np.testing.assert_allclose(z, y, atol=1e-9)
+    _, where, velocity = paths(1, 2)
+    sensor = scene.sensors[0]
+    moved = corrected_measurements(sensor, sensor.measure(where[0] - 0.5 * velocity), {"time": 0.5}, velocity)
+    np.testing.assert_allclose(moved, sensor.measure(where[0]), rtol=1e-9)
+
+
+def test_files(found, tmp_path):
+    found.to_json(tmp_path / "biases.json")
+    content = json.loads((tmp_path / "biases.json").read_text())
+    assert content["format"] == "assoc.registration" and len(content["biases"]) == 9
+    first = content["biases"][1]
+    assert first["component"] == "azimuth" and first["unit"] == "deg" and first["bias"] == pytest.approx(-0.3, abs=0.03)
+    assert np.sqrt(content["covariance"][1][1]) == pytest.approx(first["sigma"])
+    frame = found.to_frame()
+    assert list(frame.columns) == ["sensor", "component", "unit", "bias", "sigma", "observed"]
+
+
+def test_same_seed_same_biases():
+    scene = biased_scene(scans=6)
+    assert np.array_equal(register(scene).biases, register(scene).biases)

@@ -1,0 +1,117 @@
+"""Late measurements: the tracks are those of a tracker that got everything in order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.simulation import simulate
+from assoc.tracking import TRACKERS, LatePlots
+
+KINDS = ["multi-sensor", "mht", "nearest-neighbour"]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return simulate("rotating-radars", 2, aircraft=4, duration=40.0, false_alarms=2.0)
+
+
+def arrivals(scene, delay):
+    """Measurements and their times, by the scan in which they arrive; `delay` gives seconds for each (K, S) block."""
+    count = len(scene.sensors)
+    found = [([[] for _ in range(count)], [[] for _ in range(count)]) for _ in range(scene.num_scans)]
+    for k in range(scene.num_scans):
+        for s in range(count):
+            for z, t in zip(scene.measurements[k][s], scene.measurement_times[k][s], strict=True):
+                at = min(int(np.searchsorted(scene.times, t + delay(k, s))), scene.num_scans - 1)
+                found[at][0][s].append(z)
+                found[at][1][s].append(t)
+    return [
+        ([np.reshape(z, (-1, one.dim)) for z, one in zip(rows, scene.sensors, strict=True)], list(map(np.array, times)))
+        for rows, times in found
+    ]
+
+
+def states(tracks):
+    return {track.track_id: track.mean for track in tracks if track.confirmed}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tracks_are_those_of_measurements_in_order(scene, kind):
+    rng = np.random.default_rng(0)
+    plain, late = TRACKERS[kind].for_scene(scene), LatePlots(TRACKERS[kind].for_scene(scene))
+    known = {}
+    blocks = rng.uniform(0.0, 25.0, (scene.num_scans, 3)) * (rng.random((scene.num_scans, 3)) < 0.3)
+    for k, (z, times) in enumerate(arrivals(scene, lambda k, s: blocks[k, s])):
+        scan = scene.scan(k)
+        plain.step(scan.time, scan.measurements, scan.times, scan.sectors)
+        step = late.step(scan.time, z, times, scan.sectors)
+        assert [len(one) for one in step.assigned] == [len(one) for one in z]
+        assert step.late == sum(int((t < scan.time - 2.0).sum()) for t in times)
+        # an id stays with its target
+        for i, mean in states(late.tracks).items():
+            assert i not in known or np.linalg.norm(known[i][:2] - mean[:2]) < 1_500.0
+            known[i] = mean
+    assert late.late > 20 and late.refused == 0
+    expected, found = states(plain.tracks), states(late.tracks)
+    assert len(found) == len(expected) == 4
+    for mean in expected.values():
+        assert min(np.abs(mean - other).max() for other in found.values()) < 1e-6
+    # a past scan is revised too
+    earlier = late.past_tracks(-4)
+    assert earlier[0].time == late.scans[-4] == scene.times[-4]
+    assert late.time == scene.times[-1]
+    assert states(late.tracks).keys() == found.keys()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_late_measurements_nothing_changes(scene, kind):
+    plain, wrapped = TRACKERS[kind].for_scene(scene), LatePlots(TRACKERS[kind].for_scene(scene))
+    final = []
+    for k in range(10):
+        scan = scene.scan(k)
+        given = scan.time, scan.measurements, scan.times, scan.sectors
+        plain.step(*given)
+        final += wrapped.step(*given).final
+    mine, theirs = sorted(states(plain.tracks).values(), key=list), sorted(states(wrapped.tracks).values(), key=list)
+    np.testing.assert_array_equal(mine, theirs)
+    final += wrapped.flush()
+    assert [one.scan for one in final] == list(range(10))
+
+
+def test_what_is_too_old_is_refused_and_counted(scene):
+    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), horizon=6.0)
+    for k in range(10):
+        scan = scene.scan(k)
+        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    before = states(late.tracks)
+    one = scene.measurements[0][0][:1]
+    nothing = [np.zeros((0, 3))] * 2
+    step = late.step(21.0, [one, *nothing], [np.array([11.9]), *[np.zeros(0)] * 2], np.zeros((3, 2)))
+    assert (step.late, step.refused, late.refused) == (0, 1, 1)
+    assert step.assigned[0].tolist() == [0]
+    assert states(late.tracks).keys() == before.keys()
+    step = late.step(22.0, [one, *nothing], [np.array([20.5]), *[np.zeros(0)] * 2], np.zeros((3, 2)))
+    assert (step.late, step.refused, late.refused) == (1, 0, 1)
+
+
+def test_a_step_that_fails_leaves_all_as_it_was(scene):
+    late = LatePlots(TRACKERS["multi-sensor"].for_scene(scene, max_tuples=200))
+    for k in range(6):
+        scan = scene.scan(k)
+        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+    before, scans = states(late.tracks), late.scans
+    many = np.repeat(scene.measurements[0][0][:1], 300, axis=0)
+    nothing = [np.zeros((0, 3))] * 2
+    with pytest.raises(LimitExceededError):
+        late.step(14.0, [many, *nothing], [np.full(300, 5.0), *[np.zeros(0)] * 2], np.zeros((3, 2)))
+    assert late.scans == scans and late.late == 0
+    assert {i: m.tolist() for i, m in states(late.tracks).items()} == {i: m.tolist() for i, m in before.items()}
+    for times in ([np.full(300, 15.0)], [np.zeros(3)]):
+        with pytest.raises(InvalidInputError, match="times"):
+            late.step(14.0, [many, *nothing], [*times, *[np.zeros(0)] * 2])
+    with pytest.raises(InvalidInputError, match="scan must be a number"):
+        late.past_tracks(99)
+    with pytest.raises(InvalidInputError, match="tracker must be"):
+        LatePlots(None)

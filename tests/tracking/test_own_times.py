@@ -1,0 +1,214 @@
+"""Measurements with times of their own, against a plain Kalman filter, an enumeration and simultaneous scans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from assoc.errors import InvalidInputError
+from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.sensors import BearingSensor, PositionSensor, Radar3D
+from assoc.simulation import simulate
+from assoc.tracking import TRACKERS, Initiation, LifeCycle, track_scene
+from experiments.trackers.oracle import OracleTracker
+from tests.tracking import plain
+
+KINDS = ["multi-sensor", "static", "mht", "nearest-neighbour"]
+SENSORS = [plain.sensor(0.8, 1e-3, 10.0), plain.sensor(0.9, 1e-3, 15.0), plain.sensor(0.7, 1e-3, 5.0)]
+PLACE, VELOCITY = np.array([500.0, 500.0, 250.0]), np.array([20.0, -10.0, 5.0])
+
+
+def make(kind, sensors=SENSORS, **options):
+    options = {
+        "life_cycle": LifeCycle(missed_probability=1e-9),
+        "initiation": Initiation(speed=plain.SPEED, birth_rate=plain.BIRTH, widest=1.0),
+        "gate_probability": 1 - 1e-9,
+        **options,
+    }
+    return TRACKERS[kind](sensors, KalmanFilter(ConstantVelocity(plain.Q_SIGMA, kind="continuous")), **options)
+
+
+def at(t):
+    return PLACE + t * VELOCITY
+
+
+def scans(rng, count):
+    """One measurement of each sensor in each second, in an order of its own."""
+    made = []
+    for k in range(count):
+        times = k + rng.uniform(0.0, 1.0, 3)
+        made.append((k + 1.0, [rng.normal(at(t), s.noise)[None] for t, s in zip(times, SENSORS, strict=True)], times))
+    return made
+
+
+def in_order(made):
+    """A plain filter over all measurements by their times; state and covariance at the last scan's end."""
+    flat = sorted((t, s, z[s][0]) for _, z, times in made for s, t in enumerate(times))
+    mean, cov = plain.start(flat[0][2], SENSORS[flat[0][1]].covariance)
+    when = flat[0][0]
+    for t, s, z in flat[1:]:
+        mean, cov, _ = plain.correct(*plain.predict(mean, cov, t - when), z, SENSORS[s].covariance)
+        when = t
+    return plain.predict(mean, cov, made[-1][0] - when)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_track_is_filtered_in_the_order_of_times_whatever_the_order_of_sensors(kind, seed):
+    made = scans(np.random.default_rng(seed), 4)
+    tracker = make(kind)
+    for end, z, times in made:
+        step = tracker.step(end, z, [np.array([t]) for t in times])
+    mean, cov = in_order(made)
+    (track,) = [track for track in tracker.tracks if track.confirmed]
+    np.testing.assert_allclose(track.mean, mean, rtol=1e-8)
+    np.testing.assert_allclose(track.covariance, cov, rtol=1e-8, atol=1e-8)
+    assert [one.tolist() for one in step.assigned] == [[track.track_id]] * 3
+    assert track.last_detection == made[-1][2].max()
+    assert track.started == made[0][2].min()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_times_that_are_all_the_scans_own_change_nothing(kind):
+    scene = simulate("crowd", 3, targets=6, scans=5, sensors=3, width=20_000.0)
+    kinds = TRACKERS[kind].for_scene(scene), TRACKERS[kind].for_scene(scene)
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        kinds[0].step(scan.time, scan.measurements)
+        kinds[1].step(scan.time, scan.measurements, scan.own_times(), [[0.0, 2 * math.pi]] * 3)
+    found = [sorted(t.position.tolist() for t in tracker.tracks if t.confirmed) for tracker in kinds]
+    assert len(found[0]) == 6
+    np.testing.assert_allclose(found[1], found[0], atol=0.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_miss_is_charged_once_a_look(kind):
+    tracker = make(kind, SENSORS[:2])
+    tracker.step(0.0, [at(0.0)[None], at(0.0)[None]])
+    (before,) = tracker.tracks
+    empty, everywhere, nowhere = [np.zeros((0, 3))] * 2, [0.0, 2 * math.pi], [0.0, 0.0]
+    tracker.step(1.0, empty, sectors=[nowhere, nowhere])
+    (still,) = tracker.tracks
+    assert still.score == before.score
+    # the first sensor looks at one half of the sky, then at the other; the target is at 45 degrees
+    tracker.step(2.0, empty, sectors=[[math.pi / 2, 3 * math.pi / 2], nowhere])
+    assert tracker.tracks[0].score == before.score
+    tracker.step(3.0, empty, sectors=[[-math.pi / 2, math.pi / 2], nowhere])
+    assert tracker.tracks[0].score == pytest.approx(before.score + math.log(0.2), abs=1e-12)
+    tracker.step(4.0, empty, sectors=[nowhere, everywhere])
+    assert tracker.tracks[0].score == pytest.approx(before.score + math.log(0.2 * 0.1), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scans_in_which_nobody_looked_do_not_count(kind):
+    cycle = LifeCycle(confirmation="m-of-n", m=2, n=2, deletion="count", deletion_count=2)
+    tracker = make(kind, SENSORS[:1], life_cycle=cycle)
+    tracker.step(0.0, [at(0.0)[None]], sectors=[[0.0, 2 * math.pi]])
+    for k in range(1, 6):
+        tracker.step(float(k), [np.zeros((0, 3))], sectors=[[0.0, 0.0]])
+    tracker.step(6.0, [at(6.0)[None]], sectors=[[0.0, 2 * math.pi]])
+    assert [track.confirmed for track in tracker.tracks if track.hits == 2] == [True]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_patience_counts_looks_not_scans(kind):
+    """Ten scans for a turn: a track lives on though it is seen in one of them only."""
+    tracker = make(kind, SENSORS[:1], life_cycle=LifeCycle(false_probability=1e-3))
+    for k in range(200):
+        t = float(k)
+        away = at(t % 40 * 0.25)
+        azimuth = math.atan2(away[1], away[0])
+        sector = [2 * math.pi * k / 10, 2 * math.pi * (k + 1) / 10]
+        seen = (azimuth - sector[0]) % (2 * math.pi) < 2 * math.pi / 10
+        z = at(0.0)[None] if seen else np.zeros((0, 3))
+        tracker.step(t, [z], [np.full(len(z), t)], [sector])
+    # and yet it is gone some looks after the last detection
+    assert len([track for track in tracker.tracks if track.confirmed and track.track_id == 1]) == 1
+    for k in range(200, 320):
+        tracker.step(float(k), [np.zeros((0, 3))], sectors=[[2 * math.pi * k / 10, 2 * math.pi * (k + 1) / 10]])
+    assert not tracker.tracks
+
+
+def test_scores_are_the_logarithms_of_the_predictive_densities():
+    rng = np.random.default_rng(4)
+    tracker = make("nearest-neighbour")
+    tracker.step(0.0, [at(0.0)[None], np.zeros((0, 3)), np.zeros((0, 3))])
+    (before,) = tracker.tracks
+    mean, cov = before.mean, before.covariance
+    times, expected = np.array([0.9, 0.2, 0.6]), before.score
+    z = [rng.normal(at(t), s.noise)[None] for t, s in zip(times, SENSORS, strict=True)]
+    tracker.step(1.0, z, [np.array([t]) for t in times])
+    now = 0.0
+    for s in np.argsort(times):
+        mean, cov, density = plain.correct(*plain.predict(mean, cov, times[s] - now), z[s][0], SENSORS[s].covariance)
+        now = times[s]
+        one = SENSORS[s]
+        expected += density + math.log(one.detection_probability * one.volume / one.false_alarm_rate)
+    assert tracker.tracks[0].score == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_bearing_before_the_radar_that_begins_the_track_is_used():
+    radar = Radar3D(position=[0, 0, 0], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], [-math.pi, math.pi], [0, 1.5]])
+    bearing = BearingSensor(position=[0, 0, 0], noise=[1e-4])
+    place = np.array([[20_000.0, 20_000.0, 5_000.0]])
+    tracker = TRACKERS["multi-sensor"]([bearing, radar])
+    truth = bearing.measure(place), radar.measure(place) + [0.0, 1e-3, 0.0]
+    step = tracker.step(2.0, list(truth), [np.array([1.0]), np.array([1.5])])
+    assert step.assigned[0].tolist() == step.assigned[1].tolist() == [1]
+    # across the line of sight: the radar's place p at 1.5 s, and the bearing's half a second before, by p - v / 2
+    ground = math.hypot(*place[0, :2])
+    rows = np.array([[1.0, 0.0], [1.0, -0.5], [0.0, 1.0]]) / np.array([[1e-3 * ground], [1e-4 * ground], [300.0]])
+    p, v = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0]), rcond=None)[0]
+    (track,) = tracker.tracks
+    across = (track.position - place[0]) @ [-1, 1, 0] / math.sqrt(2)
+    assert across == pytest.approx(p + v / 2, rel=0.02)
+    assert len(tracker.tracks) == 1 and track.time == 2.0
+
+
+def test_all_trackers_follow_rotating_radars_like_the_oracle():
+    scene = simulate("rotating-radars", 0, aircraft=6, duration=40.0, interval=4.0)
+    oracle = OracleTracker(scene)
+    expected, _ = track_scene(oracle, scene)
+    for kind in KINDS:
+        found, _ = track_scene(TRACKERS[kind].for_scene(scene), scene)
+        places = [table.arrays()[2][table.arrays()[0] == 40.0] for table in (expected, found)]
+        assert len(places[1]) == 6, kind
+        nearest = np.linalg.norm(places[0][:, None] - places[1][None], axis=2).min(axis=1)
+        assert nearest.max() < 60.0, kind
+
+
+def test_what_is_refused():
+    tracker = make("multi-sensor", SENSORS[:1])
+    z = [at(0.0)[None]]
+    tracker.step(5.0, z, [np.array([4.0])])
+    for times, sectors, words in [
+        ([np.array([4.9])], None, "must lie from the last step's time, 5 s, to 6 s, got 4.9"),
+        ([np.array([6.1])], None, "must not be after the scan's time, 6 s, got 6.1"),
+        ([np.array([5.5, 5.6])], None, r"times of sensor 0 must have shape \(1,\)"),
+        ([np.array([math.nan])], None, "times of sensor 0 must be finite"),
+        (5.5, None, "times must be one array for each of 1 sensors"),
+        (None, [[0.0, 7.0]], "that of sensor 0 must be from an azimuth to one 0 to 2 pi above it"),
+        (None, [[1.0, 0.0]], "that of sensor 0 must be from"),
+        (None, [[0.0, 1.0]] * 2, r"sectors must have shape \(1, 2\)"),
+    ]:
+        with pytest.raises(InvalidInputError, match=words) as caught:
+            tracker.step(6.0, z, times, sectors)
+        assert "\n" not in str(caught.value)
+        assert tracker.time == 5.0
+
+
+def test_a_saved_tracker_knows_how_often_it_is_looked_at(tmp_path):
+    scene = simulate("rotating-radars", 1, aircraft=3, duration=20.0)
+    whole, first, second = (TRACKERS["mht"].for_scene(scene) for _ in range(3))
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        given = scan.time, scan.measurements, scan.times, scan.sectors
+        whole.step(*given)
+        if k == 5:
+            first.save(tmp_path / "half.npz")
+            second.restore(tmp_path / "half.npz")
+        (first if k <= 4 else second).step(*given) if k != 5 else second.step(*given)
+    assert [t.mean.tolist() for t in whole.tracks] == [t.mean.tolist() for t in second.tracks]
+    assert isinstance(scene.sensors[0], Radar3D) and not isinstance(scene.sensors[0], PositionSensor)
