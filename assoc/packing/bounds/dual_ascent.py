@@ -89,12 +89,11 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     duals = np.zeros(packing.num_rows)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
     temperature = START * spread(arrays)
-    limited = run is not None and run.time_limit is not None
     deadline = math.inf if run is None else run.deadline()
     done = -1
     while done < levels:
         done = _ascend(arrays, point, temperature, done, (levels, passes), deadline)
-        if limited and run is not None and run.remaining() <= 0.0:
+        if run is not None and run.remaining() <= 0.0:
             deadline = -math.inf  # for systems where kernels cannot read the clock
     return duals
 
