@@ -242,8 +242,8 @@ FAULTS = (
     Fault(
         "reduced costs do not order the crossover",
         _BREEDING,
-        "reduced[k] / temperature - np.log",
-        "-np.log",
+        "reduced[k] / temperature - math.log",
+        "-math.log",
         _OF_GENETIC,
     ),
     Fault(

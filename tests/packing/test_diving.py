@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.components import search
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.run import Run
@@ -118,6 +119,8 @@ def test_the_colony_dives(monkeypatch):
     called = []
     original = Diver.dive
     monkeypatch.setattr(diving, "_LEAST", 5)
+    # but those with which every search begins
+    monkeypatch.setattr(search, "_DIVES", 0)
 
     def spy(self, trail, strictness, *rest):
         called.append(strictness)
