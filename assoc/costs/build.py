@@ -19,7 +19,7 @@ from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
 from assoc.costs.range_rates import SPEED, range_rates
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -36,6 +36,7 @@ def build_problem(
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
+    all_tuples: bool = False,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
 
@@ -65,6 +66,9 @@ def build_problem(
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
         against, and what a target may fly between measurements of different times; without either it has no effect.
+    all_tuples : bool
+        Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
+        papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
 
     Returns
     -------
@@ -73,7 +77,7 @@ def build_problem(
     Raises
     ------
     LimitExceededError
-        There are more candidates than `max_tuples`; the message estimates how many.
+        There are more tuples than `max_tuples`; the message says how many, or estimates it.
     InvalidInputError
         An argument is out of range.
 
@@ -90,6 +94,8 @@ def build_problem(
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
+    if all_tuples:
+        return _whole_grid(scene, one, int(max_tuples), speed)
     if not one.at_once:
         return timed_problem(scene, one, probability, int(max_tuples), speed)
     sensors = sensor_arrays(scene)
@@ -102,6 +108,18 @@ def build_problem(
     rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
+
+
+def _whole_grid(scene: Scene, one: Scan, most: int, speed: float | Sequence[float]) -> AssignmentProblem:
+    shape = [int(size) + 1 for size in one.sizes]
+    count = math.prod(shape) - 1
+    if count > most:
+        raise LimitExceededError(
+            f"scan {one.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
+        )
+    # the first of the grid is the tuple without measurements, which no problem has
+    tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
+    return AssignmentProblem(tuples, tuple_costs(scene, one, tuples, speed=speed), one.sizes)
 
 
 def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:

@@ -21,6 +21,7 @@ from assoc.filters.motion.models import (
     Motion,
     Padded,
 )
+from assoc.filters.motion.unit_rates import UnitRates
 from assoc.filters.motion.unmanned_aircraft import Aerodynamics, UnmannedAircraft
 from assoc.filters.smoother import FixedLagSmoother, Window
 from assoc.filters.state import Gaussian
@@ -54,6 +55,7 @@ __all__ = [
     "ModifiedEKF",
     "Motion",
     "Padded",
+    "UnitRates",
     "UnmannedAircraft",
     "UnscentedKalmanFilter",
     "Update",

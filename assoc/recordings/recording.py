@@ -37,6 +37,8 @@ class Recording:
         Altitudes that cannot be right.
     lines : array_like of int (n,), optional
         Where the plot stood in its file.
+    addresses : array_like of int (n,), optional
+        ICAO addresses of 24 bits; 0 is "not known", and the default.
     sources : array_like of int (n,), optional
         The aircraft that really caused the plot, -1 for a false plot; only a simulation knows.
     notes : mapping of str to int, optional
@@ -59,6 +61,7 @@ class Recording:
     sources: Array | None = None
     notes: Mapping[str, int] = field(default_factory=dict)
     name: str = ""
+    addresses: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -80,7 +83,8 @@ class Recording:
             raise InvalidInputError(f"altitudes must be numbers or NaN of shape {shape}, got {altitudes.shape}")
         altitudes.setflags(write=False)
         put(self, "altitudes", altitudes)
-        for name, default in (("identities", UNDECODED), ("lines", 0), ("garbled", False), ("sources", None)):
+        numbers = (("identities", UNDECODED), ("addresses", 0), ("lines", 0), ("garbled", False), ("sources", None))
+        for name, default in numbers:
             value: Any = getattr(self, name)
             if value is None and default is None:
                 continue
@@ -105,6 +109,17 @@ class Recording:
     def measurements(self) -> Array:
         """Range and azimuth (n, 2), metres and radians, as a `Radar2D` measures them."""
         return np.stack([self.ranges, self.azimuths], axis=1)
+
+    @property
+    def aircraft(self) -> Array | None:
+        """Which aircraft each plot is of (n,): the sources, else Mode 3, -1 where it is not decoded.
+
+        None where neither is known. A plot without an identity counts as one of no aircraft, as in the thesis.
+        """
+        if self.sources is not None:
+            return self.sources
+        decoded = self.identities != UNDECODED
+        return np.where(decoded, self.identities, -1) if decoded.any() else None
 
     @property
     def positions(self) -> Array:
@@ -154,4 +169,4 @@ class Recording:
         return f"Recording({name}{len(self)} plots{span})"
 
 
-_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines")
+_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines", "addresses")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +20,13 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z",
+    "sigma_x", "sigma_y", "sigma_z", "speed", "heading", "altitude",
 )  # fmt: skip
-"""Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position."""
+"""Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
+
+Speed and heading are those of the horizontal velocity (equations 3.5 to 3.8 of the thesis on clustering time windows,
+of the filter's estimate and not from plot to plot), the heading in degrees, clockwise from +y: with y to the north a
+compass heading."""
 
 
 class TrackTable:
@@ -33,7 +38,12 @@ class TrackTable:
     def __init__(self) -> None:
         self._rows: list[tuple[Any, ...]] = []
 
-    def add(self, tracks: Iterable[Track], positions: Sequence[int] = (0, 1, 2)) -> None:
+    def add(
+        self,
+        tracks: Iterable[Track],
+        positions: Sequence[int] = (0, 1, 2),
+        altitudes: Mapping[int, float] | None = None,
+    ) -> None:
         """Add the tracks of one scan.
 
         Parameters
@@ -41,10 +51,14 @@ class TrackTable:
         tracks : iterable of Track
         positions : sequence of int
             Where x, y (and z) stand in the state: ``filter.motion.position``.
+        altitudes : mapping of track id to metres, optional
+            What transponders have told; without it the altitude is z, of tracks in the plane NaN.
         """
         for track in tracks:
             sigma = np.zeros(3)
             sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
+            vx, vy = track.velocity[:2].tolist()
+            told = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
             self._rows.append(
                 (
                     track.track_id,
@@ -57,6 +71,9 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    math.hypot(vx, vy),
+                    math.degrees(math.atan2(vx, vy)) % 360.0,
+                    told if altitudes is None else altitudes.get(track.track_id, math.nan),
                 )  # fmt: skip
             )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import io
 import json
 import math
@@ -37,6 +38,8 @@ class Claim:
         What is accepted, low and high; an open end is None inside.
     holds : bool or None
         Whether the claim holds. Left out, it is whether ours lies in the band, or None without a band.
+    source : str
+        Where the paper prints its number or says what is judged (page, table, figure or equation), or "chosen by us".
 
     Raises
     ------
@@ -51,6 +54,7 @@ class Claim:
     interval: tuple[float, float] | None = None
     band: tuple[float | None, float | None] | None = None
     holds: bool | None = None
+    source: str = ""
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -75,20 +79,25 @@ class Claim:
             put(self, "holds", bool(self.holds))
 
 
-def to_dict(claims: Iterable[Claim], experiment: str, seed: int) -> dict[str, Any]:
-    """Return the claims as the JSON form "assoc.claims", version 1."""
+def to_dict(claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> dict[str, Any]:
+    """Return the claims as the JSON form "assoc.claims", version 1; `about` tells the settings."""
     return {
         "format": FORMAT,
         "version": VERSION,
         "experiment": experiment,
         "seed": seed,
+        "date": datetime.date.today().isoformat(),
+        "about": " ".join(about.split()),
         "claims": [asdict(claim) for claim in claims],
     }
 
 
-def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int) -> None:
-    """Write the claims as JSON (infinities are refused: they are not JSON)."""
-    write_text(path, json.dumps(to_dict(claims, experiment, seed), indent=2, allow_nan=False) + "\n")
+def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: int, about: str = "") -> None:
+    """Write the claims as JSON, a line each (infinities are refused: they are not JSON)."""
+    data = to_dict(claims, experiment, seed, about)
+    rows = ",\n".join(f"    {json.dumps(claim, allow_nan=False)}" for claim in data.pop("claims"))
+    head = json.dumps(data, indent=2).removesuffix("\n}")
+    write_text(path, f'{head},\n  "claims": [\n{rows}\n  ]\n}}\n')
 
 
 def load_json(path: str | Path) -> list[Claim]:
@@ -136,6 +145,7 @@ def print_table(claims: Sequence[Claim], title: str) -> None:
     for column in ("paper", "ours", "interval", "accepted band"):
         table.add_column(column, justify="right")
     table.add_column("holds")
+    table.add_column("source")
     for claim in claims:
         table.add_row(
             claim.quantity,
@@ -145,6 +155,7 @@ def print_table(claims: Sequence[Claim], title: str) -> None:
             _ends(claim.interval),
             _ends(claim.band),
             {True: "yes", False: "no", None: "-"}[claim.holds],
+            claim.source,
         )
     console = Console()
     if not console.is_terminal:

@@ -1,4 +1,4 @@
-"""The command line that most experiments share: --quick, --seed, --json, --figure."""
+"""The command line that most experiments share: --quick, --seed, --json, --figure, --publish."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from assoc._files.output import write_atomically
 from assoc._types import Array
 from experiments.common.claims import Claim, print_table, save_json
+from experiments.common.results import result_file
 
 Experiment = Callable[[bool, np.random.Generator], tuple[list[Claim], Any]]
 Draw = Callable[[Any, Any], None]
@@ -24,6 +25,7 @@ def main(
     draw: Draw,
     size: tuple[float, float],
     arguments: Sequence[str] | None = None,
+    about: str | None = None,
 ) -> int:
     """Run an experiment: print its claims, save its figure and, if asked, its JSON.
 
@@ -37,9 +39,11 @@ def main(
     draw : callable (figure, what it shows)
     size : (float, float)
         Of the figure, inches.
+    about : str, optional
+        What was set, for the result file: the module's description.
     """
     parser = make_parser(name, title)
-    return run(parser, parser.parse_args(arguments), name, title, experiment, draw, size)
+    return run(parser, parser.parse_args(arguments), name, title, experiment, draw, size, about)
 
 
 def make_parser(name: str, title: str) -> argparse.ArgumentParser:
@@ -49,7 +53,24 @@ def make_parser(name: str, title: str) -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default 0)")
     parser.add_argument("--json", metavar="FILE", help="write the results here")
     parser.add_argument("--figure", metavar="FILE", help=f"write the figure here (default {_picture(name)})")
+    add_publish(parser, name)
     return parser
+
+
+def add_publish(parser: argparse.ArgumentParser, name: str) -> None:
+    """Add the option that writes the result file of an experiment."""
+    parser.add_argument(
+        "--publish",
+        action="store_true",
+        help=f"write experiments/results/{name}.json, from which the pages take their figures; never with --quick",
+    )
+
+
+def publish(claims: list[Claim], name: str, seed: int, about: str | None) -> None:
+    """Write the result file of an experiment."""
+    path = result_file(name)
+    save_json(path, claims, name, seed, about or "")
+    print(f"{path}: written; now: python -m experiments.pages")
 
 
 def run(
@@ -60,14 +81,19 @@ def run(
     experiment: Experiment,
     draw: Draw,
     size: tuple[float, float],
+    about: str | None = None,
 ) -> int:
     """Run an experiment with the options chosen; see `main`."""
     if chosen.seed < 0:
         parser.error("--seed must be at least 0")
+    if chosen.publish and chosen.quick:
+        parser.error("--publish needs the full run, got --quick")
     claims, shown = experiment(chosen.quick, np.random.default_rng(chosen.seed))
     print_table(claims, title)
     if chosen.json:
-        save_json(chosen.json, claims, name, chosen.seed)
+        save_json(chosen.json, claims, name, chosen.seed, about or "")
+    if chosen.publish:
+        publish(claims, name, chosen.seed, about)
     figure_file = Path(chosen.figure or _picture(name))
     save_figure(figure_file, draw, shown, size)
     print(f"{figure_file}: written")

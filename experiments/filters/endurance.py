@@ -63,10 +63,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
         least, asymmetry, deviation = shown[name].T
         claims += [
             Claim(f"{name}: least eigenvalue of the correlation in {steps} steps", "", None, least.min(), None,
-                  (1e-12, None)),
-            Claim(f"{name}: largest asymmetry", "", None, asymmetry.max(), None, (None, 1e-12)),
+                  (1e-12, None), source="chosen by us"),
+            Claim(f"{name}: largest asymmetry", "", None, asymmetry.max(), None, (None, 1e-12), source="chosen by us"),
             Claim(f"{name}: largest deviation of the position after {EVERY} steps", "m", None, deviation.max(), None,
-                  (None, 300.0)),
+                  (None, 300.0), source="chosen by us"),
         ]  # fmt: skip
     return claims, shown
 
@@ -93,7 +93,7 @@ TITLE = "Covariances through many steps"
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    return main("filters.endurance", TITLE, experiment, draw, (8, 4.5), arguments)
+    return main("filters.endurance", TITLE, experiment, draw, (8, 4.5), arguments, about=__doc__)
 
 
 if __name__ == "__main__":

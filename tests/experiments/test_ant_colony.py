@@ -7,8 +7,11 @@ import json
 import numpy as np
 import pytest
 
+import assoc
+from assoc.simulation import simulate
 from experiments.common.claims import load_json
-from experiments.papers import ant_colony as experiment
+from experiments.papers.ant_colony import __main__ as experiment
+from experiments.papers.ant_colony import readings, truth
 
 
 def measured(cycles):
@@ -70,9 +73,49 @@ def test_a_small_run(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "288 runs (3 scans, 2 seeds)" in out and "Table 1 and its conclusions" in out
     content = json.loads((tmp_path / "c.json").read_text())
-    assert (content["format"], content["experiment"], content["seed"]) == ("assoc.claims", "aco_parameters", 0)
+    assert (content["format"], content["experiment"], content["seed"]) == ("assoc.claims", "papers.ant_colony", 0)
     claims = load_json(tmp_path / "c.json")
     assert sum("mode paper: mean cycles to convergence" in claim.quantity for claim in claims) == 24
-    for name in ("settings.csv", "claims.csv", "claims.json", "table_1.png"):
+    for name in ("settings.csv", "claims.csv", "claims.json", "table_1.png", "figure_3.png"):
         assert (tmp_path / "o" / name).stat().st_size > 500
     assert (tmp_path / "o" / "table_1.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_walk_written_twice_takes_as_many_cycles():
+    # equations 7 to 11 once compiled in the solver, once in plain numpy: the same mean over many seeds
+    scene = simulate("three-radar", seed=0, scans=10)
+    rng = np.random.default_rng(0)
+    parameters = {"mode": "paper", "ants": 15, "alpha": 2.0, "beta": 1.0, "rho": 0.3}
+    ours, plain = [], []
+    for scan in (0, 8, 9):
+        problem = assoc.build_problem(scene, scan)
+        tuples, costs = readings.nodes_of(scene, scan, "candidates")
+        ours += [assoc.assign(problem, "aco", seed=seed, **parameters).iterations for seed in range(80)]
+        plain += [readings.cycles(tuples, costs, readings.READINGS[0], rng) for _ in range(80)]
+    error = np.hypot(np.std(ours), np.std(plain)) / len(ours) ** 0.5
+    assert abs(np.mean(ours) - np.mean(plain)) < 3 * error
+    # and the start matters: ants that all start on the best tour agree much sooner
+    quick = [readings.cycles(tuples, costs, readings.READINGS[6], rng) for _ in range(80)]
+    assert np.mean(quick) < np.mean(plain) - 5 * error
+
+
+def test_single_measurements_are_priced_by_equation_5():
+    scene = simulate("three-radar", seed=0, scans=1)
+    tuples, costs = readings.nodes_of(scene, 0, "priced grid")
+    assert len(tuples) == np.prod(scene.scan(0).sizes + 1.0) - 1
+    one = np.flatnonzero((tuples > 0).sum(axis=1) == 1)
+    first = scene.sensors[int(np.flatnonzero(tuples[one[0]])[0])]
+    r, missed = first.covariance, 2 * np.log(1 - 0.9)
+    expected = 0.5 * np.log(np.linalg.det(2 * np.pi * r)) - np.log(0.9 * first.volume / 1.0) - missed
+    assert costs[one[0]] == pytest.approx(expected)
+
+
+def test_the_truth_is_counted():
+    scene = simulate("three-radar", seed=3, scans=5)
+    found = truth.shares(scene, assoc.associate(scene, "exact"))
+    sources = [np.concatenate(scene.scan(k).sources) for k in range(5)]
+    assert found["false alarms left alone"][1] == sum(int((one < 0).sum()) for one in sources)
+    seen = [np.unique(one[one >= 0], return_counts=True)[1] for one in sources]
+    for n in (2, 3):
+        every = found[f"targets seen by {n} radars, found with just these"][1]
+        assert every == sum(int((one == n).sum()) for one in seen)

@@ -50,7 +50,7 @@ def test_json_round_trip_and_form(tmp_path: Path) -> None:
         "experiment": "sample",
         "seed": 7,
     }
-    assert list(data["claims"][0]) == ["quantity", "unit", "paper", "ours", "interval", "band", "holds"]
+    assert list(data["claims"][0]) == ["quantity", "unit", "paper", "ours", "interval", "band", "holds", "source"]
     path.write_text(json.dumps({**data, "version": 2}))
     with pytest.raises(ValueError, match="version 2"):
         claims.load_json(path)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+
 import pytest
 
 from experiments.common.claims import load_json
+from experiments.common.results import Results
 from experiments.filters import benchmark, consistency, manoeuvres
 from experiments.filters.b1 import Setting
-from experiments.papers import dubins_enkf, fuzzy_ekf, modified_ekf
+from experiments.papers.dubins_enkf import __main__ as dubins_enkf
+from experiments.papers.fuzzy_ekf import __main__ as fuzzy_ekf
+from experiments.papers.modified_ekf import __main__ as modified_ekf
 from tests.sizes import few_or_all
 
 
@@ -16,13 +22,26 @@ def test_programs_whose_claims_hold(module, tmp_path, capsys):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert module.program(["--quick", "--json", files[0], "--figure", files[1], "--seed", "1"]) == 0
     claims = load_json(files[0])
-    judged = [c for c in claims if c.band is not None]
+    # what the papers claim and does not hold is on the page; what we accept by limits of our own must hold
+    judged = [c for c in claims if c.holds is not None and c.source.endswith("chosen by us") and "%" not in c.source]
+    judged = [c for c in judged if not re.search("table|figure|section|equation|abstract", c.source)]
     assert len(judged) >= 5
-    # the small runs of --quick leave some room
-    loose = [c for c in judged if not c.holds and not c.quantity.startswith("B1")]
-    assert not loose
+    assert not [c.quantity for c in judged if not (c.holds or may_hold(c))]
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
     assert "holds" in capsys.readouterr().out
+
+
+def may_hold(claim):
+    """Whether the interval of a small run reaches into what is accepted."""
+    if claim.interval is None or claim.band is None:
+        return False
+    (low, high), (least, most) = claim.interval, claim.band
+    return (most is None or low <= most) and (least is None or high >= least)
+
+
+def test_b1_holds_at_full_size():
+    claims = [claim for claim in Results("papers.modified_ekf").starting("B1") if claim.band is not None]
+    assert len(claims) == 3 and all(claim.holds for claim in claims)
 
 
 def test_beta_of_b1():
@@ -31,12 +50,35 @@ def test_beta_of_b1():
 
 def test_fuzzy_experiment(tmp_path, monkeypatch):
     monkeypatch.setattr(fuzzy_ekf, "SCENARIOS", {"C": manoeuvres.SCENARIOS["C"]})
+    monkeypatch.setattr(fuzzy_ekf, "NEW_SCENARIOS", {})
     file = str(tmp_path / "f.json")
     assert fuzzy_ekf.program(["--quick", "--json", file, "--figure", str(tmp_path / "f.png")]) == 0
     by_name = {c.quantity: c for c in load_json(file)}
     assert by_name["C: tuned rules / best fixed EKF"].holds
     assert by_name["C: RMSE, IMM"].ours < by_name["C: RMSE, raw measurements"].ours
     assert by_name["C: RMSE, raw measurements"].ours == pytest.approx(89.7, rel=0.03)
+    # the stand-in for the published rules is tuned: better than the sets chosen by eye
+    assert by_name["C: RMSE, the paper's rules, tuned sets"].ours < by_name[
+        "C: RMSE, the paper's rules, sets chosen by eye"
+    ].ours
+
+
+def test_quick_runs_have_the_same_rivals():
+    for turns, least in ((False, 19), (True, 49)):
+        assert len(list(fuzzy_ekf.fixed(turns))) == least
+    assert "quick" not in inspect.signature(fuzzy_ekf.fixed).parameters
+
+
+def test_new_manoeuvres_are_those_that_were_drawn():
+    import numpy as np
+
+    drawn = manoeuvres.random_flights(3, np.random.default_rng(20_261_122))
+    for own, one in zip(manoeuvres.NEW_SCENARIOS.values(), drawn, strict=True):
+        assert len(own.turns) == len(one.turns)
+        for turn, other in zip(own.turns, one.turns, strict=True):
+            assert (turn.start, turn.end, turn.g) == pytest.approx((other.start, other.end, other.g), abs=0.06)
+        assert own.position == pytest.approx(one.position, abs=6)
+        assert (own.speed, own.heading) == pytest.approx((one.speed, one.heading % (2 * np.pi)), abs=0.6)
 
 
 def test_scenarios_are_as_described():

@@ -10,6 +10,7 @@ from assoc import track
 from assoc.recordings import Recording, write_plots
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, MultiSensorTracker
+from assoc.tracking.filter_choice import make_filter
 
 NOISE = ["--range-noise", "100", "--bearing-noise", "0.115"]
 COLUMNS = ["track_id", "time", "x", "y", "z", "vx", "vy", "vz"]
@@ -115,6 +116,7 @@ BAD = {
     "filter": (["SCENE", "--filter", "akf"], "filter: unknown name 'akf'; known: imm-cv"),
     "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
+    "rates for a scene": (["SCENE", "--rates", "r.csv"], "--rates: judges the plots"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
     "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
@@ -124,7 +126,7 @@ BAD = {
     "confirmation": (["SCENE", "--confirmation", "x"], "--confirmation: expected one of score, m-of-n"),
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
-    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, none"),
+    "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, irregular, none"),
     "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
     "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }
@@ -161,3 +163,76 @@ def test_help_is_quick_and_lists_trackers(run):
     assert done.returncode == 0
     for name in TRACKERS:
         assert name in done.stdout
+
+
+def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
+    from assoc.metrics import ct_mt_it
+    from assoc.recordings import clustering_time_window, radar_of, read_plots
+    from assoc.tracking.plot_tracks import track_plots
+
+    plots(tmp_path / "plots.csv")
+    words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE]
+    words += ["--rates", str(tmp_path / "rates.csv"), "--report", str(tmp_path / "r.html")]
+    assert track.main(words) == 0
+    printed = capsys.readouterr().out
+    figures = [float(one) for one in re.findall(r"(?:CT|MT|IT) ([\d.]+) %", printed)]
+    assert "aircraft known by Mode 3" in printed
+    rates = pd.read_csv(tmp_path / "rates.csv")
+    assert list(rates.columns) == ["window", "time", "plots", "ct", "mt", "it"]
+    assert rates[["ct", "mt", "it"]].mean().to_numpy() == pytest.approx(figures, abs=0.06)
+    # both aircraft fly straight: once their tracks are confirmed every plot is theirs, and keeps its track
+    assert (rates[["ct", "mt"]].iloc[6:] == 100.0).all().all()
+    recording = read_plots(tmp_path / "plots.csv")
+    windows = clustering_time_window(recording)
+    assert rates.plots.sum() == len(recording) == sum(len(window) for window in windows)
+    # the rates are those of the plots' tracks: a tracker that gives nothing away has none
+    radar = radar_of(recording, range_noise=100.0, azimuth_noise=2e-3)
+    tracker = TRACKERS["mht"]([radar], make_filter("ekf", [radar], None, 0))
+    done = track_plots(tracker, recording, windows)
+    rows = np.concatenate([window.rows for window in windows])
+    number = np.repeat(np.arange(len(windows)), [len(window) for window in windows])
+    nobody = ct_mt_it(number, recording.aircraft[rows], np.full(len(rows), -1), np.zeros(len(rows), dtype=bool))
+    assert done.rates.ct > 70 and nobody.ct == 0
+    page = (tmp_path / "r.html").read_text()
+    assert "CT, MT and IT of the windows" in page and '"rates":{' in page.replace(" ", "")
+
+
+def test_speed_heading_and_altitude(tmp_path, capsys):
+    recording = Recording(
+        10.0 * np.arange(12), np.hypot(1e5, 250.0 * 10 * np.arange(12)), np.arctan2(250.0 * 10 * np.arange(12), 1e5),
+        identities=np.full(12, 5), altitudes=np.full(12, 9144.0),
+    )  # fmt: skip
+    write_plots(tmp_path / "plots.csv", recording)
+    out = tmp_path / "tracks.csv"
+    assert track.main([str(tmp_path / "plots.csv"), "-o", str(out), "--rotation", "10", *NOISE]) == 0
+    capsys.readouterr()
+    table = pd.read_csv(out)
+    assert list(table.columns[-3:]) == ["speed", "heading", "altitude"]
+    last = table.iloc[-1]
+    # northward at 250 m/s, at flight level 300
+    assert last.speed == pytest.approx(np.hypot(last.vx, last.vy)) and last.speed == pytest.approx(250, rel=0.1)
+    assert min(last.heading, 360 - last.heading) < 10
+    assert last.altitude == pytest.approx(9144)
+
+
+def test_irregular_windows_and_what_rates_need(tmp_path, capsys):
+    plots(tmp_path / "plots.csv")
+    words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE, "--window"]
+    counts = {}
+    for window in ("ctw", "irregular", "none"):
+        assert track.main([*words, window]) == 0
+        counts[window] = int(re.search(r"rows, (\d+) scans", capsys.readouterr().out)[1])
+    assert counts["ctw"] < counts["irregular"] < counts["none"]
+    unknown = read_without_identities(tmp_path)
+    assert track.main([unknown, "-o", str(tmp_path / "t.csv"), "--rates", str(tmp_path / "x.csv"), *NOISE]) == 2
+    assert "no plot has an identity" in capsys.readouterr().err and not (tmp_path / "t.csv").exists()
+    assert track.main([unknown, "-o", str(tmp_path / "t.csv"), "--rotation", "10", *NOISE]) == 0
+    assert "CT" not in capsys.readouterr().out
+
+
+def read_without_identities(folder):
+    frame = pd.read_csv(folder / "plots.csv")
+    path = folder / "unknown.csv"
+    known = [name for name in frame.columns if name.startswith(("mode3", "aircraft"))]
+    frame.drop(columns=known).to_csv(path, index=False)
+    return str(path)

@@ -93,3 +93,31 @@ def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
             }
             assert column == best
     assert [decision.scan for decision in final + list(own.flush())] == [0, 1, 2]
+
+
+def test_the_28_hypotheses_of_reids_example():
+    # figures 2.3 to 2.5 of the thesis: two targets, three measurements; the first lies in both gates, the second and
+    # third in that of target 2 alone; each may be a false alarm or a new target
+    gate = {"life_cycle": LifeCycle(missed_probability=1e-12), "gate_probability": 0.99, "max_hypotheses": 1}
+    own = HypothesisOrientedMHT(
+        [plain.sensor()],
+        KalmanFilter(ConstantVelocity(plain.Q_SIGMA, kind="continuous")),
+        region=plain.REGION,
+        initiation=Initiation(speed=1.0, birth_rate=5.0, widest=1.0),
+        depth=8,
+        hypothesis_drop=1e6,
+        **gate,
+    )
+    targets = np.array([[400.0, 500, 100], [430.0, 500, 100]])
+    for time in range(4):
+        own.step(float(time), [targets])
+    assert len(own.tracks) == 2 and len(own.probabilities) == 1
+    own.max_hypotheses = 1000
+    reach = math.sqrt(2) * plain.sensor().noise[0]
+    beyond = targets[1] + [[0, 3.0 * reach, 0], [0, -3.0 * reach, 0]]
+    step = own.step(4.0, [np.concatenate([targets.mean(axis=0)[None], beyond])])
+    assert len(step.assigned[0]) == 3
+    assert len(own.probabilities) == 28
+    # 0: false alarm, 1 and 2: the targets, above: a new one; no target twice
+    rows = ((a, b, c) for a in (0, 1, 2, 3) for b in (0, 2, 4) for c in (0, 2, 5))
+    assert sum(row.count(1) < 2 and row.count(2) < 2 for row in rows) == 28

@@ -16,10 +16,12 @@ from assoc.metrics import Gospa, Trajectories, gospa_over_time
 from assoc.plotting.places import places
 from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
+from assoc.plotting.report.plots import plot_data
 from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
+from assoc.tracking.plot_tracks import PlotTracks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,6 +31,7 @@ GOSPA_CUTOFF = 1_000.0
 
 _NEEDED = ("track_id", "time", "x", "y")
 _INSTANTS = 300
+_DECIMALS = 4
 _MOST_POINTS = 40_000
 _MOST_MEASUREMENTS = 30_000
 
@@ -40,6 +43,8 @@ _SCENE = (
 )
 
 _METRIC = '<div id="metric-plot" class="plot small"></div>'
+_RATES = '<div id="rates-plot" class="plot small"></div>'
+_ALTITUDES = '<div id="altitude-plot" class="plot small"></div>'
 _COUNTS = '<div id="counts-plot" class="plot small"></div>'
 
 
@@ -52,6 +57,7 @@ def write_tracking_report(
     settings: Mapping[str, Any] | None = None,
     cutoff: float = GOSPA_CUTOFF,
     words: Sequence[str] | None = None,
+    plots: PlotTracks | None = None,
 ) -> None:
     """Write tracks as one HTML file that works without a network.
 
@@ -71,6 +77,9 @@ def write_tracking_report(
         Of GOSPA, metres.
     words : sequence of str, optional
         The command line of ``python -m assoc.track`` that made it, to be shown.
+    plots : PlotTracks, optional
+        The recording that the tracks were made from, in the place of a scene: its plots and aircraft are drawn, and
+        CT, MT and IT over the windows.
 
     Raises
     ------
@@ -93,18 +102,22 @@ def write_tracking_report(
     made = made_with("assoc.track", words)
     command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
-    sections = [("summary", "Summary", _summary(frame, len(rows), values, cutoff))]
-    if len(frame) or known:
+    sections = [("summary", "Summary", _summary(frame, len(rows), values, cutoff, plots))]
+    if len(frame) or known or (plots is not None and plots.windows):
         sections.append(("scene", "Tracks over time", _SCENE))
     if known:
         sections.append(("metric", f"GOSPA over time, cutoff {cutoff:g} m", _METRIC))
+    if plots is not None and plots.rates is not None:
+        sections.append(("rates", "CT, MT and IT of the windows", _RATES))
+    if "altitude" in frame.columns and frame["altitude"].notna().any():
+        sections.append(("heights", "Altitude over time", _ALTITUDES))
     sections += [
         ("numbers", "Number of tracks over time", _COUNTS),
         ("life", "Life of the tracks", _table(rows, known)),
         ("settings", "Settings", f"{command}{shown}<h3>Made with</h3>{definitions(made)}"),
     ]
     title = (scene.name if scene is not None else "") or name or "Tracks"
-    data = _data(frame, scene, truth)
+    data = _data(frame, scene, truth, plots)
     data["gospa"] = {
         "times": plain_numbers(times, 6),
         "distance": plain_numbers([one.distance for one in values], 4),
@@ -118,7 +131,9 @@ def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, lis
     return gospa_over_time(Trajectories.from_scene(scene), found, cutoff)
 
 
-def _data(frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array]) -> dict[str, Any]:
+def _data(
+    frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array], plots: PlotTracks | None
+) -> dict[str, Any]:
     """Instants of the slider, paths of tracks and targets, measurements of the scans."""
     reach = np.abs(frame[["x", "y"]].to_numpy(dtype=float)).max() if len(frame) else 0.0
     decimals = 0 if reach > 20_000 else 1 if reach > 2_000 else 3
@@ -128,9 +143,15 @@ def _data(frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array]) 
         # thinned tracks keep their last point
         kept = np.unique(np.r_[np.arange(0, len(track), step), len(track) - 1])
         part = track.iloc[kept]
-        paths.append({"id": number_of, **_path(part["time"], part[["x", "y", "z"]], decimals)})
+        path = {"id": number_of, **_path(part["time"], part[["x", "y", "z"]], decimals)}
+        if "altitude" in part:
+            path["h"] = plain_numbers(part["altitude"].to_numpy(dtype=float), 0)
+        paths.append(path)
     if scene is not None and scene.num_scans <= _INSTANTS:
         instants = np.unique(scene.times)
+    elif plots is not None and len(plots.ends) <= _INSTANTS:
+        # as many decimals as the tracks' own times, so that both mean the same instant
+        instants = np.unique(np.round(plots.ends, _DECIMALS))
     elif len(frame):
         instants = np.linspace(frame["time"].min(), frame["time"].max(), min(_INSTANTS, len(frame)))
     else:
@@ -146,6 +167,7 @@ def _data(frame: pd.DataFrame, scene: Scene | None, truth: Mapping[int, Array]) 
             {"name": one.name or f"sensor {s + 1}", "place": plain_numbers(one.position, 1)}
             for s, one in enumerate(scene.sensors)
         ],
+        **({} if plots is None else plot_data(plots, decimals)),
     }
 
 
@@ -156,7 +178,7 @@ def _by_track(frame: pd.DataFrame) -> list[tuple[int, pd.DataFrame]]:
 def _path(times: Any, where: Any, decimals: int) -> dict[str, Any]:
     points = np.asarray(where, dtype=float)
     return {
-        "t": plain_numbers(np.asarray(times, dtype=float), 4),
+        "t": plain_numbers(np.asarray(times, dtype=float), _DECIMALS),
         **{axis: plain_numbers(points[:, i], decimals) for i, axis in enumerate("xyz")},
     }
 
@@ -207,6 +229,9 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         life["hits"] = int(track["hits"].iloc[-1]) if "hits" in track else None
         life["score"] = float(track["score"].iloc[-1]) if "score" in track else None
         life["speed"] = length / (ended - began) if ended > began else None
+        life["heading"] = float(track["heading"].iloc[-1]) if "heading" in track else None
+        told = track["altitude"].dropna().to_numpy(dtype=float) if "altitude" in track else np.zeros(0)
+        life["altitude"] = float(told[-1]) if len(told) else None
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
@@ -219,6 +244,7 @@ def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
     columns = [("track", "track", "d"), ("started", "started, s", "g"), ("first", "first row, s", "g")]
     columns += [("detected", "last detection, s", "g"), ("last", "last row, s", "g"), ("rows", "rows", "d")]
     columns += [("hits", "hits", "d"), ("score", "score, nats", ".4g"), ("speed", "mean speed, m/s", ".4g")]
+    columns += [("heading", "last heading, deg", ".0f"), ("altitude", "last altitude, m", ".0f")]
     columns += [("target", "target followed", "d"), ("share", "share of its rows", ".0%")] if known else []
     used = [one for one in columns if any(life[one[0]] is not None for life in lives) or one[0] == "track"]
     rows = [
@@ -228,13 +254,22 @@ def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
     return note + sortable_table("track-table", [header for _, header, _ in used], rows, link="track")
 
 
-def _summary(frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float) -> str:
+def _summary(
+    frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float, plots: PlotTracks | None
+) -> str:
     content = {"Tracks": (f"{count:,}", f"{len(frame):,} rows")}
     if len(frame):
         spans = frame.groupby("track_id")["time"].agg(["min", "max"])
         middle = float((spans["max"] - spans["min"]).median())
         whole = float(frame["time"].max() - frame["time"].min())
         content["Median life"] = (f"{middle:.4g} s", f"of {whole:.4g} s")
+    if plots is not None and plots.rates is not None:
+        rates = plots.rates
+        notes = {"CT": "plots in a track of their aircraft", "MT": "plots that kept their track"}
+        for name, rate in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it)):
+            note = notes.get(name, "plots in a wrong or tentative track")
+            shown = "-" if np.isnan(rate) else f"{rate:.1f} %"
+            content[name] = (shown, f"mean of {len(rates.windows)} windows: {note}")
     if values:
         mean = float(np.mean([one.distance for one in values]))
         content["GOSPA"] = (f"{mean:.4g} m", f"mean over {len(values)} instants, cutoff {cutoff:g} m")

@@ -127,6 +127,15 @@ const drawHistories = () => {
   if (byId('metric-plot')) {
     overTime('metric-plot', [['GOSPA', gospa.times, gospa.distance], ['localisation', gospa.times, gospa.localisation], ['missed', gospa.times, gospa.missed], ['false', gospa.times, gospa.false]], 'GOSPA (m)');
   }
+  if (byId('rates-plot')) {
+    overTime('rates-plot', ['CT', 'MT', 'IT'].map((name) => [name, data.rates.times, data.rates[name]]), 'percent');
+  }
+  if (byId('altitude-plot')) {
+    // the longest tracks: more lines than that nobody can tell apart
+    const told = data.tracks.filter((one) => one.h && one.h.some((h) => h !== null));
+    const longest = [...told].sort((a, b) => b.t.length - a.t.length).slice(0, 30);
+    overTime('altitude-plot', longest.map((one) => [`track ${one.id}`, one.t, one.h]), 'altitude (m)');
+  }
   overTime('counts-plot', counts, 'tracks (number)');
 };
 

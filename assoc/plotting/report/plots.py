@@ -1,0 +1,43 @@
+"""What the report of a tracker shows of a recording: plots, aircraft, and CT, MT and IT over the windows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.plotting.report.views import plain_numbers
+from assoc.tracking.plot_tracks import PlotTracks
+
+_MOST = 30_000
+
+
+def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
+    """Plots of each window, the aircraft's own plots as their truth, and the rates, in plain numbers."""
+    recording = shown.recording
+    places, aircraft = recording.positions, recording.aircraft
+    few = len(recording) <= _MOST
+    measured = [
+        {"t": round(float(end), 4), "at": plain_numbers(places[window.rows], decimals)}
+        for end, window in zip(shown.ends, shown.windows, strict=True)
+        if few
+    ]
+    truth = []
+    if aircraft is not None:
+        height = np.nan_to_num(recording.trusted_altitudes)
+        for name in np.unique(aircraft[aircraft >= 0]).tolist():
+            own = np.flatnonzero(aircraft == name)
+            own = own[:: max(1, len(recording) // _MOST)]
+            columns = zip("xyz", (*places[own].T, height[own]), strict=True)
+            path = {axis: plain_numbers(values, decimals) for axis, values in columns}
+            truth.append({"id": name, "t": plain_numbers(recording.times[own], 4), **path})
+    return {"measured": measured, "truth": truth, "rates": _rates(shown)}
+
+
+def _rates(shown: PlotTracks) -> dict[str, Any] | None:
+    if shown.rates is None:
+        return None
+    times: Array = np.asarray(shown.ends, dtype=float)[shown.rates.windows]
+    columns = zip(("CT", "MT", "IT"), shown.rates.per_window.T, strict=True)
+    return {"times": plain_numbers(times, 4), **{name: plain_numbers(values, 1) for name, values in columns}}

@@ -1,0 +1,87 @@
+"""A recording of radar plots through a tracker: tracks, and CT, MT and IT where the aircraft are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.metrics import CtMtIt, ct_mt_it
+from assoc.recordings import Recording, Window
+from assoc.tracking.plot_windows import step_windows
+from assoc.tracking.track_table import TrackTable
+from assoc.tracking.tracker import Tracker
+
+
+class PlotTracks(NamedTuple):
+    """A recording as a tracker took it.
+
+    Attributes
+    ----------
+    recording : Recording
+    windows : list of Window
+    ends : array (K,)
+        The tracker's time after each window, seconds.
+    tracks : int array (n,)
+        The track that took each plot of the windows, in their order, -1 if none did.
+    rates : CtMtIt or None
+        CT, MT and IT of the windows; None where no aircraft is known.
+    table : TrackTable
+        The tracks after each window; their altitude is the last that a plot of theirs has told, garbled ones left out.
+    """
+
+    recording: Recording
+    windows: Sequence[Window]
+    ends: Array
+    tracks: Array
+    rates: CtMtIt | None
+    table: TrackTable
+
+
+def track_plots(
+    tracker: Tracker,
+    recording: Recording,
+    windows: Sequence[Window],
+    *,
+    confirmed: bool = True,
+    progress: Iterable[Window] | None = None,
+) -> PlotTracks:
+    """Run a tracker of one radar over the windows of a recording.
+
+    Parameters
+    ----------
+    tracker : Tracker
+        Of a single sensor, one that takes measurements with times of their own.
+    recording : Recording
+    windows : list of Window
+        Of this recording.
+    confirmed : bool
+        Whether only confirmed tracks are listed.
+    progress : iterable of Window, optional
+        The windows once more, one that shows how far it is.
+    """
+    table = TrackTable()
+    ends: list[float] = []
+    takers: list[Array] = [np.zeros(0, dtype=np.int64)]
+    sure: list[Array] = [np.zeros(0, dtype=np.bool_)]
+    altitudes: dict[int, float] = {}
+    steps = step_windows(tracker, windows if progress is None else progress)
+    for window, step in zip(windows, steps, strict=True):
+        ids = step.assigned[0]
+        takers.append(np.where(ids > 0, ids, -1))
+        sure.append(np.asarray(step.confirmed[0], dtype=np.bool_))
+        known = (ids > 0) & np.isfinite(window.altitudes)
+        altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
+        ends.append(float(step.time))
+        listed = (track for track in tracker.tracks if track.confirmed or not confirmed)
+        table.add(listed, tracker.filter.motion.position, altitudes)
+    tracks = np.concatenate(takers)
+    aircraft = recording.aircraft
+    rates = None
+    if aircraft is not None and windows:
+        number = np.repeat(np.arange(len(windows)), [len(window) for window in windows])
+        rows = np.concatenate([window.rows for window in windows])
+        rates = ct_mt_it(number, aircraft[rows], tracks, np.concatenate(sure))
+    return PlotTracks(recording, windows, np.array(ends), tracks, rates, table)

@@ -1,0 +1,70 @@
+"""The published results: one small file for each experiment, from which the pages take their figures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from experiments.common.claims import Claim, load_json
+
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+
+
+def result_file(name: str) -> Path:
+    """Path of the result file of ``python -m experiments.NAME``."""
+    return RESULTS / f"{name}.json"
+
+
+class Results:
+    """The claims of a result file by their quantity.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    """
+
+    def __init__(self, name: str) -> None:
+        path = result_file(name)
+        self.name = name
+        self.claims: list[Claim] = load_json(path)
+        self.head: dict[str, Any] = {k: v for k, v in json.loads(path.read_text()).items() if k != "claims"}
+        self._by_quantity = {claim.quantity: claim for claim in self.claims}
+
+    def __getitem__(self, quantity: str) -> Claim:
+        if quantity not in self._by_quantity:
+            raise KeyError(f"{result_file(self.name)}: no claim {quantity!r}")
+        return self._by_quantity[quantity]
+
+    def __contains__(self, quantity: str) -> bool:
+        return quantity in self._by_quantity
+
+    def starting(self, words: str) -> list[Claim]:
+        """Claims whose quantity begins so, at least one."""
+        found = [claim for claim in self.claims if claim.quantity.startswith(words)]
+        if not found:
+            raise KeyError(f"{result_file(self.name)}: no claim begins with {words!r}")
+        return found
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with at least so many significant digits, thousands with commas."""
+    if abs(value) < 1e-12:
+        value = 0.0
+    size = abs(value)
+    if size and (size < 1e-4 or size >= 1e7):
+        return f"{value:.{digits - 1}e}"
+    decimals = digits - 1
+    while size >= 10 and decimals > 0:
+        size, decimals = size / 10, decimals - 1
+    while 0 < size < 1 and decimals < 8:
+        size, decimals = size * 10, decimals + 1
+    return f"{value:,.{decimals}f}"
+
+
+def table(head: list[str], rows: list[list[str]], right: Callable[[int], bool] = lambda column: column > 0) -> str:
+    """A table in Markdown; all columns but the first are set to the right unless told otherwise."""
+    rule = ["---:" if right(column) else "---" for column in range(len(head))]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, rule, *rows))

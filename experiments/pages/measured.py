@@ -1,0 +1,236 @@
+"""Tables of measured figures for docs/filters.md, docs/recordings.md and docs/sweeps.md."""
+
+from __future__ import annotations
+
+from experiments.common.claims import Claim
+from experiments.common.results import Results, number, table
+
+SCENARIOS = tuple("CDEFGH")
+
+
+def _judged(claim: Claim, digits: int = 3) -> str:
+    """Our figure, bold where it misses its limit."""
+    text = number(claim.ours, digits)
+    return f"**{text}**" if claim.holds is False else text
+
+
+def fuzzy() -> str:
+    """RMSE and ratios of the fuzzy filters on scenarios C to H."""
+    r = Results("papers.fuzzy_ekf")
+
+    def find(scenario: str, words: str) -> Claim:
+        # names of the best fixed filters follow in brackets
+        found = r.starting(f"{scenario}: {words}")
+        return min(found, key=lambda claim: len(claim.quantity.split(" (")[0]))
+
+    lines = (
+        ("raw measurements", "RMSE, raw measurements"),
+        ("best fixed EKF, constant velocity or acceleration", "RMSE, best fixed EKF ("),
+        ("best fixed EKF, constant acceleration (the paper's model)", "RMSE, best fixed EKF of constant acceleration"),
+        ("best fixed EKF with the turn rate in its state", "RMSE, best fixed EKF with turn rate"),
+        ("the paper's rules, sets and base noise tuned by us", "RMSE, the paper's rules, tuned sets"),
+        ("the paper's rules, sets chosen by eye", "RMSE, the paper's rules, sets chosen by eye"),
+        ("Q_0, R_0, P_0 of equations 38 to 40 taken literally, EKF", "RMSE, Q_0, R_0 and P_0 taken literally, EKF"),
+        ("the same with the rules", "RMSE, Q_0, R_0 and P_0 taken literally, with rules"),
+        ("tuned rules", "RMSE, tuned rules"),
+        ("IMM, tuned with the same care", "RMSE, IMM"),
+    )
+    ratios = (
+        ("the paper's rules, tuned sets / best fixed EKF of constant acceleration (at most 1)", None),
+        ("the paper's rules, tuned sets / best fixed EKF (at most 1)", None),
+        ("tuned rules / best fixed EKF (at most 0.97)", None),
+        ("tuned rules / best fixed EKF with turn rate (at most 0.97)", None),
+        ("tuned rules / IMM (at most 1.08)", None),
+        ("tuned rules / IMM, both smoothed over 2 steps (at most 1.08)", None),
+    )
+    rows = [[name, *(number(find(s, words).ours) for s in SCENARIOS)] for name, words in lines]
+    rows += [[name, *(_judged(r[f"{s}: {name.split(' (at')[0]}"]) for s in SCENARIOS)] for name, _ in ratios]
+    return table(["", *SCENARIOS], rows)
+
+
+def phases() -> str:
+    """Tuned rules and IMM in straight flight and in turns."""
+    r = Results("papers.fuzzy_ekf")
+    rows = [
+        [phase, *(" / ".join(number(r[f"{s}: RMSE in {phase}, {one}"].ours) for one in ("tuned rules", "IMM"))
+                  for s in SCENARIOS)]
+        for phase in ("straight flight", "turns and 5 s after")
+    ]  # fmt: skip
+    return table(["", *SCENARIOS], rows)
+
+
+def paper_setting() -> str:
+    """Table 4.3 of the modified EKF's paper in each reading."""
+    r = Results("papers.modified_ekf")
+    readings = ("sigmas", "R_k", "mixed", "moving")
+    rows = []
+    for variable in ("x", "y", "z", "Vx", "Vy", "Vz"):
+        for name in ("EKF", "modified"):
+            claims = [r[f"simulation 1, reading {one}: RMSE of {variable}, {name}"] for one in readings]
+            paper = claims[0].paper
+            assert paper is not None
+            rows.append([f"{variable}, {name}", number(paper), *(_judged(claim) for claim in claims)])
+    claims = [r[f"simulation 1, reading {one}: modified / EKF, RMSE of the position"] for one in readings]
+    paper = claims[0].paper
+    assert paper is not None
+    rows.append(["position, modified / EKF (below 0.99)", number(paper, 2), *(_judged(claim) for claim in claims)])
+    more = (
+        ("beta", "beta"),
+        ("r x prior variance of azimuth / sigma_range", "r * prior variance of azimuth / sigma_range, mean"),
+    )
+    for words, quantity in more:
+        rows.append([words, "", *(number(r[f"simulation 1, reading {one}: {quantity}"].ours, 2) for one in readings)])
+    return table(["", "paper", *(f'"{one}"' for one in readings)], rows)
+
+
+def consistency() -> str:
+    """NEES and NIS of every filter."""
+    r = Results("filters.consistency")
+    cells: dict[tuple[str, str], list[str]] = {}
+    for claim in r.claims:
+        case, rest = claim.quantity.split(", ", 1)
+        name = rest.split(": N")[0]
+        cells.setdefault((case, name), []).append(f"{claim.ours:,.4g}{'' if claim.holds else ' *'}")
+    return table(["case", "filter", "NEES (6)", "NIS (3)"], [[*key, *values] for key, values in cells.items()],
+                 lambda column: column > 1)  # fmt: skip
+
+
+KINDS = ("Kalman", "EKF", "UKF", "EnKF")
+COLUMNS = {
+    "filterpy": "filterpy",
+    "Stone Soup": "Stone Soup",
+    "one track, `predict` and `update`": "assoc, two calls",
+    "one track, `step`": "assoc, one call",
+    "one track's recording, `run`": "assoc, a recording",
+    "batch, a track": "assoc, batch",
+}
+
+
+def speed() -> str:
+    """Microseconds of every filter and package."""
+    r = Results("filters.benchmark")
+    rows = [[kind, *(number(r[f"{kind}: {name}"].ours, 2) for name in COLUMNS.values())] for kind in KINDS]
+    return table(["", *COLUMNS], rows)
+
+
+def speed_ratios() -> str:
+    """The faster of the two other packages divided by ours."""
+    r = Results("filters.benchmark")
+    names = {
+        "`predict` and `update`": "one track, a step in two calls",
+        "`step`": "one track, a step in one call",
+        "`run`": "one track's recording in a call",
+        "batch": "in a batch",
+    }
+    rows = [
+        [kind, *(_judged(r[f"{kind}: faster of the two / assoc, {words}"]) for words in names.values())]
+        for kind in KINDS
+    ]
+    return table(["", *names], rows)
+
+
+def batch() -> str:
+    """Updates in a batch."""
+    r = Results("filters.benchmark")
+    rows = [[c.quantity.split(": ")[1], _judged(c)] for c in r.starting("EKF, batch of")]
+    return table(["EKF, batch of 10,000, microseconds a track (goal: 2)", ""], rows)
+
+
+def overhead() -> str:
+    """The overhead of a run in a parameter study."""
+    r = Results("sweep_overhead")
+    parts = ("overhead a run", "processor time of the sweep, a run", "in the solver, a run")
+    rows = [
+        [f"{kind}, {backend}", *(_judged(r[f"{kind}, {backend}: {part}"], 2) for part in parts)]
+        for kind in ("greedy", "ant colony")
+        for backend in ("one process", "joblib", "dask")
+    ]
+    return table(["ms", *parts], rows)
+
+
+def traffic() -> str:
+    """CT, MT and IT by grouping, clock and tracker."""
+    r = Results("papers.clustering_time_window")
+    names = {
+        "nearest neighbour": "nearest neighbour",
+        "MHT": "MHT, track-oriented",
+        "Reid's MHT": "MHT, Reid and Murty (the thesis's)",
+    }
+    rows = [
+        [f"thesis: {words}", "constant step", "MHT, Reid and Murty",
+         *(number(r[f"{rate}, Reid's MHT, {key}"].paper or 0.0) for rate in ("CT", "MT", "IT"))]
+        for words, key in (("irregular", "irregular groups"), ("window", "CTW"))
+    ]  # fmt: skip
+    for clock, suffix in (("constant step", ""), ("time stamps", ", time stamps")):
+        for words, key in (("irregular", "irregular groups"), ("window", "CTW")):
+            for name, shown in names.items():
+                claims = [r[f"{rate}, {name}, {key}{suffix}"] for rate in ("CT", "MT", "IT")]
+                low, high = claims[0].interval or (claims[0].ours, claims[0].ours)
+                ct = f"{number(claims[0].ours)} ± {(high - low) / 2:.1f}"
+                rows.append([words, clock, shown, ct, *(number(claim.ours) for claim in claims[1:])])
+    return table(["grouping", "clock", "tracker", "CT", "MT", "IT"], rows, lambda column: column > 2)
+
+
+def ant_colony() -> str:
+    """Table 1 and its conclusions in both modes."""
+    r = Results("papers.ant_colony")
+
+    def cell(mode: str, words: str, digits: int = 3) -> str:
+        claim = r[f"mode {mode}: {words}"]
+        ends = "" if claim.interval is None else f" ({number(claim.interval[0], 3)} .. {number(claim.interval[1], 3)})"
+        return f"{number(claim.ours, digits)}{ends}"
+
+    means = {
+        mode: [c.ours for c in r.starting("setting") if c.quantity.endswith(words)]
+        for mode, words in (("paper", "mode paper: mean cycles to convergence"), ("mmas", "mode mmas: mean cycles"))
+    }
+    paper = [c.paper for c in r.starting("setting") if c.paper is not None]
+    below = "cycles, alpha > beta less the others, whole interval below 0"
+    above = "certified optimal, alpha > beta less the others, whole interval above 0"
+    overall = r["mode paper: mean cycles over all settings"]
+    rows = [
+        ["mean cycles over the 24 settings", number(overall.paper or 0.0),
+         cell("paper", "mean cycles over all settings"), number(sum(means["mmas"]) / len(means["mmas"]))],
+        ["smallest and largest mean of a setting", f"{min(paper):.2f}, {max(paper):.2f}",
+         *(f"{number(min(means[mode]))}, {number(max(means[mode]))}" for mode in ("paper", "mmas"))],
+        ["scans certified optimal, worst setting, %", "not given",
+         *(cell(mode, "least certified optimal of a setting") for mode in ("paper", "mmas"))],
+        ["cycles, alpha > beta less the others", number(r[f"mode paper: {below}"].paper or 0.0, 2),
+         *(cell(mode, below, 2) for mode in ("paper", "mmas"))],
+        ["certified optimal, alpha > beta less the others, %", "claimed, no figure",
+         *(cell(mode, above, 2) for mode in ("paper", "mmas"))],
+        ["rank in cycles of rho 0.3, alpha 2, beta 1 among 24", "1",
+         *(cell(mode, "rank in cycles of alpha 2 beta 1 rho 0.3 of 24") for mode in ("paper", "mmas"))],
+    ]  # fmt: skip
+    return table(["", "paper", "mode paper", "mode mmas"], rows)
+
+
+def readings() -> str:
+    """Mean cycles of every reading of what the ant colony paper leaves open."""
+    r = Results("papers.ant_colony")
+    rows = [
+        [
+            "Table 1, alpha 2, beta 1, rho 0.3",
+            number(next(c.paper for c in r.starting("reading") if c.paper) or 0.0),
+            "",
+        ]
+    ]
+    for claim in r.starting("reading"):
+        if claim.quantity.endswith("mean cycles"):
+            words = claim.quantity.removeprefix("reading, ").removesuffix(": mean cycles")
+            low, high = claim.interval or (claim.ours, claim.ours)
+            rows.append([words, number(claim.ours), f"{number(low)} .. {number(high)}"])
+    return table(["reading", "mean cycles", "95 % interval"], rows)
+
+
+FILTERS = {
+    "paper-setting": paper_setting,
+    "fuzzy": fuzzy,
+    "phases": phases,
+    "consistency": consistency,
+    "speed": speed,
+    "speed-ratios": speed_ratios,
+    "batch": batch,
+}
+RECORDINGS = {"traffic": traffic}
+SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}

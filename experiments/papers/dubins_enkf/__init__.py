@@ -1,0 +1,1 @@
+"""Dubins paths and the ensemble Kalman filter for an unmanned aircraft."""

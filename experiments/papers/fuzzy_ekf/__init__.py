@@ -1,0 +1,1 @@
+"""The EKF with fuzzy inference: the paper's rules, tuned rules, fixed filters and an IMM on the same manoeuvres."""

@@ -1,0 +1,162 @@
+"""The figures on the pages are those of the published results, and every claim there names its source."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from experiments.__main__ import EXPERIMENTS
+from experiments.common.results import RESULTS, Results, number
+from experiments.pages.__main__ import DOCS, TABLES, insert, main
+
+PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md")
+ROOT = Path(__file__).parents[2]
+NAMES = {one.name for one in EXPERIMENTS}
+# files of parameters that experiments write with their scores
+PARAMETERS = {
+    "filters.tune": ROOT / "assoc" / "filters" / "fuzzy" / "tuned_parameters.json",
+    "papers.fuzzy_ekf.tune_published": ROOT / "experiments" / "papers" / "fuzzy_ekf" / "published_rules.json",
+}
+WORD = r"(?:equations?|tables?|figures?|fig\.|eqs?\.|sections?|rows?|conclusions?|rules|appendix|step|place)"
+REFERENCES = re.compile(
+    rf"{WORD}\s+[\d.]*\d(?:(?:,| and| to|,? but)\s+(?:{WORD}\s+)?[\d.]*\d)*", re.IGNORECASE
+)
+NUMBER = re.compile(r"(?<![\w.^])\d[\d,]*(?:\.\d+)?(?:e-?\d+)?(?![\w^]|\.\d)")
+
+
+def sections(page: str) -> list[tuple[str, str]]:
+    """Parts of a page that name an experiment, by their heading; of papers.md all."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    parts = re.split(r"^## ", text, flags=re.MULTILINE)
+    return [(part.split("\n")[0], part) for part in parts if "experiments." in part]
+
+
+SECTIONS = [(page, name, text) for page in PAGES for name, text in sections(page)]
+
+
+def sources(text: str) -> set[str]:
+    """Experiments that a part of a page names and that have a file of results."""
+    flat = " ".join(text.split())
+    named = set(re.findall(r"python -m experiments\.([\w.]*\w)", flat))
+    return {one for one in named if (RESULTS / f"{one}.json").exists() or one in PARAMETERS}
+
+
+def known(name: str) -> list[float]:
+    """Every number in the files of an experiment: measured, claimed, accepted, or set."""
+    if name in PARAMETERS:
+        return [float(one.replace(",", "")) for one in NUMBER.findall(PARAMETERS[name].read_text())]
+    results = Results(name)
+    found: list[float] = [float(results.head["seed"])]
+    texts = [results.head["about"]]
+    for claim in results.claims:
+        found += [one for one in (claim.paper, claim.ours) if one is not None]
+        found += [end for pair in (claim.interval, claim.band) if pair for end in pair if end is not None]
+        texts += [claim.quantity, claim.source]
+    found += [float(one.replace(",", "")) for text in texts for one in NUMBER.findall(text)]
+    return found
+
+
+def figures(text: str) -> list[str]:
+    """Numbers in a part of a page, those of code, links, paths and references to papers left out."""
+    text = re.sub(r"```.*?```", " ", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->", " ", text, flags=re.DOTALL)
+    text = re.sub(r"`[^`]*`", " ", text)
+    text = re.sub(r"\]\([^)]*\)", "] ", text)
+    text = REFERENCES.sub(" ", " ".join(text.split()))
+    # years of papers, names such as 3-D
+    text = re.sub(r"\b(?:19|20)\d\d\b|\b\d-D\b", " ", text)
+    return NUMBER.findall(text)
+
+
+def is_one_of(figure: str, numbers: list[float]) -> bool:
+    """Whether a printed figure is one of the numbers, rounded to its digits."""
+    plain = figure.replace(",", "")
+    decimals = len(plain.partition(".")[2])
+    half = 0.5 * 10.0**-decimals
+    return any(abs(abs(one) - float(plain)) <= half * 1.000001 for one in numbers)
+
+
+@pytest.mark.parametrize(("page", "name", "text"), SECTIONS, ids=[f"{page}: {name}" for page, name, _ in SECTIONS])
+def test_every_figure_is_in_a_result_file(page, name, text):
+    named = sources(text)
+    # what is said of the papers as a whole, before the first heading of the page
+    if page == "papers.md" and text.startswith("#"):
+        assert not figures(text)
+        return
+    assert named, f"docs/{page}, {name}: names no experiment with a result file"
+    numbers = [one for source in named for one in known(source)]
+    missing = [one for one in figures(text) if not is_one_of(one, numbers)]
+    assert not missing, f"docs/{page}, {name}: {missing} are in no result file of {sorted(named)}"
+
+
+def test_the_check_finds_a_wrong_figure():
+    numbers = [0.354, 2086.6, 12.0]
+    assert [is_one_of(one, numbers) for one in ("0.354", "0.35", "2,087", "12", "0.36", "2,086", "12.1")] == [
+        True, True, True, True, False, False, False,
+    ]  # fmt: skip
+    text = "Table 4.3 has 0.71, equations 4.1 to 4.15 and tables 2.1 and 2.2 not; `x=5` and 3-D neither, 2,087 m does."
+    assert figures(text) == ["0.71", "2,087"]
+
+
+@pytest.mark.parametrize("page", TABLES)
+def test_tables_are_those_of_the_results(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert insert(text, TABLES[page]) == text, "run python -m experiments.pages"
+
+
+def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
+    text = (DOCS / "papers.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = [row for row in rows if row[0] not in ("element", "---")]
+    assert len(rows) > 100
+    for row in rows:
+        element, result, command = row[0], row[2], row[3] if len(row) > 3 else ""
+        assert re.match("holds|does not hold|absent", result), element
+        shown = re.findall(r"`(pytest|python -m) ([^`]+)`", command)
+        # where something is absent there may be nothing to show it with
+        assert shown or result.startswith("absent"), element
+        for program, what in shown:
+            known = (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES
+            assert known, element
+
+
+def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):
+    with pytest.raises(ValueError, match="expected the marks"):
+        insert("no marks", {"x": lambda: "table"})
+    monkeypatch.setattr("experiments.pages.__main__.DOCS", tmp_path)
+    monkeypatch.setattr(
+        "experiments.pages.__main__.TABLES", {"p.md": {"x": lambda: "| a |"}}
+    )
+    page = tmp_path / "p.md"
+    page.write_text("before\n<!-- table x: written by python -m experiments.pages -->\nold\n<!-- end of x -->\nafter\n")
+    assert main(["--check"]) == 1 and "old" in page.read_text()
+    assert main([]) == 0
+    assert "| a |" in page.read_text() and "old" not in page.read_text() and page.read_text().endswith("after\n")
+    assert main(["--check"]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("path", sorted(RESULTS.glob("*.json")), ids=lambda path: path.stem)
+def test_result_files_are_small_dated_and_name_their_sources(path):
+    assert path.stat().st_size < 150_000
+    data = json.loads(path.read_text())
+    assert data["experiment"] == path.stem
+    assert path.stem in {one.name for one in EXPERIMENTS}
+    assert isinstance(data["seed"], int) and re.fullmatch(r"20\d\d-\d\d-\d\d", data["date"])
+    assert data["about"]
+    for claim in data["claims"]:
+        if claim["paper"] is not None:
+            # a page, table, figure, equation or section of the paper
+            assert re.search(r"(table|figure|equation|section|conclusion|abstract)s?\b", claim["source"]), claim
+        if claim["band"] is not None:
+            assert claim["source"], claim["quantity"]
+
+
+def test_numbers():
+    assert [number(one) for one in (2086.63, 88.54, 1.0, 0.00942, 521.13, 9.4079)] == [
+        "2,087", "88.5", "1.00", "0.00942", "521", "9.41",
+    ]  # fmt: skip
+    assert number(521.13, 4) == "521.1" and number(0.0) == "0.00" and number(-4.36) == "-4.36"
