@@ -53,17 +53,22 @@ def search_components(
     duals = dual_bound(packing, run=share)
     components = split_components(packing, duals, np.arange(packing.num_columns))
     deadline = run.deadline()
+    parts: list[Component] = []
     for component in components:
         component.deadline, component.refinement = deadline, parameters.refinement
         component.offer_greedy()
-        if not component.closed and not share.should_stop():
+        if component.closed:
+            parts.append(component)
+            continue
+        if not share.should_stop():
             component.sharpen(share)
         for number in range(_DIVES):
             # the first one whatever the share: what it finds is worth more than all that comes after it
             if component.dives and (number == 0 or not share.should_stop()):
                 component.settle(component.dive(number, run.rng), run.rng, parameters.clusters)
-    # what no better cover can use is gone before the search begins
-    components = [part for whole in components for part in (split_component(whole) or [whole])]
+        # what no better cover can use is gone before the search begins
+        parts.extend(split_component(component) or [component])
+    components = parts
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
     done = len(components)
