@@ -33,11 +33,8 @@ def assign(
     seed: int | np.random.SeedSequence | np.random.Generator = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
-<<<<<<< HEAD
     watch: Callable[[Any], object] | None = None,
-=======
     advise: bool = True,
->>>>>>> main
     proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
@@ -55,14 +52,11 @@ def assign(
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
         Called with each ``TracePoint``; a true answer stops the solver.
-<<<<<<< HEAD
     watch : callable, optional
         Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
         gives the same by tuples of the problem.
-=======
     advise : bool, default True
         Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
->>>>>>> main
     proof : path-like, optional
         Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
         (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
