@@ -58,6 +58,8 @@ def _simulate(words: list[str]) -> None:
     scene = simulation.simulate(scenario, seed, **values)
     scene.save(parsed["output"])
     print_lines(f"{printable(parsed['output'])}: {scene!r}")
+    for what, count in scene.notes.items():
+        print_lines(f"{what}: {count:,}")
 
 
 def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[str, Any]) -> None:

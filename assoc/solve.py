@@ -17,7 +17,7 @@ from assoc._cli.options import add_common_options, common_values, parameter_valu
 from assoc._cli.program import Parser, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
 from assoc._cli.table import print_table
-from assoc._cli.values import check_kind, scan_range
+from assoc._cli.values import check_kind, density, scan_range
 from assoc._files.output import write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
-_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
+_GATING = ("gate_probability", "max_tuples", "target_density")
+_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -101,7 +102,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--csv", metavar="FILE", help="write the table as CSV")
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
-    add_common_options(parser, ["gate_probability", "max_tuples"])
+    add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
         for option in choices:
@@ -126,6 +127,9 @@ def _read_config(path: str) -> dict[str, Any]:
             continue
         if key not in _SETTINGS:
             raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
+        if key == "target_density":
+            density(str(value), f"{path}: {key}")
+            continue
         kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
         check_kind(value, kind, f"{path}: {key}")
     return config
@@ -152,7 +156,7 @@ def _plan(
     from assoc.association.plan import Plan
 
     gating: dict[str, Any] = {
-        key: settings[key] for key in ("gate_probability", "max_tuples") if key in settings
+        key: settings[key] for key in _GATING if key in settings
     }
     plan = Plan(
         tuple(sources),

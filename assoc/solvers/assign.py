@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Callback, Outcome, Run
@@ -20,6 +21,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify
+from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 
 
@@ -30,6 +32,8 @@ def assign(
     seed: int | np.random.SeedSequence | np.random.Generator = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
+    advise: bool = True,
+    proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
     """Solve an assignment problem.
@@ -46,6 +50,11 @@ def assign(
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
         Called with each ``TracePoint``; a true answer stops the solver.
+    advise : bool, default True
+        Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
+    proof : path-like, optional
+        Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
+        (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
     **parameters
         Parameters of that solver (``assoc.solvers.parameters(name)``).
 
@@ -60,6 +69,11 @@ def assign(
         Unknown solver or parameter, or a value out of range.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
+
+    Warns
+    -----
+    AssocWarning
+        No tuple costs less than its measurements as false alarms, so that nothing can be a target.
     """
     started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
@@ -67,6 +81,8 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
+    if proof is not None:
+        check_writable(proof)
     run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
@@ -85,7 +101,16 @@ def assign(
             outcome = Outcome(run.fallback, 0)
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
-        return certify(problem, prepared, outcome, run, solver, chosen)
+        solution = certify(problem, prepared, outcome, run, solver, chosen)
+        if proof is not None:
+            from assoc.proofs import write_proof  # loads what few calls need
+
+            write_proof(proof, problem, solution)
+    # only where nothing was found is it worth a look why
+    if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
+        for line in doubts_about_costs(problem):
+            warn(line)
+    return solution
 
 
 def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
