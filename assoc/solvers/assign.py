@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -32,6 +33,7 @@ def assign(
     seed: int | np.random.SeedSequence | np.random.Generator = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
+    watch: Callable[[Any], object] | None = None,
     advise: bool = True,
     proof: FilePath | None = None,
     **parameters: Any,
@@ -50,6 +52,9 @@ def assign(
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
         Called with each ``TracePoint``; a true answer stops the solver.
+    watch : callable, optional
+        Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
+        gives the same by tuples of the problem.
     advise : bool, default True
         Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
     proof : path-like, optional
@@ -83,7 +88,7 @@ def assign(
     limit = checked_time_limit(time_limit)
     if proof is not None:
         check_writable(proof)
-    run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
+    run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import time
 
 import numpy as np
 import pytest
 
 import assoc
+from assoc.association.plan import Plan
 from assoc.plotting.report import write_association_report
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
@@ -17,6 +19,9 @@ from tests.plotting.test_association_report import EVIL
 
 CURRENT = "return document.querySelector('#scan-table tr[aria-current=true]').dataset.row"
 LINK = '<a href="javascript:alert(2)">b</a>'
+MOVE = (
+    "const s = document.getElementById(arguments[0]); s.value = arguments[1];s.dispatchEvent(new Event(arguments[2]))"
+)
 READY = "return document.documentElement.dataset.ready"
 
 
@@ -145,3 +150,35 @@ def test_a_script_that_slips_through_does_not_run(browser, page, tmp_path):
     show(browser, broken)
     assert browser.execute_script("return window.slipped === undefined")
     assert any("Content Security Policy" in one for one in complaints(browser))
+
+
+@pytest.mark.parametrize("mode", ["paper", "mmas"])
+def test_the_ants_over_their_cycles(browser, tmp_path, pictures, mode):
+    """A slider over the cycles: the bars are the history's, and a scan that no ant walked says so."""
+    scene = simulate("bearing-only", 0, targets=12, scans=3)
+    parameters = {"mode": mode, "iterations": 20, "refinement": "none"}
+    plan = Plan((scene,), "aco", parameters=parameters, pheromone=True)
+    association = plan.gather(plan.run(plan.items()))
+    history = association.scans[0].pheromone
+    assert len(history.cycles) > 2
+    path = tmp_path / "out.html"
+    write_association_report(path, association, scene)
+    bars = "return document.getElementById('ants-plot').data.map((t) => [t.y, t.x])"
+    for size in (DESKTOP, PHONE):
+        show(browser, path, size)
+        for _ in range(100):
+            if browser.execute_script("return Boolean(document.getElementById('ants-plot').data)"):
+                break
+            time.sleep(0.1)
+        for name, factor in (("pheromone", 1.0), ("probability", 100.0), ("visibility", 1.0)):
+            browser.execute_script(MOVE, "ants-measure", name, "change")
+            for cycle in (0, len(history.cycles) - 1):
+                browser.execute_script(MOVE, "cycle-slider", str(cycle), "input")
+                drawn = {y: x for trace in browser.execute_script(bars) for y, x in zip(*trace, strict=True)}
+                names = [f"({', '.join(map(str, row))})" for row in history.tuples.tolist()]
+                expected = factor * getattr(history, name)[cycle]
+                assert [drawn[one] for one in names] == pytest.approx(expected.tolist(), rel=6e-3)
+            screenshot(browser, pictures / f"ants-{mode}-{name}-{size[0]}.png")
+        assert f"of {history.cycles[-1]}" in browser.find_element("id", "cycle-slider-label").text
+        assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
+    assert complaints(browser) == []

@@ -161,7 +161,7 @@ const showScan = (index) => {
   markRow(scanTable, index);
   // the scene follows the slider at once, the histories when there is time
   window.clearTimeout(pending);
-  pending = window.setTimeout(() => { drawTrace(); drawScans(); }, 30);
+  pending = window.setTimeout(() => { drawTrace(); drawScans(); showAnts(index); }, 30);
 };
 
 const setSpace = (space) => {

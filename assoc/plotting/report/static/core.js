@@ -92,11 +92,12 @@ const onRow = (table, choose) => table.tBodies[0].addEventListener('click', (eve
   choose(Number(row.dataset.row));
 });
 
-// The slider with its buttons; choose(i) moves it from elsewhere.
-const makeSlider = (count, label, show) => {
-  const range = byId('slider');
-  const text = byId('slider-label');
-  const play = byId('play');
+// A slider with its buttons; choose(i) moves it from elsewhere, and may say that it has another number of places now.
+const makeSlider = (places, label, show, prefix = '') => {
+  let count = places;
+  const range = byId(`${prefix}slider`);
+  const text = byId(`${prefix}slider-label`);
+  const play = byId(`${prefix}play`);
   let timer = null;
   const choose = (wanted) => {
     const number = Math.min(Math.max(wanted, 0), count - 1);
@@ -113,15 +114,20 @@ const makeSlider = (count, label, show) => {
   };
   range.max = String(count - 1);
   range.addEventListener('input', () => { stop(); choose(Number(range.value)); });
-  byId('before').addEventListener('click', () => { stop(); choose(Number(range.value) - 1); });
-  byId('after').addEventListener('click', () => { stop(); choose(Number(range.value) + 1); });
+  byId(`${prefix}before`).addEventListener('click', () => { stop(); choose(Number(range.value) - 1); });
+  byId(`${prefix}after`).addEventListener('click', () => { stop(); choose(Number(range.value) + 1); });
   play.addEventListener('click', () => {
     if (timer !== null) { stop(); return; }
     play.textContent = 'Pause';
     play.setAttribute('aria-pressed', 'true');
     timer = window.setInterval(() => choose((Number(range.value) + 1) % count), 400);
   });
-  return (number) => { stop(); choose(number); };
+  return (number, now = count) => {
+    stop();
+    count = now;
+    range.max = String(count - 1);
+    choose(number);
+  };
 };
 
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13 };
