@@ -35,6 +35,7 @@ SCENARIOS = [
     ("crowd", {"scans": 3, "sensor": "radar"}),
     ("bearing-only", {"scans": 4}),
     ("dubins-uav", {"targets": 3}),
+    ("rotating-radars", {}),
     ("from-tracks", {"scans": 8}),
 ]
 

@@ -51,7 +51,7 @@ def test_azimuth_turns_from_x_to_y_and_elevation_up():
     np.testing.assert_allclose(radar.measure(places), expected, atol=1e-12)
     flat = Radar2D(position=[1, 2, 3], noise=[1, 0.1], field_of_view=[[0, 9], CIRCLE])
     np.testing.assert_allclose(flat.measure(places), np.array(expected)[:, :2], atol=1e-12)
-    only = BearingSensor(position=[1, 2, 3], noise=[1])
+    only = BearingSensor(position=[1, 2, 3], noise=[0.1])
     np.testing.assert_allclose(only.measure(places), np.array(expected)[:, 1:2], atol=1e-12)
 
 
