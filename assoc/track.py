@@ -23,8 +23,9 @@ from assoc._cli.options import (
     parameter_values,
     read_first,
 )
-from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
+from assoc._cli.program import Parser, command, prepare_process, prepare_streams, run_program, write_all
 from assoc._cli.progress import with_progress
+from assoc._cli.signals import Interruption
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, seconds, whole_number
 from assoc._files.output import STDOUT
@@ -35,11 +36,13 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from assoc.recordings import Recording
     from assoc.scene.scene import Scene
     from assoc.sensors import Sensor
     from assoc.tracking import Tracker, TrackTable
     from assoc.tracking.plot_tracks import PlotTracks
 
+_INTERRUPTION = Interruption("assoc.track")
 TRACKERS = {
     "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
     "static": "associates the sensors of a scan first, then assigns the results to tracks",
@@ -64,6 +67,8 @@ _RADAR = {
 FORMATS = {".csv": "to_csv", ".parquet": "to_parquet"}
 """Endings of the output, and which method of the table writes it."""
 
+# options that only --live takes
+_LIVE = ("udp", "replay", "page", "interval", "turns", "horizon", "wait")
 CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
@@ -75,8 +80,14 @@ further options (docs/tracking.md):
 
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
-    prepare_process("assoc.track")
-    return main(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if "--live" in words:
+        # what has come in is still written
+        prepare_streams()
+        _INTERRUPTION.interrupt_on_signals()
+    else:
+        prepare_process("assoc.track")
+    return main(words)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -100,6 +111,8 @@ def _track(words: list[str]) -> None:
     parsed = vars(parser.parse_args(words))
     given = parsed["cutoff"]
     parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
+    if not parsed["live"] and parsed["output"] is None:
+        parser.error("the following arguments are required: -o/--output")
     check_outputs([parsed["output"], parsed["report"], parsed["rates"]], [parsed["file"]])
     ending = check_ending(parsed["output"], "--output", *FORMATS)
     check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
@@ -115,6 +128,12 @@ def _track(words: list[str]) -> None:
         "initiation": Initiation(**parameter_values(initiation, parsed)),
         **common_values(parsed),
     }
+    if parsed["live"]:
+        _live(parsed["file"], parsed, settings)
+        return
+    for option in _LIVE:
+        if parsed[option] is not None:
+            raise InvalidInputError(f"{flag_of(option)}: is only for --live")
     with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"], parsed["rates"]]):
         _make_tracks(words, parsed, settings, ending)
 
@@ -184,15 +203,17 @@ def completions() -> dict[str, Sequence[str]]:
 
 def _parser(further: Sequence[Option]) -> Parser:
     lines = [f"  {name:<18} {purpose}" for name, purpose in TRACKERS.items()]
+    called = command("track")
     parser = Parser(
         prog="assoc.track",
-        usage=f"{command('track')} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
+        usage=f"{called} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]\n"
+        f"       {called} SCENE --live [--udp PORT] [--page PORT] [options] < plots",
         description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", required=True, metavar="FILE", help="file for the tracks (.csv or .parquet)")
+    add("-o", "--output", metavar="FILE", help="file for the tracks (.csv or .parquet)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
     add("--tracker", metavar="NAME", help="name of the tracker, see below")
     add("--solver", metavar="NAME", help="name of the solver (default exact)")
@@ -222,10 +243,21 @@ def _parser(further: Sequence[Option]) -> Parser:
     plots.add_argument("--rates", metavar="FILE", help="write CT, MT and IT of each window (.csv; needs identities)")
     plots.add_argument("--rotation", metavar="S", help="rotation period of the antenna, seconds (default: estimated)")
     add = plots.add_argument
+    add("--radar", metavar="SAC/SIC", help="which radar of an ASTERIX file (.ast, .asterix, .pcap)")
     add("--detection-probability", metavar="P", help="detection probability of the radar (default 0.8)")
     add("--range-noise", metavar="M", help="standard deviation of range, metres (default: from the plots' steps)")
     add("--bearing-noise", metavar="DEG", help="standard deviation of bearing, degrees (default: likewise)")
     add("--false-alarms", metavar="X", help="mean number of false plots in a rotation (default 2.5)")
+    live = parser.add_argument_group("options for plots as they come")
+    add = live.add_argument
+    add("--live", action="store_true", help="read plots as lines (CSV or JSON), write tracks as they change")
+    add("--udp", metavar="PORT", help="read them from this UDP port on 127.0.0.1 (default: stdin)")
+    add("--replay", metavar="X", help="take the scene's own plots, X times as quickly as they were made (0: at once)")
+    add("--page", metavar="PORT", help="show the picture moving on a page on 127.0.0.1 (0: any free port)")
+    add("--interval", metavar="S", help="seconds of plots that are taken in together (default 1)")
+    add("--turns", metavar="S,...", help="seconds for a turn of each radar's antenna (default: sensors look at once)")
+    add("--horizon", metavar="S", help="seconds that plots may be late (default 30)")
+    add("--wait", metavar="S", help="seconds for which an interval waits for plots (default 0)")
     for option in further:
         option.add_to(parser)
     return parser
@@ -239,6 +271,24 @@ def _is_npz(file: str) -> bool:
     except OSError:
         return not file.lower().endswith(".csv")
     return start == b"PK\x03\x04" or file.lower().endswith(".npz")
+
+
+def _is_asterix(file: str) -> bool:
+    return file.lower().endswith((".ast", ".asterix", ".pcap"))
+
+
+def _read_asterix(file: str, radar: str | None) -> Recording:
+    """Plots of one radar of an ASTERIX file."""
+    from assoc.integrations.asterix import read_asterix
+
+    plots = {f"{sac}/{sic}": recording for (sac, sic), recording in sorted(read_asterix(file).plots.items())}
+    if not plots:
+        raise InvalidInputError(f"{file}: holds no plots (category 048)")
+    if radar is None and len(plots) == 1:
+        return next(iter(plots.values()))
+    if radar not in plots:
+        raise InvalidInputError(f"--radar: the file holds plots of {', '.join(plots)}; name one")
+    return plots[radar]
 
 
 def _make(
@@ -309,7 +359,9 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
-    recording = read_plots(file)
+    recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
+    if parsed["radar"] is not None and not _is_asterix(file):
+        raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
     if parsed["rates"] and recording.aircraft is None:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
@@ -344,6 +396,82 @@ def _report_rates(plots: PlotTracks | None) -> None:
         for name, value in (("CT", rates.ct), ("MT", rates.mt), ("IT", rates.it))
     )
     print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
+
+
+def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
+    """Track plots as they come, until they end or a signal ends the program."""
+    from assoc._cli.live import Lines, TrackWriter, parse_line, replayed
+    from assoc.scene.scene import Scene
+    from assoc.tracking import LiveTracker
+
+    for flag in ("report", "rates", "window", "rotation", "registration", *_RADAR):
+        if parsed[flag] is not None:
+            raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
+    if parsed["udp"] is not None and parsed["replay"] is not None:
+        raise InvalidInputError("--udp and --replay: expected one of them")
+    parsed["filter"] = parsed["filter"] or "imm-cv"
+    given = [name for name in ("interval", "horizon", "wait") if parsed[name] is not None]
+    numbers = {name: number(parsed[name], flag_of(name)) for name in given}
+    turns = None if parsed["turns"] is None else [number(one, "--turns") for one in parsed["turns"].split(",")]
+    ports = {
+        name: None if parsed[name] is None else whole_number(parsed[name], flag_of(name), 0) for name in ("udp", "page")
+    }
+    speed = None if parsed["replay"] is None else number(parsed["replay"], "--replay")
+    if speed is not None and not 0 <= speed < math.inf:
+        raise InvalidInputError(f"--replay: expected a number >= 0, got {parsed['replay']!r}")
+    scene = Scene.load(file)
+
+    def tell(line: str) -> None:
+        print(f"assoc.track: {printable(line)}", file=sys.stderr, flush=True)
+
+    def make() -> Tracker:
+        return _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+
+    tracker = LiveTracker(scene, make, turns=turns, tell=tell, **numbers)
+    tracker.warm_up()
+    page = None
+    if ports["page"] is not None:
+        from assoc.plotting.live import LivePage
+
+        page = LivePage(scene, ports["page"], scene.name)
+        tell(f"page: {page.address}")
+    lines = None if speed is not None else Lines(ports["udp"])
+    if lines is not None and lines.port is not None:
+        tell(f"plots: udp 127.0.0.1:{lines.port}")
+    kept = parsed["output"] not in (None, "-")
+    stream = open(parsed["output"], "w", encoding="utf-8", newline="\n") if kept else sys.stdout
+    writer = TrackWriter(stream, tracker.positions)
+
+    def show(pictures: list[Any]) -> None:
+        for picture in pictures:
+            writer.write(picture)
+            if page is not None:
+                page.show(picture)
+
+    def end() -> None:
+        show(tracker.finish())
+        if page is not None:
+            page.close()
+        if kept:
+            stream.close()
+        if lines is not None and lines.lost:
+            tell(f"{lines.lost} lines lost: they came quicker than tracks can be made")
+        tell(tracker.summary())
+
+    with _INTERRUPTION.reported(end):
+        if lines is None:
+            for plot in replayed(scene, speed or 0.0):
+                show(tracker.take(*plot))
+        else:
+            for line in lines:
+                try:
+                    found = parse_line(line, scene)
+                except InvalidInputError as error:
+                    tracker.leave_out("lines not understood", f"line left out: {error}")
+                    continue
+                if found is not None:
+                    show(tracker.take(*found))
+    end()
 
 
 def _report(

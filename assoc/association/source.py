@@ -18,6 +18,8 @@ def load_source(path: str) -> Source:
     InvalidInputError
         It is neither, or cannot be read.
     """
+    if path.endswith(".txt"):
+        return AssignmentProblem.load(path)
     found = format_of(path)
     if found is None and _is_table(path):
         raise InvalidInputError(

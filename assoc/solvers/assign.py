@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
@@ -33,6 +34,7 @@ def assign(
     time_limit: float | None = None,
     callback: Callback | None = None,
     start: Solution | None = None,
+    proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
     """Solve an assignment problem.
@@ -51,6 +53,9 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
+    proof : path-like, optional
+        Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
+        (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
     **parameters
         Parameters of that solver (``assoc.solvers.parameters(name)``).
 
@@ -72,6 +77,8 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
+    if proof is not None:
+        check_writable(proof)
     run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
@@ -95,7 +102,12 @@ def assign(
             outcome = _lighter(packing, outcome, run.start, run)
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
-        return certify(problem, prepared, outcome, run, solver, chosen)
+        solution = certify(problem, prepared, outcome, run, solver, chosen)
+        if proof is not None:
+            from assoc.proofs import write_proof  # loads what few calls need
+
+            write_proof(proof, problem, solution)
+        return solution
 
 
 def _checked(outcome: object, solver: str) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.late_plots import LatePlots
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.live import LiveTracker, Picture
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
@@ -33,8 +34,10 @@ __all__ = [
     "Initiation",
     "LatePlots",
     "LifeCycle",
+    "LiveTracker",
     "MultiSensorTracker",
     "NearestNeighbourTracker",
+    "Picture",
     "StaticFusionTracker",
     "Step",
     "Track",

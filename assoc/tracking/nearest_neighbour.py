@@ -81,7 +81,7 @@ class NearestNeighbourTracker(Tracker):
     def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], Array, Array]:
         """Take in a scan whose measurements have times of their own; as `_at_once`, and which were looked at."""
         timed, old = self._timed(scan), len(self._batch)
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         # the sensors that have been taken in: only they can have missed a track
         past = np.zeros_like(looked)
         anchor = track = np.arange(old)
@@ -112,7 +112,7 @@ class NearestNeighbourTracker(Tracker):
             score = np.append(score, np.zeros(len(own)))
             done.append(s)
         followed = timed.follow(track, rows)
-        states = timed.at(followed, np.arange(len(track)), scan.time)
+        states = timed.at_end(followed, track)
         seen = rows.any(axis=1)
         when = np.where(seen, followed.when, np.nan)
         order = old + np.lexsort((*states.mean[old:, list(self.filter.motion.position)].T, followed.first[old:]))

@@ -347,6 +347,7 @@ class Tracker(Checkpoint):
         return TimedScan(
             self.filter, self._batch.states, before, scan.measurements, scan.own_times(), self.sensors,
             Places(positions, covariances, fit, births), start, scan.sectors, self.gate_probability,
+            scan.time,
         )  # fmt: skip
 
     def _seed(self) -> np.random.SeedSequence:

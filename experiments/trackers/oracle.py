@@ -57,7 +57,7 @@ class OracleTracker(SingleScanTracker):
 
     def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
         rows, fresh = self._true_rows(scan)
-        return self._outcome(scan, timed, timed.looked(scan.time), rows, fresh)
+        return self._outcome(scan, timed, timed.looked(), rows, fresh)
 
     def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         rows, fresh = self._true_rows(scan)

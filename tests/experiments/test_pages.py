@@ -14,6 +14,7 @@ from experiments.pages.__main__ import DOCS, TABLES, insert, main
 
 PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md")
 ROOT = Path(__file__).parents[2]
+NAMES = {one.name for one in EXPERIMENTS}
 # files of parameters that experiments write with their scores
 PARAMETERS = {
     "filters.tune": ROOT / "assoc" / "filters" / "fuzzy" / "tuned_parameters.json",
@@ -104,6 +105,22 @@ def test_the_check_finds_a_wrong_figure():
 def test_tables_are_those_of_the_results(page):
     text = (DOCS / page).read_text(encoding="utf-8")
     assert insert(text, TABLES[page]) == text, "run python -m experiments.pages"
+
+
+def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
+    text = (DOCS / "papers.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = [row for row in rows if row[0] not in ("element", "---")]
+    assert len(rows) > 100
+    for row in rows:
+        element, result, command = row[0], row[2], row[3] if len(row) > 3 else ""
+        assert re.match("holds|does not hold|absent", result), element
+        shown = re.findall(r"`(pytest|python -m) ([^`]+)`", command)
+        # where something is absent there may be nothing to show it with
+        assert shown or result.startswith("absent"), element
+        for program, what in shown:
+            known = (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES
+            assert known, element
 
 
 def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):

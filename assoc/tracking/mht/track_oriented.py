@@ -122,7 +122,7 @@ class TrackOrientedMHT(Tracker):
     def _grow_in_order(self, scan: Scan) -> None:
         """`_grow` where measurements have times of their own: each branch is filtered in their order."""
         count, timed = len(self.sensors), self._timed(scan)
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         # the sensors that have been taken in: only they can have missed a branch
         past = np.zeros_like(looked)
         tables, gained = self._tables(), np.zeros(len(self._batch))
@@ -146,7 +146,7 @@ class TrackOrientedMHT(Tracker):
             done.append(s)
         rows = tables.history[:, :count]
         followed = timed.follow(parent_row, rows)
-        states = timed.at(followed, np.arange(len(rows)), scan.time)
+        states = timed.at_end(followed, parent_row)
         new = np.flatnonzero(parent_row < 0)
         tables.numbers[new, STARTED] = followed.first[new]
         count_scan(tables.counts, tables.history, count, looked[anchor].any(axis=1))

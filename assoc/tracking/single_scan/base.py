@@ -78,7 +78,7 @@ class SingleScanTracker(Tracker):
         gain = -score_costs(timed, followed, rows, self.terms, looked[track])
         when = np.where(rows.any(axis=1), followed.when, np.nan)
         at_all = np.asarray(looked[track].any(axis=1))
-        return ScanOutcome(timed.at(followed, track, scan.time), gain, rows, born, when, at_all)
+        return ScanOutcome(timed.at_end(followed, track), gain, rows, born, when, at_all)
 
     def _begin_timed(self, scan: Scan, timed: TimedScan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
@@ -88,8 +88,8 @@ class SingleScanTracker(Tracker):
         if not len(rows):
             return self._batch[:0], rows
         followed = timed.follow(np.full(len(rows), -1), rows)
-        states = timed.at(followed, np.arange(len(rows)), scan.time)
-        looked = timed.looked(scan.time)[timed.anchors(rows, followed.lead)]
+        states = timed.at_end(followed, np.full(len(rows), -1))
+        looked = timed.looked()[timed.anchors(rows, followed.lead)]
         score = -score_costs(timed, followed, rows, self.terms, looked)
         order = np.lexsort(states.mean[:, list(self.filter.motion.position)].T)
         batch = TrackBatch.new(states[order], self._new_ids(len(order)), score[order], followed.when[order])

@@ -55,18 +55,22 @@ class MultiSensorTracker(SingleScanTracker):
         return ScanOutcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
 
     def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         tuples = grow_timed_tuples(timed, self.terms, looked, self.max_tuples)
         known = tuples.track >= 0
         value = -tuples.costs
         value[known] = doubted_gain(scores[tuples.track[known]], value[known])
         # where false alarms are rarer than new targets a single measurement is one, too
-        good = np.flatnonzero(known | (value > 0))
-        columns = np.column_stack([tuples.track + 1, tuples.rows])[good]
-        problem = AssignmentProblem(columns, -value[good], np.concatenate([[len(scores)], scan.sizes]))
+        # a track without measurements is missed, and has no part in the problem
+        wooed = np.append(np.bincount(tuples.track[known], minlength=len(scores)) > 1, False)
+        number = np.cumsum(wooed) * wooed
+        good = np.flatnonzero(np.where(known, wooed[tuples.track], value > 0))
+        columns = np.column_stack([number[tuples.track], tuples.rows])[good]
+        problem = AssignmentProblem(columns, -value[good], np.concatenate([[int(wooed.sum())], scan.sizes]))
         solution = self._assign(problem)
         mine = solution.tuples[solution.tuples[:, 0] > 0]
-        rows = mine[np.argsort(mine[:, 0]), 1:].astype(np.int32)
+        rows = np.zeros((len(scores), scan.sizes.size), dtype=np.int32)
+        rows[np.flatnonzero(wooed)[mine[:, 0] - 1]] = mine[:, 1:]
         return self._outcome(scan, timed, looked, rows, solution.tuples[solution.tuples[:, 0] == 0][:, 1:])
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
