@@ -9,6 +9,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from assoc._cli.imports import HELP as IMPORT_HELP
@@ -27,7 +28,7 @@ from assoc._cli.program import Parser, command, prepare_process, prepare_streams
 from assoc._cli.progress import with_progress
 from assoc._cli.signals import Interruption
 from assoc._cli.speech import add_speech_options, spoken
-from assoc._cli.values import number, seconds, whole_number
+from assoc._cli.values import number, place_on_earth, seconds, whole_number
 from assoc._files.output import STDOUT
 from assoc._parameters import Option, options, positive
 from assoc._system.compile_time import compile_seconds
@@ -113,12 +114,15 @@ def _track(words: list[str]) -> None:
     parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
-    check_outputs([parsed["output"], parsed["report"], parsed["rates"]], [parsed["file"]])
+    check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [parsed["file"]])
     ending = check_ending(parsed["output"], "--output", *FORMATS)
     check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
     check_ending(parsed["rates"], "--rates", ".csv", strict=False)
     if ending == ".parquet":
         check_extra("pyarrow", "parquet")
+    if parsed["map"] and not parsed["map"].lower().endswith((".geojson", ".json", ".kml")):
+        raise InvalidInputError(f"--map: expected a name that ends in .geojson or .kml, got {parsed['map']!r}")
+    parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
     if parsed["report"]:
         check_extra("plotly", "report")
     settings: dict[str, Any] = {
@@ -149,6 +153,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
     else:
         tracker, plots = _of_plots(file, parsed, settings)
         count, table, scene = len(plots.windows), plots.table, None
+        table.origin = parsed["origin"]
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
 
@@ -161,11 +166,18 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
             more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
+    def write_tracks_on_map() -> None:
+        if parsed["map"]:
+            from assoc.tracking.maps import write_map
+
+            write_map(parsed["map"], table.to_frame())
+
     def write_rates() -> None:
         if parsed["rates"] and plots is not None:
             _write_rates(parsed["rates"], plots)
 
     write_all(
+        write_tracks_on_map,
         lambda: getattr(table, FORMATS[ending])(parsed["output"]),
         write_rates,
         write_report,
@@ -214,6 +226,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
     add("-o", "--output", metavar="FILE", help="file for the tracks (.csv or .parquet)")
+    add("--map", metavar="FILE", help="write the tracks for a map as well (.geojson or .kml); needs an origin")
+    add("--origin", metavar="LAT,LON[,H]", help="where x = y = 0 is on the earth, degrees and metres (if not in FILE)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
     add("--tracker", metavar="NAME", help="name of the tracker, see below")
     add("--solver", metavar="NAME", help="name of the solver (default exact)")
@@ -331,6 +345,10 @@ def _of_scene(
             raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
         settings["registration"] = "online"
     scene = Scene.load(file)
+    if parsed["origin"] is not None:
+        scene = replace(scene, origin=parsed["origin"])
+    elif parsed["map"] and scene.origin is None:
+        raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
     table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
@@ -372,6 +390,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
     print_lines(recording.summary())
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
+    if parsed["map"] and parsed["origin"] is None:
+        raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
     shown = with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])
     return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
 

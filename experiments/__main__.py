@@ -105,6 +105,9 @@ EXPERIMENTS = (
         "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
     ),
     Experiment(
+        "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"
+    ),
+    Experiment(
         "sweep_overhead",
         "time of a parameter study besides its solves",
         "docs/sweeps.md (overhead); with --publish experiments/results/sweep_overhead.json",

@@ -117,19 +117,22 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Pla
     return Plan(*values)
 
 
-def _targets(problem: AssignmentProblem, solution: Solution) -> NDArray[np.int32]:
+def _targets(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Tuples that are targets, and what each costs."""
     number = np.count_nonzero(solution.tuples, axis=1)
     alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
-    return solution.tuples[(number >= 2) | alone_but_real]
+    real = (number >= 2) | alone_but_real
+    return solution.tuples[real], problem.costs[solution.indices[real]]
 
 
 def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
     sizes = tuple(int(n) for n in problem.sizes)
-    return ScanAssociation(0, None, sizes, solution, _targets(problem, solution))
+    targets, costs = _targets(problem, solution)
+    return ScanAssociation(0, None, sizes, solution, targets, costs=costs)
 
 
 def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
-    targets = _targets(problem, solution)
+    targets, costs = _targets(problem, solution)
     positions, covariances = positions_and_covariances(scene, scan, targets)
     truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
@@ -141,6 +144,7 @@ def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Sol
         targets=targets,
         positions=positions,
         covariances=covariances,
+        costs=costs,
         true_tuples=None if truth is None else len(truth),
         correct_tuples=correct,
     )

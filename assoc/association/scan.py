@@ -32,6 +32,8 @@ class ScanAssociation:
         Fused (maximum-likelihood) positions, metres; None without a scene.
     covariances : array (T, 3, 3) or None
         Their covariances, m^2.
+    costs : array (T,) or None
+        What each target costs in the problem that was solved; None in associations made elsewhere.
     true_tuples : int or None
         Targets that at least two sensors detected; None where the truth is not known.
     correct_tuples : int or None
@@ -50,6 +52,7 @@ class ScanAssociation:
     targets: NDArray[np.int32]
     positions: NDArray[np.float64] | None = None
     covariances: NDArray[np.float64] | None = None
+    costs: NDArray[np.float64] | None = None
     true_tuples: int | None = None
     correct_tuples: int | None = None
     ranked: tuple[ScanAssociation, ...] = ()

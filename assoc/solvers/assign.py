@@ -14,7 +14,7 @@ from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Callback, Outcome, Run
@@ -22,6 +22,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify
+from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.start import start_columns
 
@@ -34,6 +35,7 @@ def assign(
     time_limit: float | None = None,
     callback: Callback | None = None,
     start: Solution | None = None,
+    advise: bool = True,
     proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
@@ -53,6 +55,8 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
+    advise : bool, default True
+        Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
     proof : path-like, optional
         Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
         (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
@@ -70,6 +74,11 @@ def assign(
         Unknown solver or parameter, a value out of range, or a start that is no solution of this problem.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
+
+    Warns
+    -----
+    AssocWarning
+        No tuple costs less than its measurements as false alarms, so that nothing can be a target.
     """
     started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
@@ -107,7 +116,11 @@ def assign(
             from assoc.proofs import write_proof  # loads what few calls need
 
             write_proof(proof, problem, solution)
-        return solution
+    # only where nothing was found is it worth a look why
+    if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
+        for line in doubts_about_costs(problem):
+            warn(line)
+    return solution
 
 
 def _checked(outcome: object, solver: str) -> Outcome:

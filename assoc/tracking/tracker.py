@@ -359,7 +359,9 @@ class Tracker(Checkpoint):
         if self.solver == "exact" and self.time_limit is None:
             nodes = max(_LEAST_NODES, _VISITS // max(problem.num_tuples, 1))
             parameters = {"nodes": nodes, "patience": 0} | parameters
-        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, **parameters)
+        return assign(
+            problem, self.solver, seed=self._seed(), time_limit=self.time_limit, advise=False, **parameters
+        )
 
     def _elapsed(self, time: float) -> float:
         return 0.0 if self._time is None else time - self._time

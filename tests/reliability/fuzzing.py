@@ -142,9 +142,9 @@ def _use_problem(path: Path) -> None:
 
 
 def _use_tracks(path: Path) -> None:
-    from assoc.simulation.scenarios.from_tracks import FromTracksParameters, read
+    from assoc.simulation.flight_reports import read_flight_reports
 
-    read(FromTracksParameters(file=str(path)))
+    read_flight_reports(str(path), {})
 
 
 def _use_plots(path: Path) -> None:

@@ -6,10 +6,10 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from assoc._text.html import escape
+from assoc._text.html import escape, warning_list
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
-from assoc.association.source import Source
+from assoc.association.source import Source, warnings_of
 from assoc.errors import InvalidInputError
 from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
@@ -91,7 +91,8 @@ def _page(association: Association, each: list[Source], files: list[str], words:
         (scene_view(each[i], association.scans[i], views[owners[i]]["decimals"]) for i in drawn),  # type: ignore[arg-type]
         [scans[i] for i in drawn],
     )
-    sections = [("summary", "Summary", _summary(association))]
+    doubts = [line for source in {id(one): one for one in each}.values() for line in warnings_of(source)]
+    sections = [("summary", "Summary", warning_list(doubts) + _summary(association))]
     if association.scans:
         note = ""
         if kept < len(drawn):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._text.html import escape
+from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
@@ -102,7 +102,8 @@ def write_tracking_report(
     made = made_with("assoc.track", words)
     command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
-    sections = [("summary", "Summary", _summary(frame, len(rows), values, cutoff, plots))]
+    doubts = warning_list(() if scene is None else scene.warnings)
+    sections = [("summary", "Summary", doubts + _summary(frame, len(rows), values, cutoff, plots))]
     if len(frame) or known or (plots is not None and plots.windows):
         sections.append(("scene", "Tracks over time", _SCENE))
     if known:
