@@ -50,6 +50,7 @@ TRACKERS = {
     "mht": "track-oriented multiple hypothesis tracking (default for plots)",
     "mht-hypothesis": "hypothesis-oriented multiple hypothesis tracking (Reid, Murty)",
     "nearest-neighbour": "assigns each measurement to the nearest track",
+    "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
 WINDOWS = ("ctw", "ctw-time", "irregular", "none")
 # option -> the trackers that take it
@@ -57,6 +58,8 @@ _OWN = {
     "depth": ("mht", "mht-hypothesis"),
     "max_branches": ("mht",),
     "max_hypotheses": ("mht-hypothesis",),
+    "max_events": ("joint-probabilistic",),
+    "rule": ("nearest-neighbour",),
 }
 # option -> what `assoc.recordings.radar_of` calls it, and its unit
 _RADAR = {
@@ -138,7 +141,7 @@ def _track(words: list[str]) -> None:
     for option in _LIVE:
         if parsed[option] is not None:
             raise InvalidInputError(f"{flag_of(option)}: is only for --live")
-    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"], parsed["rates"]]):
+    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"], parsed["rates"], parsed["map"]]):
         _make_tracks(words, parsed, settings, ending)
 
 
@@ -161,7 +164,8 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            used = {"tracker": tracker.name, "solver": tracker.solver, "filter": parsed["filter"], "scans": count}
+            asked = tracker.solver if tracker.solver_calls else "none"
+            used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": parsed["cutoff"], "words": words}
             more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
@@ -236,15 +240,18 @@ def _parser(further: Sequence[Option]) -> Parser:
         metavar="NAME",
         help="imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
     )
-    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv 50)")
+    add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
     text = f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})"
     add("--cutoff", metavar="M", help=text)
     add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
-    add("--all", action="store_true", help="also write tentative tracks")
+    add("--all", action="store_true", help="also write tracks that are tentative, or whose target may be gone")
+    add("--smooth", action="store_true", help="smooth the tracks of a scene: each position by all of its measurements")
     add("--depth", metavar="N", help="mht: number of scans after which a decision is final (default 3)")
     add("--max-branches", metavar="N", help="mht: largest number of branches of a track tree (default 30)")
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
+    add("--max-events", metavar="N", help="joint-probabilistic: joint events listed for each cluster (default 100)")
+    add("--rule", metavar="NAME", help="nearest-neighbour: greedy (default), or assignment, which uses the solver")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
     add_speech_options(parser, "what the solver does in each scan")
     plots = parser.add_argument_group("options for plots")
@@ -306,7 +313,8 @@ def _read_asterix(file: str, radar: str | None) -> Recording:
 
 
 def _make(
-    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any
+    name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any,
+    pace: float = 1.0,
 ) -> Tracker:
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
@@ -320,11 +328,11 @@ def _make(
         flag = flag_of(option)
         if name not in takers:
             raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
-        extra[option] = whole_number(parsed[option], flag, 1)
+        extra[option] = parsed[option] if option == "rule" else whole_number(parsed[option], flag, 1)
     noise = None
     if parsed["process_noise"] is not None:
         noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
-    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0))
+    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace)
     return KINDS[name](sensors, made, region=region, **settings, **extra)
 
 
@@ -332,7 +340,8 @@ def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
 ) -> tuple[int, Tracker, TrackTable, Scene | None]:
     from assoc.scene.scene import Scene
-    from assoc.tracking import track_scene
+    from assoc.tracking import smoothed, track_scene
+    from assoc.tracking.filter_choice import pace_of
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
     if parsed["rates"] is not None:
@@ -349,9 +358,12 @@ def _of_scene(
         scene = replace(scene, origin=parsed["origin"])
     elif parsed["map"] and scene.origin is None:
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
-    tracker = _make(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+    name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
+    tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
-    table, _ = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    if parsed["smooth"]:
+        table = smoothed(tracker, scene, decisions)
     return scene.num_scans, tracker, table, scene
 
 
@@ -367,7 +379,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     parsed["filter"] = parsed["filter"] or "ekf"
     if name in ("multi-sensor", "static"):
         raise InvalidInputError(
-            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis or nearest-neighbour"
+            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis, nearest-neighbour or "
+            "joint-probabilistic"
         )
     window = parsed["window"] or "ctw"
     if window not in WINDOWS:
@@ -377,6 +390,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for scenes (.npz), not for plots")
     recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
     if parsed["radar"] is not None and not _is_asterix(file):
         raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
@@ -427,6 +442,8 @@ def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
     for flag in ("report", "rates", "window", "rotation", "registration", *_RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for finished tracks, not for --live")
     if parsed["udp"] is not None and parsed["replay"] is not None:
         raise InvalidInputError("--udp and --replay: expected one of them")
     parsed["filter"] = parsed["filter"] or "imm-cv"
@@ -501,8 +518,10 @@ def _report(
     name = "stdout" if output == STDOUT else printable(output)
     print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
+    # several trackers never need one, or only for what their own search leaves open
+    used = tracker.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
-    print_lines(f"{tracker.name}, {tracker.solver}: {spent}")
+    print_lines(f"{tracker.name}, {used}: {spent}")
 
 
 def _compare(scene: Scene | None, table: TrackTable, cutoff: float) -> None:

@@ -27,6 +27,9 @@ COLUMNS = {
 }
 """Where no column is named, the first of these that the file has is taken; a name it need not have."""
 
+MOTION = {"updated": "lastposupdate", "speed": "velocity", "heading": "heading", "climb": "vertrate"}
+"""Columns of OpenSky's that are used where they are: when the position was heard (s), m/s, degrees, m/s."""
+
 ALTITUDE_UNITS = {"m": 1.0, "ft": 0.3048}
 
 HIGH = 18_000.0
@@ -39,7 +42,9 @@ _LIMITS = {"latitude": 90.0, "longitude": 360.0, "altitude": 1e6, "time": 1e12}
 class FlightReports:
     """Reports of a file: time (s), number of the target, place (rad, rad, m), sorted by target and time.
 
-    `names` tells what the targets are called, by their numbers; `notes` which rows were left out, and how many.
+    `updated` (n,) tells when each position was heard, s, and `velocity` (n, 3) how the target flew east, north and up,
+    m/s; both are NaN where the file does not say. `names` tells what the targets are called, by their numbers; `notes`
+    which rows were left out, and how many.
     """
 
     time: Array
@@ -47,6 +52,8 @@ class FlightReports:
     latitude: Array
     longitude: Array
     height: Array
+    updated: Array
+    velocity: Array
     names: Mapping[int, str] = field(default_factory=dict)
     notes: Mapping[str, int] = field(default_factory=dict)
 
@@ -114,6 +121,7 @@ def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_uni
         "rows left out, without altitude": int((placed & known_id & ~high).sum()),
         "rows left out, second report of an aircraft at one instant": int((~first).sum()),
     }
+    updated, velocity = _motion(table, chosen)
     calls = table[chosen["name"]][known] if "name" in chosen else None
     return FlightReports(
         time[order],
@@ -121,6 +129,8 @@ def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_uni
         np.radians(lat[order]),
         np.radians(lon[order]),
         height[order],
+        updated[known][order],
+        velocity[known][order],
         _names(ids, target, calls),
         {what: count for what, count in notes.items() if count},
     )
@@ -168,9 +178,28 @@ def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]
             raise InvalidInputError(f"{path}: no column {' or '.join(candidates)} for the {meaning}; it has: {have}")
         if found is not None:
             chosen[meaning] = str(found)
+    for meaning, usual_name in MOTION.items():
+        if usual_name in header and usual_name not in chosen.values():
+            chosen[meaning] = usual_name
     if len(set(chosen.values())) < len(chosen):
         raise InvalidInputError(f"{path}: the columns must be different, got {', '.join(chosen.values())}")
     return chosen
+
+
+def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Array]:
+    """When positions were heard, (n,), and velocities east, north, up, (n, 3); NaN where nothing sound is said."""
+    import pandas as pd
+
+    def column(meaning: str) -> Array:
+        if meaning not in chosen:
+            return np.full(len(table), np.nan)
+        values = np.asarray(pd.to_numeric(table[chosen[meaning]], errors="coerce").to_numpy(dtype=np.float64))
+        return np.where(np.isfinite(values), values, np.nan)
+
+    speed, heading = column("speed"), np.radians(column("heading"))
+    # level flight where no climb is told
+    climb = column("climb") if "climb" in chosen else np.zeros(len(table))
+    return column("updated"), np.stack([speed * np.sin(heading), speed * np.cos(heading), climb], axis=1)
 
 
 def _place(path: str, row: int, column: str) -> str:

@@ -24,8 +24,8 @@ from assoc.tracking.tracker import Memory, Tracker
 HORIZON = 30.0
 """Seconds that a measurement may be late where nothing else is said."""
 
-# names of this many times the tracks that live are looked through for those that are gone
-_MANY = 10
+# when there are so many names, and then twice as many as are left, those of tracks that are gone are forgotten
+_MANY = 1_000
 
 
 @dataclass(eq=False)
@@ -69,6 +69,7 @@ class LatePlots:
         self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
         self.next_id = max(first_id, max(self._names, default=0) + 1)
         self._decided: dict[int, Decision] = {}
+        self._many = _MANY
 
     @property
     def time(self) -> float | None:
@@ -78,7 +79,7 @@ class LatePlots:
     @property
     def tracks(self) -> list[Track]:
         """The tracks that live now, by their ids."""
-        named = [replace(track, track_id=self._name(track.track_id)) for track in self.tracker.tracks]
+        named = [track.named(self._name(track.track_id)) for track in self.tracker.tracks]
         return sorted(named, key=lambda track: track.track_id)
 
     @property
@@ -248,9 +249,10 @@ class LatePlots:
             self._kept.popleft()
         open_scans = step.scan - len(self._kept)
         final = tuple(self._decided.pop(scan) for scan in sorted(self._decided) if scan <= open_scans)
-        if len(self._names) > _MANY * (1 + len(self.tracker.tracks)):
+        if len(self._names) > self._many:
             living = self.tracker.remember().track_ids | (self._kept[0].before.track_ids if self._kept else set())
             self._names = {inner: outer for inner, outer in self._names.items() if inner in living}
+            self._many = _MANY + 2 * len(self._names)
         return replace(step, final=final, late=count, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z", "speed", "heading", "altitude",
+    "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
 
@@ -86,6 +86,7 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    track.existence,
                     math.hypot(vx, vy),
                     math.degrees(math.atan2(vx, vy)) % 360.0,
                     told if altitudes is None else altitudes.get(track.track_id, math.nan),
@@ -151,7 +152,7 @@ def track_scene(
     tracker : Tracker
     scene : Scene
     confirmed : bool
-        Whether only confirmed tracks are listed.
+        Whether only confirmed tracks are listed, while their targets are rather there than not (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
 
@@ -167,7 +168,7 @@ def track_scene(
         step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
         decisions += step.final
         table.add(
-            (track for track in tracker.tracks if track.confirmed or not confirmed), tracker.filter.motion.position
+            (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
         )
     if scene.truth is not None and scene.truth.names:
         table.targets = followed_targets(*table.arrays(), scene)

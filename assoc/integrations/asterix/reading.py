@@ -16,7 +16,7 @@ from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, 
 from assoc.recordings.altitude import garbled_altitudes
 from assoc.recordings.columns import DAY, FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
-from assoc.simulation.geodesy import east_north_up
+from assoc.scene.geodesy import east_north_up
 
 SECOND = 1.0 / 128.0
 """Step of times of day."""

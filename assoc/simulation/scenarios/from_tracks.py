@@ -18,8 +18,10 @@ from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.scene.geodesy import east_north_up
 from assoc.scene.scene import Scene
+from assoc.simulation.cleaning import Reports, clean
 from assoc.simulation.flight_reports import ALTITUDE_UNITS, COLUMNS, FlightReports, read_flight_reports
 from assoc.simulation.flights import STEP
+from assoc.simulation.interpolation import along, frame_velocities, resample
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe, velocities_from
 from assoc.simulation.radars import on_circle, radar_over
@@ -56,6 +58,9 @@ class FromTracksParameters(Parameters):
     )
     max_gap: float = field(
         default=60.0, metadata={"help": "no target where its reports are further apart than this, seconds"}
+    )
+    clean: bool = field(
+        default=True, metadata={"help": "leave out repeated positions, mend altitudes that cannot be right"}
     )
     scans: int | None = field(
         default=None, metadata={"help": "number of scans (without: the whole recording)"}
@@ -99,12 +104,14 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     p = parameters
     named = {meaning: getattr(p, f"{meaning}_column") for meaning in COLUMNS}
     recording = read_flight_reports(p.file, named, p.altitude_unit)
-    origin = (_middle(recording.latitude), _middle(recording.longitude), 0.0)
-    reports = east_north_up(recording.latitude, recording.longitude, recording.height, origin)
+    flown, found = _flown(recording, p.clean)
+    origin = (_middle(flown.latitude), _middle(flown.longitude), 0.0)
+    reports = east_north_up(flown.latitude, flown.longitude, flown.height, origin)
+    speeds = frame_velocities(flown, reports, origin)
     times = _epochs(p, recording)
-    targets = len(np.unique(recording.target))
+    targets = len(np.unique(flown.target))
     require_scene_memory(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
-    ids, positions = resample(recording, reports, times, p.max_gap)
+    ids, positions = resample(flown, reports, times, p.max_gap, speeds)
     velocities = velocities_from(times, ids, positions)
     fastest = max(float(np.linalg.norm(one, axis=1).max(initial=0.0)) for one in velocities)
     region = around(reports, 0.01)
@@ -128,15 +135,26 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     ]
     if p.turns is not None:
         turns, start = parse_turns(p.turns, p.radars), float(times[0]) - p.interval
-        paths = _paths(recording, reports, p.max_gap)
+        paths = _paths(flown, reports, speeds, p.max_gap)
         scene = observe_in_turns(sensors, turns, start, times, paths, rng, region=region, name=name)
     else:
         scene = observe(sensors, times, ids, positions, rng, region=region, name=name, velocities=velocities)
     truth = replace(scene.truth, names=recording.names) if scene.truth is not None else None
-    return replace(scene, truth=truth, origin=origin, notes=recording.notes)
+    return replace(scene, truth=truth, origin=origin, notes={**recording.notes, **found})
 
 
-def _paths(recording: FlightReports, reports: Array, max_gap: float) -> list[Path]:
+def _flown(recording: FlightReports, cleaned: bool) -> tuple[Reports, dict[str, int]]:
+    """What the reports tell of flights, and what had to be cleaned, with counts."""
+    of_file = Reports(
+        recording.time, recording.target, recording.latitude, recording.longitude, recording.height, recording.velocity
+    )
+    if not cleaned:
+        return of_file, {}
+    reports, found = clean(of_file, recording.updated)
+    return reports, found.notes()
+
+
+def _paths(recording: Reports, reports: Array, speeds: Array, max_gap: float) -> list[Path]:
     """The flights in fine steps, one path for each part without a gap."""
     new = (np.diff(recording.target) != 0) | (np.diff(recording.time) > max_gap)
     paths = []
@@ -145,7 +163,7 @@ def _paths(recording: FlightReports, reports: Array, max_gap: float) -> list[Pat
         count = max(math.ceil((own[-1] - own[0]) / STEP), 1)
         if len(rows) > 1:
             times = np.linspace(own[0], own[-1], count + 1)
-            fine = np.column_stack([np.interp(times, own, axis) for axis in places.T])
+            fine = along(own, places, times, max_gap, speeds[rows])
             paths.append(Path(int(recording.target[rows[0]]), times, fine, np.gradient(fine, times, axis=0)))
     return paths
 
@@ -167,46 +185,6 @@ def _epochs(parameters: FromTracksParameters, recording: FlightReports) -> Array
     if count > MAX_SCANS:
         raise LimitExceededError(f"{count} scans exceed {MAX_SCANS}: raise --interval or give --scans")
     return start + parameters.interval * np.arange(count)
-
-
-def resample(
-    recording: FlightReports, reports: Array, times: Array, max_gap: float
-) -> tuple[list[Array], list[Array]]:
-    """Positions of the targets at given times, interpolated linearly between neighbouring reports.
-
-    Parameters
-    ----------
-    recording : FlightReports
-    reports : array (n, 3)
-        Its positions in the scene's frame, metres.
-    times : array (K,)
-        Seconds.
-    max_gap : float
-        Between reports further apart than this (s) a target is absent.
-
-    Returns
-    -------
-    ids, positions : lists over times of arrays (T_k,) and (T_k, 3)
-    """
-    ids: list[list[int]] = [[] for _ in times]
-    positions: list[list[Array]] = [[] for _ in times]
-    bounds = np.flatnonzero(np.diff(recording.target)) + 1
-    for rows in np.split(np.arange(len(recording.time)), bounds):
-        own, target = recording.time[rows], int(recording.target[rows[0]])
-        after = np.clip(np.searchsorted(own, times), 0, len(own) - 1)
-        exact = own[after] == times
-        before = np.where(exact, after, np.maximum(after - 1, 0))
-        gap = own[after] - own[before]
-        present = (times >= own[0]) & (times <= own[-1]) & (gap <= max_gap)
-        share = np.divide(times - own[before], gap, out=np.zeros(len(times)), where=gap > 0)
-        places = reports[rows][before] + share[:, None] * (reports[rows][after] - reports[rows][before])
-        for k in np.flatnonzero(present):
-            ids[k].append(target)
-            positions[k].append(places[k])
-    return (
-        [np.array(one, dtype=np.int64) for one in ids],
-        [np.array(one, dtype=np.float64).reshape(-1, 3) for one in positions],
-    )
 
 
 parameters = FromTracksParameters

@@ -11,7 +11,6 @@ from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.costs.tracks.scores import log_birth
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
@@ -103,12 +102,6 @@ class SingleScanTracker(Tracker):
             speed=self.initiation.speed,
         )  # fmt: skip
 
-    @property
-    def _volume(self) -> float:
-        """Of the region, m^3."""
-        region = self._place.region
-        return float(np.prod(region[:, 1] - region[:, 0]))
-
     def _begin(self, scan: Scan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
         tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
@@ -119,17 +112,9 @@ class SingleScanTracker(Tracker):
         order = order[np.lexsort(positions[order].T)]
         rows, positions, covariances = tuples[order], positions[order], covariances[order]
         states = self.initiation.start(self.filter, positions, covariances)
-        seen = rows > 0
-        several = log_birth(covariances, self._volume, self.initiation.birth_rate)
         costs = tuple_costs(self._place, scan, rows, speed=self.initiation.speed)
-        score = np.where(seen.sum(axis=1) == 1, self._single_scores(rows), several - costs)
+        score = self._new_scores(rows, costs, covariances)
         return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
-
-    def _single_scores(self, rows: Array) -> Array:
-        """Scores of new tracks of single measurements, (K, S), that all other sensors missed."""
-        seen = rows > 0
-        scores: Array = seen @ self.terms.birth + ~seen @ self.terms.miss
-        return scores
 
     def _decision(self, scan: Scan, batch: TrackBatch, rows: Array) -> Decision:
         assigned = []

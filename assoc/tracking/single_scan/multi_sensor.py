@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
-from assoc.costs.tracks.scores import doubted_gain, log_birth
+from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
@@ -76,12 +76,9 @@ class MultiSensorTracker(SingleScanTracker):
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""
         problem = self._problem(scan)
-        rows, costs = problem.tuples, np.array(problem.costs)
-        several = np.count_nonzero(rows, axis=1) > 1
+        if not problem.num_tuples:
+            return problem.tuples, problem.costs
         # where false alarms are rarer than new targets a single measurement is one, too
-        costs[~several] = -self._single_scores(rows[~several])
-        if several.any():
-            covariances = self._fused(scan, rows[several])[1]
-            costs[several] -= log_birth(covariances, self._volume, self.initiation.birth_rate)
-        good = costs < 0
-        return rows[good], costs[good]
+        scores = self._new_scores(problem.tuples, problem.costs, self._fused(scan, problem.tuples)[1])
+        good = scores > 0
+        return problem.tuples[good], -scores[good]
