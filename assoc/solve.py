@@ -90,7 +90,7 @@ def _associate(
     files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    plan, items = _plan(sources, files, solver, settings, parameters)
+    plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
     scans = plan.run(items, settings.get("jobs", 1))
     association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
     elapsed = time.perf_counter() - started
@@ -193,6 +193,8 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
+    *,
+    pheromone: bool,
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
@@ -207,6 +209,7 @@ def _plan(
         parameters,
         gating,
         settings.get("kbest"),
+        pheromone,
     )
     items = plan.items()
     if "scans" in settings:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc.solution import Solution
+
+if TYPE_CHECKING:
+    from assoc.solvers.pheromone_history import PheromoneHistory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +43,8 @@ class ScanAssociation:
         Those of them whose measurements, all of them and no other, form a chosen tuple.
     ranked : tuple of ScanAssociation
         The k best associations of the scan, this one first; empty where they were not asked for.
+    pheromone : PheromoneHistory or None
+        What the ants left on the tuples with the most of it, where that was asked for (solver aco).
     compile_time : float
         Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
         no part of ``solution.runtime``.
@@ -56,6 +61,7 @@ class ScanAssociation:
     true_tuples: int | None = None
     correct_tuples: int | None = None
     ranked: tuple[ScanAssociation, ...] = ()
+    pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -35,6 +36,7 @@ def assign(
     time_limit: float | None = None,
     callback: Callback | None = None,
     start: Solution | None = None,
+    watch: Callable[[Any], object] | None = None,
     advise: bool = True,
     proof: FilePath | None = None,
     **parameters: Any,
@@ -55,6 +57,9 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
+    watch : callable, optional
+        Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
+        gives the same by tuples of the problem.
     advise : bool, default True
         Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
     proof : path-like, optional
@@ -88,7 +93,7 @@ def assign(
     limit = checked_time_limit(time_limit)
     if proof is not None:
         check_writable(proof)
-    run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
+    run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset

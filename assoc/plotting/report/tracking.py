@@ -14,7 +14,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.plotting.places import places
-from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.plots import plot_data
 from assoc.plotting.report.views import plain_numbers
@@ -36,7 +36,7 @@ _MOST_POINTS = 40_000
 _MOST_MEASUREMENTS = 30_000
 
 _SCENE = (
-    CONTROLS
+    controls("time")
     + """<div class="controls"><div class="buttons"><button type="button" id="nearer" disabled>Zoom to track</button>
 <button type="button" id="whole">Whole scene</button></div></div>
 <div id="scene-plot" class="plot large"></div><p class="note" id="detail" aria-live="polite"></p>"""
