@@ -91,6 +91,8 @@ def _associate(
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
     plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    if parsed["verbose"]:
+        print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
     association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
     elapsed = time.perf_counter() - started
@@ -139,7 +141,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
     add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "each improvement of cost and bound, and the time of each scan")
+    add_speech_options(parser, "all parameters, the defaults included")
     parser.elsewhere = lambda: flags_of_solvers(solver)
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")

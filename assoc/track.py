@@ -180,6 +180,8 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         if parsed["rates"] and plots is not None:
             _write_rates(parsed["rates"], plots)
 
+    if parsed["verbose"]:
+        print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
     write_all(
         write_tracks_on_map,
         lambda: getattr(table, FORMATS[ending])(parsed["output"]),
@@ -253,7 +255,7 @@ def _parser(further: Sequence[Option]) -> Parser:
     add("--max-events", metavar="N", help="joint-probabilistic: joint events listed for each cluster (default 100)")
     add("--rule", metavar="NAME", help="nearest-neighbour: greedy (default), or assignment, which uses the solver")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "what the solver does in each scan")
+    add_speech_options(parser, "the settings that were used")
     plots = parser.add_argument_group("options for plots")
     plots.add_argument(
         "--window",
