@@ -1,30 +1,76 @@
-"""``python -m assoc`` lists the programs."""
+"""``assoc`` and ``python -m assoc``: the programs as subcommands. Imports inside functions keep --help quick."""
 
 from __future__ import annotations
 
-from assoc._cli.program import prepare_streams, run_program
+import sys
+from collections.abc import Sequence
+from importlib import import_module
 
-_PROGRAMS = {
-    "assoc.simulate": "simulate a scene: python -m assoc.simulate three-radar -o scene.npz",
-    "assoc.solve": "associate its measurements: python -m assoc.solve scene.npz --solver aco",
-    "assoc.track": "make tracks of scenes or of radar plots: python -m assoc.track scene.npz -o tracks.csv",
-    "assoc.register": "find biases of sensors: python -m assoc.register scene.npz -o registered.npz",
-    "assoc.sweep": "compare parameters: python -m assoc.sweep scene.npz --solver aco --grid alpha=1,2,3 -o study/",
+from assoc._cli.lines import print_lines
+from assoc._cli.program import BAD_INPUT, command, prepare_streams, run_program
+from assoc._cli.speech import SPEECH_FLAGS
+from assoc._text.near import did_you_mean
+from assoc._text.plain import one_line
+from assoc._version import __version__
+
+PROGRAMS = {
+    "simulate": ("simulate a scene", "three-radar -o scene.npz"),
+    "solve": ("associate its measurements", "scene.npz --solver aco"),
+    "track": ("make tracks of scenes or of radar plots", "scene.npz -o tracks.csv"),
+    "register": ("find biases of sensors", "scene.npz -o registered.npz"),
+    "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),
+}
+"""Name of each: a module ``assoc.NAME`` with a function ``start``; what it does, and an example."""
+
+_OTHERS = {
+    "check": ("check a proof, or a solution, in exact arithmetic", "problem.npz proof.json"),
+    "completion": ("print what a shell needs to complete names and options", "bash (or zsh, fish)"),
 }
 
 
-def main() -> int:
-    """Print the programs and what each is for."""
-    return run_program(_list, "assoc")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a program by its name; returns its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    forwarded = []
+    while words and words[0] in SPEECH_FLAGS:
+        forwarded.append(words.pop(0))
+    name, *rest = words or ["--help"]
+    if name == "check":
+        # a file that stands alone: it shares nothing with the other programs
+        prepare_streams()
+        return import_module("assoc.check").main(rest)
+    if name in PROGRAMS:
+        start = import_module(f"assoc.{name}").start
+        code: int = start([*forwarded, *rest])
+        return code
+    prepare_streams()
+    if name == "completion":
+        return run_program(lambda: _complete(rest), "assoc")
+    if name in ("-h", "--help", "help"):
+        return run_program(_list, "assoc")
+    if name in ("-V", "--version"):
+        return run_program(lambda: print(f"assoc {__version__}"), "assoc")
+    hint = did_you_mean(name, [*PROGRAMS, *_OTHERS, "--help", "--version"])
+    known = ", ".join([*PROGRAMS, *_OTHERS, "--version"])
+    print(f"assoc: error: unknown command {one_line(name)!r}; {hint or 'known: ' + known}", file=sys.stderr)
+    return BAD_INPUT
 
 
 def _list() -> None:
-    print("assoc: which measurements, from several sensors, came from the same target?")
-    print("\nPrograms (each has --help):")
-    for name, purpose in _PROGRAMS.items():
-        print(f"  python -m {name:<16} {purpose}")
+    print_lines("assoc: which measurements, from several sensors, came from the same target?")
+    print_lines("\nPrograms (each has --help, -q to say nothing and -v to say more):")
+    for name, (purpose, example) in {**PROGRAMS, **_OTHERS}.items():
+        called = f"assoc {name}" if name == "completion" else command(name)
+        print_lines(f"  {name:<10}  {purpose}: {called} {example}")
+    print_lines("\nassoc --version prints the version.")
+
+
+def _complete(words: Sequence[str]) -> None:
+    from assoc._cli.completion import SHELLS, script
+
+    programs = {name: import_module(f"assoc.{name}").completions() for name in PROGRAMS}
+    print(script(words[0] if words else "", {**programs, "check": {}, "completion": {"": SHELLS}}), end="")
 
 
 if __name__ == "__main__":
-    prepare_streams()
     raise SystemExit(main())

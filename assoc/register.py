@@ -5,16 +5,17 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_outputs
+from assoc._cli.inputs import check_ending, check_outputs
+from assoc._cli.lines import print_lines
 from assoc._cli.options import add_common_options, common_values
-from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
+from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import number
 from assoc._system.extras import check_extra
@@ -32,6 +33,12 @@ _SPREADS = {
 }
 
 
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as a process of its own."""
+    prepare_process("assoc.register")
+    return main(arguments)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -44,6 +51,9 @@ def _register(words: list[str]) -> None:
     if page == "":
         page = f"{output.removesuffix('.npz')}.html"
     check_outputs([output, page, parsed["json"]], [file])
+    check_ending(output, "--output", ".npz")
+    check_ending(page, "--report", ".html", ".htm", strict=False)
+    check_ending(parsed["json"], "--json", ".json", strict=False)
     if page:
         check_extra("plotly", "report")
     values: dict[str, Any] = common_values(parsed)
@@ -53,11 +63,19 @@ def _register(words: list[str]) -> None:
     for name in ("components", "reference"):
         if parsed[name] is not None:
             values[name] = tuple(one.strip() for one in parsed[name].split(","))
+    with spoken(quiet=parsed["quiet"], outputs=[output, page, parsed["json"]]):
+        _write(words, parsed, page, values)
 
+
+def _write(words: list[str], parsed: dict[str, Any], page: str | None, values: dict[str, Any]) -> None:
+    file, output = parsed["file"], parsed["output"]
     from assoc.registration import register
     from assoc.scene.scene import Scene
 
     scene = Scene.load(file)
+    if parsed["verbose"]:
+        used = ", ".join(f"{name} {value}" for name, value in values.items())
+        print_lines(f"{printable(file)}: {scene!r}; {used or 'all defaults'}")
     started = time.perf_counter()
     found = register(scene, **values)
     elapsed = time.perf_counter() - started
@@ -79,11 +97,9 @@ def _register(words: list[str]) -> None:
 def _parser() -> Parser:
     parser = Parser(
         prog="assoc.register",
-        usage="python -m assoc.register SCENE.npz -o REGISTERED.npz [options]",
+        usage=f"{command('register')} SCENE.npz -o REGISTERED.npz [options]",
         description="Estimate biases of sensors from the targets that they have in common, without knowing the truth,\n"
         "and write the scene without them.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add("file", metavar="SCENE.npz", help="scene whose sensors are registered")
@@ -104,7 +120,13 @@ def _parser() -> Parser:
     add("--time-spread", metavar="S", help="usual size of clocks' biases, seconds (default 1)")
     add("--position-spread", metavar="M", help="usual error of sensors' places, metres (default 300)")
     add_common_options(parser, ["seed", "max_tuples"])
+    add_speech_options(parser, "the options that were used")
     return parser
+
+
+def completions() -> dict[str, Sequence[str]]:
+    """Options of the program with the values they take, for shells."""
+    return {**_parser().flags()}
 
 
 def _print(found: Registration, output: str, elapsed: float) -> None:
@@ -118,10 +140,9 @@ def _print(found: Registration, output: str, elapsed: float) -> None:
         [*headers], [[printable(cell) for cell in row] for row in rows], keys=2, left=("sensor", "component", "unit")
     )
     print()
-    print(found.summary())
-    print(f"{printable(output)}: written; {elapsed:.2f} s")
+    print_lines(found.summary())
+    print_lines(f"{printable(output)}: written; {elapsed:.2f} s")
 
 
 if __name__ == "__main__":
-    prepare_process("assoc.register")
-    raise SystemExit(main())
+    raise SystemExit(start())

@@ -8,16 +8,26 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_outputs, read_toml
+from assoc._cli.imports import HELP as IMPORT_HELP
+from assoc._cli.imports import import_modules
+from assoc._cli.inputs import check_ending, check_outputs, read_toml
 from assoc._cli.lines import print_lines
-from assoc._cli.options import add_common_options, common_values, parameter_values, read_first
-from assoc._cli.program import Parser, prepare_process, run_program, write_all
+from assoc._cli.options import (
+    add_common_options,
+    common_values,
+    flag_of,
+    flags_of_solvers,
+    parameter_values,
+    read_first,
+)
+from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
 from assoc._cli.progress import with_progress
+from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
-from assoc._cli.values import check_kind, density, scan_range
+from assoc._cli.values import check_kind, cores, density, scan_range
 from assoc._files.output import write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
@@ -35,6 +45,12 @@ _GATING = ("gate_probability", "max_tuples", "target_density")
 _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as a process of its own."""
+    prepare_process("assoc.solve")
+    return main(arguments)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -42,7 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _solve(words: list[str]) -> None:
-    solver, explicit, config = _solver(words)
+    first = read_first("assoc.solve", words, ["solver", "config", "import"])
+    import_modules(first["import"])
+    solver, explicit, config = _solver(first)
     choices = options(registry.parameters(solver))
     parsed = vars(_parser(solver, choices, explicit).parse_args(words))
     settings = {**{key: config[key] for key in _SETTINGS if key in config}, **common_values(parsed)}
@@ -54,16 +72,29 @@ def _solve(words: list[str]) -> None:
         raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
     files = parsed["files"]
     check_outputs([parsed["json"], parsed["csv"], parsed["report"]], [*files, parsed["config"]])
+    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
+        check_ending(parsed[option], flag_of(option), *endings, strict=False)
     if parsed["report"]:
         check_extra("plotly", "report")
 
+    outputs = [parsed["json"], parsed["csv"], parsed["report"]]
+    with spoken(quiet=parsed["quiet"], outputs=outputs):
+        _associate(words, solver, parsed, settings, parameters)
+
+
+def _associate(
+    words: list[str], solver: str, parsed: dict[str, Any], settings: dict[str, Any], parameters: dict[str, Any]
+) -> None:
     from assoc.association.source import load_source
 
+    files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
     plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    if parsed["verbose"]:
+        print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
-    association = plan.gather(with_progress(scans, len(items), "associating"))
+    association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
     elapsed = time.perf_counter() - started
     names = [files[number] for number, _ in items]
     of_items = [sources[number] for number, _ in items]
@@ -75,9 +106,15 @@ def _solve(words: list[str]) -> None:
     )
 
 
-def _solver(words: list[str]) -> tuple[str, bool, dict[str, Any]]:
+def completions() -> dict[str, Sequence[str]]:
+    """Options of the program with the values they take, for shells."""
+    parameters = dict.fromkeys(flags_of_solvers(DEFAULT_SOLVER), ())
+    parser = _parser(DEFAULT_SOLVER, options(registry.parameters(DEFAULT_SOLVER)), explicit=True)
+    return {**parameters, **parser.flags(), "--solver": registry.names()}
+
+
+def _solver(first: Mapping[str, str | None]) -> tuple[str, bool, dict[str, Any]]:
     """Which solver, whether it was named, and the configuration file: they decide what options there are."""
-    first = read_first("assoc.solve", words, ["solver", "config"])
     config = _read_config(first["config"]) if first["config"] is not None else {}
     name = first["solver"] if first["solver"] is not None else config.get("solver")
     return (DEFAULT_SOLVER, False, config) if name is None else (name, True, config)
@@ -86,7 +123,7 @@ def _solver(words: list[str]) -> tuple[str, bool, dict[str, Any]]:
 def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     parser = Parser(
         prog="assoc.solve",
-        usage="python -m assoc.solve FILE.npz [FILE.npz ...] --solver NAME [options]",
+        usage=f"{command('solve')} FILE.npz [FILE.npz ...] --solver NAME [options]",
         description="Associate the measurements of scenes, or solve assignment problems,\n"
         "and report how far each answer can be from the optimum.",
         epilog=None if explicit else _other_solvers(solver),
@@ -103,6 +140,9 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
+    add("--import", metavar="MODULE", help=IMPORT_HELP)
+    add_speech_options(parser, "all parameters, the defaults included")
+    parser.elsewhere = lambda: flags_of_solvers(solver)
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
         for option in choices:
@@ -124,6 +164,9 @@ def _read_config(path: str) -> dict[str, Any]:
         if isinstance(value, dict):
             if key not in registry.names():
                 raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(registry.names())}")
+            continue
+        if key == "jobs" and value == "all":
+            config[key] = cores()
             continue
         if key not in _SETTINGS:
             raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
@@ -226,5 +269,4 @@ def _print(association: Association, names: list[str], elapsed: float, *, every:
 
 
 if __name__ == "__main__":
-    prepare_process("assoc.solve")
-    raise SystemExit(main())
+    raise SystemExit(start())

@@ -10,11 +10,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.imports import HELP as IMPORT_HELP
+from assoc._cli.imports import import_modules
+from assoc._cli.inputs import check_ending
 from assoc._cli.lines import print_lines
-from assoc._cli.options import add_common_options
-from assoc._cli.program import Parser, prepare_streams, run_program
-from assoc._cli.progress import ProgressBar
+from assoc._cli.options import add_common_options, read_first
+from assoc._cli.program import Parser, command, prepare_streams, run_program
+from assoc._cli.progress import ProgressBar, ProgressLog
 from assoc._cli.signals import Interruption
+from assoc._cli.speech import add_speech_options, spoken
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -23,7 +27,21 @@ if TYPE_CHECKING:
     from assoc.sweeps.study import Counts, Study
 
 _SHOWN = 20
+_EXTRAS = (
+    ("report", "plotly", "report"),
+    ("plot", "matplotlib", "plot"),
+    ("tune", "optuna", "tune"),
+    ("scheduler", "distributed", "dask"),
+)
+"""Option, the package that it needs, and the extra that brings it."""
 _INTERRUPTION = Interruption("assoc.sweep")
+
+
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as a process of its own."""
+    prepare_streams()
+    _INTERRUPTION.interrupt_on_signals()
+    return main(arguments)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,11 +51,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _sweep(words: list[str]) -> None:
-    parser = _parser()
-    given = {name: value for name, value in vars(parser.parse_args(words)).items() if value is not None}
-    if "report" in given:
-        check_extra("plotly", "report")
+    import_modules(read_first("assoc.sweep", words, ["import"])["import"])
+    parsed = vars(_parser().parse_args(words))
+    speech = {name: parsed.pop(name) for name in ("quiet", "verbose", "import")}
+    given = {name: value for name, value in parsed.items() if value is not None}
+    for option, package, extra in _EXTRAS:
+        if option in given:
+            check_extra(package, extra)
     given["words"] = words
+    with spoken(quiet=speech["quiet"], outputs=[given.get("csv"), given.get("report")]):
+        _run(given, speech)
+
+
+def _run(given: dict[str, Any], speech: dict[str, Any]) -> None:
     if "summary" in given:
         _summary(given)
         return
@@ -46,11 +72,12 @@ def _sweep(words: list[str]) -> None:
     options = read_options(given)
     inputs = [*options.values["files"], options.config]
     check_study_outputs(options.output, [given.get("csv"), given.get("report")], inputs)
+    _check_endings(given)
     if options.tune is not None:
-        _tune(options, given)
+        _tune(options, given, speech)
         return
     study = options.study()
-    with _watched(options.output) as progress:
+    with _watched(options.output, speech) as progress:
         counts = study.run(options.output, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     _report(options.output, given, study)
     spread = f", {1e3 * counts.solving / counts.new:.3g} ms a run in the solver" if counts.new else ""
@@ -58,12 +85,20 @@ def _sweep(words: list[str]) -> None:
     print_lines(f"{counts.total} runs in {printable(options.output)}: {found}")
 
 
+def completions() -> dict[str, Sequence[str]]:
+    """Options of the program with the values they take, for shells."""
+    from assoc.solvers import registry
+
+    return {**_parser().flags(), "--solver": registry.names(), "--target": ("gap", "time")}
+
+
 def _parser() -> Parser:
+    called = command("sweep")
     parser = Parser(
         prog="assoc.sweep",
-        usage="python -m assoc.sweep FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
-        "       python -m assoc.sweep --config STUDY.toml\n"
-        "       python -m assoc.sweep --summary FOLDER [--all] [--plot] [--csv FILE] [--report FILE]",
+        usage=f"{called} FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
+        f"       {called} --config STUDY.toml\n"
+        f"       {called} --summary FOLDER [--all] [--plot] [--csv FILE] [--report FILE]",
         description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
         "The same command again runs only what is missing.",
     )
@@ -84,7 +119,7 @@ def _parser() -> Parser:
     add("--scans", metavar="A:B", help="only scans A to B-1 of each scene, counted from 0; A alone is one scan")
     add_common_options(parser, ["gate_probability", "max_tuples"])
     add("-o", "--output", metavar="FOLDER", help="folder of the study")
-    add("--jobs", metavar="N", help="number of processes, or 'all' for one per core (default 1)")
+    add_common_options(parser, ["jobs"])
     add("--scheduler", metavar="ADDRESS", help="run on a dask cluster: tcp://host:port")
     add("--tune", metavar="N", help="search for good parameters in the ranges of --grid, with N trials")
     add("--target", metavar="NAME", help="what --tune minimises: gap (mean gap, default) or time (time to optimum)")
@@ -93,8 +128,15 @@ def _parser() -> Parser:
     add("--all", action="store_const", const=True, help=text)
     add("--csv", metavar="FILE", help="write the table as CSV")
     add("--report", metavar="FILE", help="write an HTML page: table, heat maps, convergence (needs assoc[report])")
+    add("--import", metavar="MODULE", help=IMPORT_HELP)
+    add_speech_options(parser, "where the study is, every five seconds, also without a terminal")
     add("--plot", action="store_const", const=True, help="draw heatmap.png and convergence.png into the folder")
     return parser
+
+
+def _check_endings(given: dict[str, Any]) -> None:
+    check_ending(given.get("csv"), "--csv", ".csv", strict=False)
+    check_ending(given.get("report"), "--report", ".html", ".htm", strict=False)
 
 
 def _summary(given: dict[str, Any]) -> None:
@@ -107,6 +149,7 @@ def _summary(given: dict[str, Any]) -> None:
     from assoc._cli.sweep_options import check_study_outputs
 
     check_study_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
+    _check_endings(given)
     _report(given["summary"], given, None)
 
 
@@ -140,10 +183,10 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
         write_sweep_report(given["report"], folder, frame, words=given["words"])
 
 
-def _tune(options: Any, given: dict[str, Any]) -> None:
+def _tune(options: Any, given: dict[str, Any], speech: dict[str, Any]) -> None:
     from assoc._cli.study_tables import print_tuning
 
-    with _watched(options.output) as progress:
+    with _watched(options.output, speech) as progress:
         report = options.tuning(progress)
     print_tuning(report)
     if {"plot", "csv", "report"} & {*given}:
@@ -151,17 +194,19 @@ def _tune(options: Any, given: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _watched(folder: str) -> Iterator[Any]:
-    """Show progress on a terminal, and say on Ctrl-C how to go on."""
+def _watched(folder: str, speech: dict[str, Any]) -> Iterator[Any]:
+    """Show progress on a terminal, with -v also elsewhere, and say on Ctrl-C how to go on."""
+    log = ProgressLog(not speech["verbose"] or sys.stderr.isatty())
 
     def message(kept: str) -> str:
         return f"{kept} are kept in {printable(folder)}; the same command goes on from there"
 
-    with ProgressBar("runs", "runs") as bar:
+    with ProgressBar("runs", "runs", shown=not speech["quiet"]) as bar:
 
         def progress(counts: Counts) -> None:
             _INTERRUPTION.message = message(f"{counts.done} of {counts.total} runs")
             bar(counts)
+            log(counts)
 
         _INTERRUPTION.message = message("finished runs")
         with _INTERRUPTION.reported(bar.close):
@@ -169,6 +214,4 @@ def _watched(folder: str) -> Iterator[Any]:
 
 
 if __name__ == "__main__":
-    prepare_streams()
-    _INTERRUPTION.interrupt_on_signals()
-    raise SystemExit(main())
+    raise SystemExit(start())

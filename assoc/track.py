@@ -12,14 +12,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_outputs
+from assoc._cli.imports import HELP as IMPORT_HELP
+from assoc._cli.imports import import_modules
+from assoc._cli.inputs import check_ending, check_outputs
 from assoc._cli.lines import print_lines
-from assoc._cli.options import add_common_options, common_values, flag_of, parameter_values, read_first
-from assoc._cli.program import Parser, prepare_process, prepare_streams, run_program, write_all
+from assoc._cli.options import (
+    add_common_options,
+    common_values,
+    flag_of,
+    flags_of_solvers,
+    parameter_values,
+    read_first,
+)
+from assoc._cli.program import Parser, command, prepare_process, prepare_streams, run_program, write_all
 from assoc._cli.progress import with_progress
 from assoc._cli.signals import Interruption
+from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, place_on_earth, seconds, whole_number
-from assoc._parameters import Option, options
+from assoc._files.output import STDOUT
+from assoc._parameters import Option, options, positive
 from assoc._system.compile_time import compile_seconds
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
@@ -57,15 +68,30 @@ _RADAR = {
     "range_noise": ("range_noise", 1.0),
     "bearing_noise": ("azimuth_noise", math.pi / 180.0),
 }
+FORMATS = {".csv": "to_csv", ".parquet": "to_parquet"}
+"""Endings of the output, and which method of the table writes it."""
+
 # options that only --live takes
 _LIVE = ("udp", "replay", "page", "interval", "turns", "horizon", "wait")
-GOSPA_CUTOFF = 1_000.0
+CUTOFF = 1_000.0
 _MORE = """
 further options (docs/tracking.md):
   track life cycle   --confirmation --false-probability --missed-probability --m --n \
 --deletion --deletion-time --deletion-count --deletion-drop
   track initiation   --speed --rest --birth-rate --widest
   solver parameters  described by: python -m assoc.solve --solver NAME --help"""
+
+
+def start(arguments: Sequence[str] | None = None) -> int:
+    """Run the program as a process of its own."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if "--live" in words:
+        # what has come in is still written
+        prepare_streams()
+        _INTERRUPTION.interrupt_on_signals()
+    else:
+        prepare_process("assoc.track")
+    return main(words)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -75,23 +101,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _track(words: list[str]) -> None:
-    solver = read_first("assoc.track", words, ["solver"])["solver"] or "exact"
+    first = read_first("assoc.track", words, ["solver", "import"])
+    import_modules(first["import"])
+    solver = first["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
         _parser([]).parse_args(words)
-    from assoc.solvers import registry
     from assoc.tracking import Initiation, LifeCycle
 
-    own = options(registry.parameters(solver))
-    cycle, start = options(LifeCycle), [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
-    for one in start:
-        one.kind = float
-    parser = _parser([*own, *cycle, *start])
+    own, cycle, initiation = _further(solver)
+    parser = _parser([*own, *cycle, *initiation])
+    parser.elsewhere = lambda: flags_of_solvers(solver)
     parsed = vars(parser.parse_args(words))
-    file = parsed["file"]
+    given = parsed["cutoff"]
+    parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
-    check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [file])
+    check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [parsed["file"]])
+    ending = check_ending(parsed["output"], "--output", *FORMATS)
+    check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
+    check_ending(parsed["rates"], "--rates", ".csv", strict=False)
+    if ending == ".parquet":
+        check_extra("pyarrow", "parquet")
     if parsed["map"] and not parsed["map"].lower().endswith((".geojson", ".json", ".kml")):
         raise InvalidInputError(f"--map: expected a name that ends in .geojson or .kml, got {parsed['map']!r}")
     parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
@@ -101,15 +132,21 @@ def _track(words: list[str]) -> None:
         "solver": solver,
         "solver_parameters": parameter_values(own, parsed),
         "life_cycle": LifeCycle(**parameter_values(cycle, parsed)),
-        "initiation": Initiation(**parameter_values(start, parsed)),
+        "initiation": Initiation(**parameter_values(initiation, parsed)),
         **common_values(parsed),
     }
     if parsed["live"]:
-        _live(file, parsed, settings)
+        _live(parsed["file"], parsed, settings)
         return
     for option in _LIVE:
         if parsed[option] is not None:
             raise InvalidInputError(f"{flag_of(option)}: is only for --live")
+    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"], parsed["rates"], parsed["map"]]):
+        _make_tracks(words, parsed, settings, ending)
+
+
+def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, Any], ending: str) -> None:
+    file = parsed["file"]
     started, compiled = time.perf_counter(), compile_seconds()
     if _is_npz(file):
         if parsed["window"] is not None:
@@ -127,9 +164,9 @@ def _track(words: list[str]) -> None:
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            asked = solver if tracker.solver_calls else "none"
+            asked = tracker.solver if tracker.solver_calls else "none"
             used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
-            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": GOSPA_CUTOFF, "words": words}
+            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": parsed["cutoff"], "words": words}
             more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
@@ -143,14 +180,28 @@ def _track(words: list[str]) -> None:
         if parsed["rates"] and plots is not None:
             _write_rates(parsed["rates"], plots)
 
+    if parsed["verbose"]:
+        print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
     write_all(
         write_tracks_on_map,
-        lambda: table.to_csv(parsed["output"]),
+        lambda: getattr(table, FORMATS[ending])(parsed["output"]),
         write_rates,
         write_report,
-        lambda: _report(parsed["output"], count, tracker, table, scene, elapsed, compiling),
+        lambda: _report(parsed["output"], count, tracker, table, elapsed, compiling),
+        lambda: _compare(scene, table, parsed["cutoff"]),
         lambda: _report_rates(plots),
     )
+
+
+def _further(solver: str) -> tuple[list[Option], list[Option], list[Option]]:
+    """Parameters of the solver, the life cycle of tracks, and their initiation."""
+    from assoc.solvers import registry
+    from assoc.tracking import Initiation, LifeCycle
+
+    initiation = [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
+    for one in initiation:
+        one.kind = float
+    return options(registry.parameters(solver)), options(LifeCycle), initiation
 
 
 def _field(owner: Any, name: str) -> Any:
@@ -159,18 +210,28 @@ def _field(owner: Any, name: str) -> Any:
     return next(one for one in fields(owner) if one.name == name)
 
 
+def completions() -> dict[str, Sequence[str]]:
+    """Options of the program with the values they take, for shells."""
+    from assoc.solvers import registry
+    from assoc.tracking.filter_choice import FILTERS
+
+    values = {"--tracker": [*TRACKERS], "--filter": [*FILTERS], "--window": WINDOWS, "--solver": registry.names()}
+    return {**_parser([option for group in _further("exact") for option in group]).flags(), **values}
+
+
 def _parser(further: Sequence[Option]) -> Parser:
     lines = [f"  {name:<18} {purpose}" for name, purpose in TRACKERS.items()]
+    called = command("track")
     parser = Parser(
         prog="assoc.track",
-        usage="python -m assoc.track FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]\n"
-        "       python -m assoc.track SCENE --live [--udp PORT] [--page PORT] [options] < plots",
+        usage=f"{called} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]\n"
+        f"       {called} SCENE --live [--udp PORT] [--page PORT] [options] < plots",
         description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
         epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
     )
     add = parser.add_argument
     add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", metavar="FILE", help="file for the tracks (.csv)")
+    add("-o", "--output", metavar="FILE", help="file for the tracks (.csv or .parquet)")
     add("--map", metavar="FILE", help="write the tracks for a map as well (.geojson or .kml); needs an origin")
     add("--origin", metavar="LAT,LON[,H]", help="where x = y = 0 is on the earth, degrees and metres (if not in FILE)")
     add("--report", metavar="FILE", help="write an HTML page: tracks over time, metric, table (needs assoc[report])")
@@ -183,6 +244,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     )
     add("--process-noise", metavar="X", help="process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)")
     add_common_options(parser, ["seed", "time_limit", "gate_probability"])
+    text = f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})"
+    add("--cutoff", metavar="M", help=text)
     add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
     add("--all", action="store_true", help="also write tracks that are tentative, or whose target may be gone")
     add("--smooth", action="store_true", help="smooth the tracks of a scene: each position by all of its measurements")
@@ -191,6 +254,8 @@ def _parser(further: Sequence[Option]) -> Parser:
     add("--max-hypotheses", metavar="N", help="mht-hypothesis: largest number of hypotheses (default 20)")
     add("--max-events", metavar="N", help="joint-probabilistic: joint events listed for each cluster (default 100)")
     add("--rule", metavar="NAME", help="nearest-neighbour: greedy (default), or assignment, which uses the solver")
+    add("--import", metavar="MODULE", help=IMPORT_HELP)
+    add_speech_options(parser, "the settings that were used")
     plots = parser.add_argument_group("options for plots")
     plots.add_argument(
         "--window",
@@ -253,7 +318,6 @@ def _make(
     name: str, sensors: Sequence[Sensor], parsed: dict[str, Any], settings: dict[str, Any], region: Any,
     pace: float = 1.0,
 ) -> Tracker:
-    from assoc._parameters import positive
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
 
@@ -298,7 +362,7 @@ def _of_scene(
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
-    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking")
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
     table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
@@ -345,7 +409,7 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    shown = with_progress(windows, len(windows), "tracking")
+    shown = with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])
     return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
 
 
@@ -450,22 +514,27 @@ def _live(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> None:
 
 
 def _report(
-    output: str, count: int, tracker: Tracker, table: TrackTable, scene: Scene | None, elapsed: float, compiling: float
+    output: str, count: int, tracker: Tracker, table: TrackTable, elapsed: float, compiling: float
 ) -> None:
     _, ids, _ = table.arrays()
-    print_lines(f"{printable(output)}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
+    name = "stdout" if output == STDOUT else printable(output)
+    print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
     # several trackers never need one, or only for what their own search leaves open
     used = tracker.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
+
+
+def _compare(scene: Scene | None, table: TrackTable, cutoff: float) -> None:
+    """Print the metrics if the truth is known."""
     if scene is None or scene.truth is None:
         return
     from assoc.metrics import Trajectories, summarise
 
-    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), GOSPA_CUTOFF)
+    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), cutoff)
     print_lines(
-        f"against the truth (cutoff {GOSPA_CUTOFF:g} m): GOSPA {found.gospa:.4g} m "
+        f"against the truth (cutoff {cutoff:g} m): root mean square GOSPA {found.gospa:.4g} m "
         f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
         f"false {found.gospa_false:.4g}), "
         f"{found.identity.switches} identity switches"
@@ -473,10 +542,4 @@ def _report(
 
 
 if __name__ == "__main__":
-    if "--live" in sys.argv:
-        # what has come in is still written
-        prepare_streams()
-        _INTERRUPTION.interrupt_on_signals()
-    else:
-        prepare_process("assoc.track")
-    raise SystemExit(main())
+    raise SystemExit(start())

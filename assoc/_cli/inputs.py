@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from assoc._files.output import check_writable, is_stream
+from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._text.plain import one_line
 from assoc.errors import InvalidInputError
 
@@ -65,6 +65,37 @@ def check_outputs(
     for path in outputs:
         if path:
             check_writable(path, folder_to_come=new_folder)
+
+
+FORMATS = (".npz", ".json", ".csv", ".parquet", ".html", ".htm", ".toml", ".png", ".pdf", ".xlsx")
+"""Endings by which people know what is in a file."""
+
+
+def check_ending(path: str | None, option: str, *endings: str, strict: bool = True) -> str:
+    """Refuse a file whose name promises something else than is written; returns its ending, the first for streams.
+
+    Parameters
+    ----------
+    path : str or None
+        None where the option was not given.
+    option : str
+        What the message begins with.
+    endings : str
+        What it may end in.
+    strict : bool, default True
+        Whether the ending must be one of these; otherwise it must only be none of another format.
+
+    Raises
+    ------
+    InvalidInputError
+        The name ends in something else.
+    """
+    if path is None or path == STDOUT or is_stream(path):
+        return endings[0]
+    ending = os.path.splitext(path)[1].lower()
+    if ending in endings or not (strict or ending in FORMATS):
+        return ending
+    raise InvalidInputError(f"{option}: {path}: expected a name that ends in {' or '.join(endings)}")
 
 
 def _real_path(path: str) -> str:

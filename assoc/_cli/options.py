@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.program import Parser
-from assoc._cli.values import density, number, seconds, whole_number
+from assoc._cli.values import density, number, processes, seconds, whole_number
 
 if TYPE_CHECKING:
     from assoc._parameters import Option
@@ -36,7 +36,7 @@ COMMON_OPTIONS = {
     "target_density": CommonOption(
         "D", density, "targets per m^3 (in the plane per m^2), or auto: positions integrated out (default: equation 5)"
     ),
-    "jobs": CommonOption("N", partial(whole_number, least=1), "number of processes (default 1)"),
+    "jobs": CommonOption("N", processes, "number of processes, or 'all' for one per core (default 1)"),
     "kbest": CommonOption("K", partial(whole_number, least=1), "the K best associations of each scan, in order"),
 }
 """By name; the flag has dashes for underscores."""
@@ -71,6 +71,22 @@ def parameter_values(choices: Sequence[Option], parsed: Mapping[str, Any]) -> di
             value = parsed[option.name]
             found[option.name] = value if option.kind is bool else option.parse(value)
     return found
+
+
+def flags_of_solvers(but: str) -> dict[str, str]:
+    """Flags of the parameters of all solvers but one, with whose they are."""
+    from assoc._parameters import options
+    from assoc.solvers import registry
+
+    found: dict[str, list[str]] = {}
+    for name in registry.names():
+        for option in options(registry.parameters(name)):
+            found.setdefault(option.flag, []).append(name)
+    return {
+        flag: f"{' and '.join(owners)} (--solver {owners[0]}), not to {but}"
+        for flag, owners in found.items()
+        if but not in owners
+    }
 
 
 def read_first(program: str, words: Sequence[str], names: Iterable[str]) -> dict[str, str | None]:

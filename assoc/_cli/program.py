@@ -6,12 +6,13 @@ import argparse
 import io
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from assoc._cli.lines import HelpFormatter
 from assoc._cli.signals import exit_on_signals
 from assoc._cli.warnings import warnings_as_lines
+from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
@@ -24,10 +25,39 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=HelpFormatter, allow_abbrev=False, **options)
+        self.elsewhere: Callable[[], Mapping[str, str]] = dict
+        """Returns flags that this program knows but does not take here, each with whose they are."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; what is not known is said together with what is near."""
+        parsed, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown[0])}")
+        return parsed
+
+    def flags(self) -> dict[str, tuple[str, ...]]:
+        """Return all flags, each with the values that it takes where these are few."""
+        return {flag: tuple(one.choices or ()) for flag, one in self._option_string_actions.items()}
+
+    def _hint(self, word: str) -> str:
+        flag = word.partition("=")[0]
+        if not flag.startswith("-"):
+            return ""
+        elsewhere = self.elsewhere()
+        if flag in elsewhere:
+            return f"; {flag} belongs to {elsewhere[flag]}"
+        near = did_you_mean(flag, [*self._option_string_actions, *elsewhere])
+        return f"; {near}" if near else ""
 
     def error(self, message: str) -> NoReturn:
         """Print one line to stderr and leave with exit code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see --help)\n")
+
+
+def command(name: str) -> str:
+    """How a user calls a program: as it was called now."""
+    called = os.path.basename(sys.argv[0]).removesuffix(".exe") if sys.argv else ""
+    return f"assoc {name}" if called == "assoc" else f"python -m assoc.{name}"
 
 
 def run_program(program: Callable[[], None], name: str) -> int:

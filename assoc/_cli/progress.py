@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
+_EVERY = 5.0
+
 
 class ProgressBar:
     """Shows on stderr how much is done; nothing if that is not a terminal.
@@ -22,13 +24,15 @@ class ProgressBar:
         What the program is doing.
     unit : str
         What it counts, in the plural.
+    shown : bool, default True
+        Show nothing at all otherwise.
     """
 
-    def __init__(self, label: str, unit: str) -> None:
+    def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit
         self._progress: Any = None
         self._started = time.perf_counter()
-        if sys.stderr.isatty():
+        if shown and sys.stderr.isatty():
             # needed on a terminal alone, and slow to load
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -72,9 +76,28 @@ class ProgressBar:
         self.close()
 
 
-def with_progress(items: Iterable[Item], total: int, label: str, unit: str = "scans") -> Iterator[Item]:
-    """Yield the items, and show a progress bar while they are worked on."""
-    with ProgressBar(label, unit) as bar:
+class ProgressLog:
+    """Says on stderr every five seconds where a study is: for those who read it in a file.
+
+    Parameters
+    ----------
+    silent : bool
+        Say nothing.
+    """
+
+    def __init__(self, silent: bool) -> None:
+        self._next = float("inf") if silent else 0.0
+
+    def __call__(self, counts: Counts) -> None:
+        """Say where a study is."""
+        if time.monotonic() >= self._next or (counts.done == counts.total and self._next < float("inf")):
+            self._next = time.monotonic() + _EVERY
+            print(f"{counts.done} of {counts.total} runs", file=sys.stderr, flush=True)
+
+
+def with_progress(items: Iterable[Item], total: int, label: str, *, shown: bool = True) -> Iterator[Item]:
+    """Yield the items, scans or what makes them, and show a progress bar while they are worked on."""
+    with ProgressBar(label, "scans", shown) as bar:
         bar.show(0, total, 0)
         for done, item in enumerate(items):
             bar.show(done, total, done)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.inputs import check_outputs, read_toml
 from assoc._cli.options import COMMON_OPTIONS, flag_of
-from assoc._cli.values import check_kind, scan_range, whole_number
+from assoc._cli.values import check_kind, cores, scan_range, whole_number
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 from assoc.sweeps.design import designed, read_words, settings_from
@@ -177,8 +177,6 @@ def read_options(given: Mapping[str, Any]) -> Options:
 
 
 def _of_text(name: str, value: Any) -> Any:
-    if name == "jobs" and value == "all":
-        return os.cpu_count() or 1
     if name in COMMON_OPTIONS:
         return COMMON_OPTIONS[name].parse(value, flag_of(name))
     return whole_number(value, flag_of(name), _WHOLE[name]) if name in _WHOLE else value
@@ -196,7 +194,7 @@ def _of_file(file: str, key: str, value: Any) -> Any:
             raise InvalidInputError(f"{label}: expected text or a list of texts, got {value!r}")
         return words
     if key == "jobs" and value == "all":
-        return _of_text(key, value)
+        return cores()
     check_kind(value, str if key in _TEXTS else float if key in _NUMBERS else int, label)
     if key in _WHOLE or key == "jobs":
         least = _WHOLE.get(key, 1)

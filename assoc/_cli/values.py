@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from typing import Any
 
 from assoc.errors import InvalidInputError
@@ -17,6 +18,24 @@ def whole_number(text: str, label: str, least: int) -> int:
     if value < least:
         raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {text!r}")
     return value
+
+
+def processes(text: str, label: str) -> int:
+    """Parse a number of processes; "all" is one for each core."""
+    if text == "all":
+        return cores()
+    try:
+        return whole_number(text, label, 1)
+    except InvalidInputError:
+        raise InvalidInputError(f"{label}: expected a whole number >= 1 or 'all', got {text!r}") from None
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not everywhere
+        return os.cpu_count() or 1
 
 
 def seconds(text: str, label: str) -> float:

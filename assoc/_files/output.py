@@ -17,6 +17,9 @@ from assoc.errors import InvalidInputError
 
 FilePath = str | os.PathLike[str]
 
+STDOUT = "-"
+"""The name that stands for stdout; a file of that name is ``./-``."""
+
 
 def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) -> None:
     """Refuse, before the work, a path at which no file can be written.
@@ -32,6 +35,8 @@ def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) ->
     InvalidInputError
         It is a folder or a disk, or in a folder that does not exist or takes no files.
     """
+    if path == STDOUT:
+        return
     try:
         found = _status(path)
         if found is not None and stat.S_ISDIR(found.st_mode):
@@ -84,7 +89,7 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
         The path is a folder, its folder does not exist, or it cannot be written.
     """
     check_writable(path)
-    number = _standard_stream(path)
+    number = 1 if path == STDOUT else _standard_stream(path)
     if number is not None or is_stream(path):
         _write_stream(path, number, writer)
         return

@@ -22,11 +22,20 @@ from assoc.errors import InvalidInputError, LimitExceededError
 _PROCESS = 100e6
 
 _task: Callable[[Any], Any] | None = None
+_problem = ""
 
 
 def require_processes(jobs: int) -> None:
     """Refuse more processes than there is memory for."""
     memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
+
+
+def not_sent(reason: object) -> InvalidInputError:
+    """Return the error of a task that other processes cannot get, with its reason."""
+    return InvalidInputError(
+        "jobs: other processes take only what is at the top level of a module that they can import; define your own "
+        f"solver or function there ({reason})"
+    )
 
 
 def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> Iterator[Any]:
@@ -109,6 +118,9 @@ def _written(task: object) -> str:
         try:
             with os.fdopen(handle, "wb") as file:
                 pickle.dump(task, file, pickle.HIGHEST_PROTOCOL)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            temporary.remove(path)
+            raise not_sent(error) from None
         except BaseException:
             temporary.remove(path)
             raise
@@ -158,17 +170,23 @@ def end_with_parent(parent: int, *paths: str) -> None:
 
 
 def _start(path: str, parent: int) -> None:
-    global _task
+    global _task, _problem
     # Ctrl-C reaches the whole group: only the parent reports it
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         # programs wait for it in a thread, and their processes inherit that it is blocked
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     end_with_parent(parent, path)
-    with open(path, "rb") as file:
-        _task = pickle.load(file)
+    try:
+        with open(path, "rb") as file:
+            _task = pickle.load(file)
+    except (ImportError, AttributeError) as error:
+        # a worker that dies would say nothing: the first item does
+        _problem = str(error)
 
 
 def _run(item: Any) -> Any:
+    if _problem:
+        raise not_sent(_problem)
     assert _task is not None
     return _task(item)

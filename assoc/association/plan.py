@@ -21,9 +21,9 @@ from assoc.ranking.kbest import checked_k, kbest
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
+from assoc.solvers import registry
 from assoc.solvers.assign import assign
 from assoc.solvers.pheromone_history import PheromoneHistory, pheromone
-from assoc.solvers.registry import make_parameters
 
 # tuples whose pheromone is kept
 _NODES = 30
@@ -62,12 +62,17 @@ class Plan:
             checked_k(self.kbest)
         self.all_parameters  # noqa: B018  (refuses what is wrong now, not in the first scan)
 
+    def __reduce__(self) -> Any:
+        # another process knows solvers from elsewhere only if it is told
+        names = () if self.kbest is not None else (self.solver,)
+        return _received, (registry.own(names), tuple(getattr(self, one.name) for one in fields(self)))
+
     @property
     def all_parameters(self) -> dict[str, Any]:
         """The parameters given and the defaults of the others."""
         if self.kbest is not None:
             return {"k": self.kbest}
-        chosen: Any = make_parameters(self.solver, self.parameters)
+        chosen: Any = registry.make_parameters(self.solver, self.parameters)
         return {one.name: getattr(chosen, one.name) for one in fields(chosen)}
 
     def __call__(self, item: tuple[int, int]) -> ScanAssociation:
@@ -120,6 +125,12 @@ class Plan:
         """Put associated scans together."""
         name = self.solver if self.kbest is None else "kbest"
         return Association(tuple(scans), name, self.all_parameters, int(self.seed))
+
+
+def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Plan:
+    """A plan in the process that it was sent to."""
+    registry.restore(solvers)
+    return Plan(*values)
 
 
 def _targets(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

@@ -22,11 +22,27 @@ def load_source(path: str) -> Source:
     if path.endswith(".txt"):
         return AssignmentProblem.load(path)
     found = format_of(path)
+    if found is None and _is_table(path):
+        raise InvalidInputError(
+            f"{path}: is a table, expected a scene or problem (.npz); radar plots become tracks with 'assoc track', "
+            "recorded trajectories become a scene with 'assoc simulate from-tracks'"
+        )
     if found == "assoc.problem":
         return AssignmentProblem.load(path)
     if found is not None and found != "assoc.scene":
         raise InvalidInputError(f"{path}: has the format {found[:60]!r}, expected 'assoc.scene' or 'assoc.problem'")
     return Scene.load(path)
+
+
+def _is_table(path: str) -> bool:
+    """Whether a file looks like a table of text: its first line has several columns."""
+    try:
+        with open(path, "rb") as file:
+            start = file.read(4096)
+        line = start.partition(b"\n")[0].decode("utf-8-sig")
+    except (OSError, ValueError):  # ValueError: no text, or no name of a file
+        return False
+    return line.replace("\t", " ").strip().isprintable() and any(line.count(mark) >= 2 for mark in ",;\t")
 
 
 def warnings_of(source: Source) -> tuple[str, ...]:

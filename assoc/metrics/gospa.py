@@ -101,11 +101,24 @@ def gospa_over_time(
 
 
 def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
-    """Mean over time of the distance, and each part as a distance: ``mean(part) ** (1 / order)``, metres."""
+    """Mean over time of GOSPA and of its parts, all in one convention: ``mean(x ** order) ** (1 / order)``, metres.
+
+    With order 2 these are root mean squares. The parts add up to the whole as they do at one instant:
+    ``distance ** order == localisation ** order + missed ** order + false ** order``.
+
+    Parameters
+    ----------
+    values : sequence of Gospa
+        Of this order, one for each instant.
+    order : float, default 2
+
+    References
+    ----------
+    Rahmathullah, Garcia-Fernandez & Svensson, FUSION 2017, section V, where the mean is over runs.
+    """
     if not values:
         return {"distance": 0.0, "localisation": 0.0, "missed": 0.0, "false": 0.0}
     parts = {
-        name: float(np.mean([getattr(one, name) for one in values]) ** (1.0 / order))
-        for name in ("localisation", "missed", "false")
+        name: float(np.mean([getattr(one, name) for one in values])) for name in ("localisation", "missed", "false")
     }
-    return {"distance": float(np.mean([one.distance for one in values])), **parts}
+    return {name: value ** (1.0 / order) for name, value in {"distance": sum(parts.values()), **parts}.items()}

@@ -16,14 +16,15 @@ from assoc.metrics.trajectories import Trajectories
 
 @dataclass(frozen=True)
 class Summary:
-    """Means over all instants, metres, and what the identities did.
+    """Averages over all instants, metres, and what the identities did.
 
     Attributes
     ----------
     gospa, gospa_localisation, gospa_missed, gospa_false : float
-        Order 2; the parts as distances (see `mean_gospa`).
+        Order 2, root mean squares over the instants: the squares of the parts add up to the square of the whole
+        (see `mean_gospa`).
     ospa, ospa2 : float
-        Order 1; OSPA(2) over windows of 10 instants.
+        Order 1, means; OSPA(2) over windows of 10 instants.
     rmse : float
         Of tracks closer to their target than the cutoff; NaN without any.
     identity : Identity

@@ -45,6 +45,8 @@ class Run:
         Called with each TracePoint; a true answer stops the solver.
     fallback : int array or None
         The greedy choice of columns, where it was made first (fallback.py).
+    start : int array or None
+        Columns of a solution that is known; no answer costs more, and solvers begin with it where they can.
     watch : callable or None
         Called by solvers that keep a state worth seeing, after each iteration: `aco` with its ``Cycle``.
     compiled : float
@@ -60,6 +62,7 @@ class Run:
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""
     fallback: NDArray[np.integer] | None = None
+    start: NDArray[np.integer] | None = None
     compiled: float = field(default_factory=compile_seconds)
     _rng: np.random.Generator | None = None
 

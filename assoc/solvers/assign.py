@@ -9,6 +9,7 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
@@ -24,6 +25,7 @@ from assoc.solvers import registry
 from assoc.solvers.certificate import certify
 from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
+from assoc.solvers.start import start_columns
 
 
 def assign(
@@ -33,6 +35,7 @@ def assign(
     seed: int | np.random.SeedSequence | np.random.Generator = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
+    start: Solution | None = None,
     watch: Callable[[Any], object] | None = None,
     advise: bool = True,
     proof: FilePath | None = None,
@@ -52,6 +55,8 @@ def assign(
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
         Called with each ``TracePoint``; a true answer stops the solver.
+    start : Solution, optional
+        A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
     watch : callable, optional
         Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
         gives the same by tuples of the problem.
@@ -71,7 +76,7 @@ def assign(
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter, or a value out of range.
+        Unknown solver or parameter, a value out of range, or a start that is no solution of this problem.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
 
@@ -93,17 +98,22 @@ def assign(
         prepared = prepare(problem)
         run.offset = prepared.offset
         packing = prepared.packing
+        if start is not None:
+            run.start = start_columns(problem, prepared, start)
         estimate = chosen.memory(packing.num_columns, packing.num_rows)
         if estimate is not None:
             memory.require(*estimate)
         if solver != "greedy":
             prepare_fallback(packing, run)
         try:
-            outcome = solve(packing, chosen, run)
+            outcome = _checked(solve(packing, chosen, run), solver)
         except InfeasibleError:
-            if run.fallback is None:
+            known = run.start if run.fallback is None else run.fallback
+            if known is None:
                 raise
-            outcome = Outcome(run.fallback, 0)
+            outcome = Outcome(known, 0)
+        if run.start is not None:
+            outcome = _lighter(packing, outcome, run.start, run)
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
         solution = certify(problem, prepared, outcome, run, solver, chosen)
@@ -118,14 +128,32 @@ def assign(
     return solution
 
 
+def _checked(outcome: object, solver: str) -> Outcome:
+    """Refuse what is no outcome: solvers may be anybody's."""
+    if not isinstance(outcome, Outcome):
+        raise InvalidInputError(f"solver {solver!r}: expected it to return an Outcome, got {type(outcome).__name__}")
+    columns = np.asarray(outcome.columns)
+    if columns.ndim != 1 or not (columns.size == 0 or np.issubdtype(columns.dtype, np.integer)):
+        raise InvalidInputError(
+            f"solver {solver!r}: expected the columns of its Outcome to be a list of whole numbers, got an array of "
+            f"shape {columns.shape} and type {columns.dtype}"
+        )
+    return outcome
+
+
 def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
     """Take the greedy choice where the solver's is worse when time is over."""
     columns = np.asarray(outcome.columns, dtype=np.int64)
-    better = better_of(packing, columns, run)
-    if better is columns:
+    return _lighter(packing, outcome, better_of(packing, columns, run), run)
+
+
+def _lighter(packing: Packing, outcome: Outcome, other: NDArray[np.integer], run: Run) -> Outcome:
+    """Take another choice where it is lighter than the solver's."""
+    weight = float(packing.weights[other].sum())
+    if weight >= packing.weights[np.asarray(outcome.columns, dtype=np.int64)].sum():
         return outcome
-    run.record(outcome.iterations, float(packing.weights[better].sum()), outcome.lower_bound)
-    return replace(outcome, columns=better)
+    run.record(outcome.iterations, weight, min(outcome.lower_bound, weight))
+    return replace(outcome, columns=other)
 
 
 def _seed(seed: object) -> int | np.random.SeedSequence | np.random.Generator:

@@ -6,8 +6,7 @@ imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the funct
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from functools import cache
 from importlib import import_module
@@ -16,12 +15,16 @@ from typing import Any
 
 from assoc._parameters import Parameters
 from assoc._system.compile_time import loading
+from assoc._text.near import did_you_mean
 from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
 
 _NAMES = ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
 # solvers from elsewhere, by `register`
 _REGISTERED: dict[str, tuple[type[Parameters], SolveFunction]] = {}
+
+Own = tuple[str, type[Parameters], SolveFunction]
+"""Name, parameters and function of a solver from elsewhere."""
 
 
 def names() -> list[str]:
@@ -49,6 +52,17 @@ def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> N
     if name in names():
         raise InvalidInputError(f"solver: the name {name!r} is taken")
     _REGISTERED[name] = (parameters, solve)
+
+
+def own(names: Iterable[str]) -> tuple[Own, ...]:
+    """Return those of the solvers that `register` added: what another process must be told of them."""
+    return tuple((name, *_REGISTERED[name]) for name in dict.fromkeys(names) if name in _REGISTERED)
+
+
+def restore(solvers: Iterable[Own]) -> None:
+    """Register in this process what `own` returned in another one; importing its module may have done so."""
+    for name, kind, solve in solvers:
+        _REGISTERED.setdefault(name, (kind, solve))
 
 
 def parameters(name: str) -> type[Parameters]:
@@ -107,7 +121,4 @@ def _module(name: str, part: str) -> ModuleType:
 
 
 def _near(name: object, known: list[str]) -> str:
-    close = difflib.get_close_matches(str(name), known, n=3)
-    if close:
-        return "did you mean " + " or ".join(close) + "?"
-    return "known: " + ", ".join(known) if known else "it takes none"
+    return did_you_mean(name, known) or ("known: " + ", ".join(known) if known else "it takes none")

@@ -73,7 +73,14 @@ class Setting:
         return isinstance(other, Setting) and self.key == other.key
 
     def __reduce__(self) -> Any:
-        return Setting, (self.solver, dict(self.parameters))
+        # a worker knows solvers from elsewhere only if it is told
+        return _received, (registry.own([self.solver]), self.solver, dict(self.parameters))
+
+
+def _received(solvers: tuple[registry.Own, ...], solver: str, parameters: Mapping[str, Any]) -> Setting:
+    """A setting in the process that it was sent to."""
+    registry.restore(solvers)
+    return Setting(solver, parameters)
 
 
 def parameter(solver: str, name: str) -> Option:

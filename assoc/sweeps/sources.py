@@ -36,6 +36,8 @@ class StudySource:
     fingerprint: str = field(default="")
 
     def __post_init__(self) -> None:
+        # names of files may hold bytes that are no text, and columns of tables cannot
+        object.__setattr__(self, "name", self.name.encode("utf-8", "backslashreplace").decode())
         if not self.fingerprint:
             object.__setattr__(self, "fingerprint", fingerprint(self.content))
 

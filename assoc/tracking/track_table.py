@@ -119,6 +119,21 @@ class TrackTable:
         text = self.to_frame().to_csv(index=False)
         write_text(path, text)
 
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as Parquet; the file appears whole or not at all.
+
+        Raises
+        ------
+        MissingExtraError
+            pyarrow is not installed.
+        """
+        from assoc._files.output import write_atomically
+        from assoc._system.extras import check_extra
+
+        check_extra("pyarrow", "parquet")
+        frame = self.to_frame()
+        write_atomically(path, lambda file: frame.to_parquet(file, index=False))
+
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
         """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take."""
         rows = [row for row in self._rows if row[8] or not confirmed]

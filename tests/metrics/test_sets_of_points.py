@@ -155,9 +155,26 @@ def test_mean_gospa():
     _, values = gospa_over_time(truth, Trajectories([0], [7], [[3.0, 0, 0]]), 10.0)
     mean = mean_gospa(values)
     assert mean == pytest.approx(
-        {"distance": (3 + 50**0.5) / 2, "localisation": 4.5**0.5, "missed": 5.0, "false": 0.0}
+        {"distance": 29.5**0.5, "localisation": 4.5**0.5, "missed": 5.0, "false": 0.0}
     )
     assert values[0].pairs.tolist() == [[1, 7]]
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
+def test_the_parts_add_up_to_the_whole_over_time(order):
+    rng = np.random.default_rng(0)
+    times, ids = np.repeat(np.arange(30), 4), np.tile(np.arange(4), 30)
+    truth = Trajectories(times, ids, rng.normal(0, 20, (120, 2)))
+    kept = rng.random(120) < 0.8
+    tracks = Trajectories(times[kept], ids[kept] + 9, truth.positions[kept] + rng.normal(0, 15, (kept.sum(), 2)))
+    _, values = gospa_over_time(truth, tracks, 25.0, order)
+    mean = mean_gospa(values, order)
+    parts = [mean[name] for name in ("localisation", "missed", "false")]
+    assert mean["distance"] ** order == pytest.approx(sum(part**order for part in parts))
+    assert min(parts) > 0 and max(parts) < mean["distance"]
+    # each part as a plain sum over the instants
+    assert mean["missed"] ** order == pytest.approx(np.mean([one.missed for one in values]))
+    assert mean["distance"] ** order == pytest.approx(np.mean([one.distance**order for one in values]))
 
 
 @pytest.mark.parametrize(

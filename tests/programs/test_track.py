@@ -184,6 +184,23 @@ def test_help_is_quick_and_lists_trackers(run):
         assert name in done.stdout
 
 
+def test_gospa_in_one_convention_and_its_cutoff(scene_file, tmp_path, capsys):
+    """The squares of the parts add up to the square of the whole, and the cutoff is the one that is asked for."""
+    found = {}
+    for cutoff in (None, "60"):
+        words = [str(scene_file), "-o", str(tmp_path / "t.csv"), *([] if cutoff is None else ["--cutoff", cutoff])]
+        assert track.main(words) == 0
+        line = next(one for one in capsys.readouterr().out.splitlines() if "GOSPA" in one)
+        assert f"(cutoff {cutoff or 1000} m)" in line
+        pattern = r"GOSPA (N) m \(localisation (N), missed (N), false (N)\)".replace("N", r"[\d.e+]+")
+        whole, *parts = map(float, re.search(pattern, line).groups())
+        assert whole**2 == pytest.approx(sum(part**2 for part in parts), rel=2e-3) and max(parts) <= whole
+        found[cutoff] = parts
+    assert found["60"][1] > found[None][1]  # errors of more than 60 m are targets missed
+    assert track.main([str(scene_file), "-o", str(tmp_path / "t.csv"), "--cutoff", "-1"]) == 2
+    assert "--cutoff must be a number above 0" in capsys.readouterr().err
+
+
 def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
     from assoc.metrics import ct_mt_it
     from assoc.recordings import clustering_time_window, radar_of, read_plots

@@ -164,6 +164,12 @@ class Component(Priced):
             cover.improve(self.deadline)
         self.offer(cover.owner, cover.weight)
 
+    def offer_start(self, run: Run) -> None:
+        """Offer what the run's start chooses of this component."""
+        if run.start is not None:
+            cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.origin, run.start)))
+            self.offer(cover.owner, cover.weight)
+
     def random_cover(self, strictness: float, rng: np.random.Generator) -> Owner:
         """Return a random greedy cover; the larger ``strictness``, the more the reduced costs decide."""
         trail = Trail.without_pheromone(self.prices, strictness, self.temperature)

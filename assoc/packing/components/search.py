@@ -56,6 +56,7 @@ def search_components(
     parts: list[Component] = []
     for component in components:
         component.deadline, component.refinement = deadline, parameters.refinement
+        component.offer_start(run)
         component.offer_greedy()
         if component.closed:
             parts.append(component)

@@ -12,7 +12,7 @@ import numpy as np
 from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.metrics import Gospa, Trajectories, gospa_over_time
+from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.plotting.places import places
 from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
@@ -272,10 +272,11 @@ def _summary(
             shown = "-" if np.isnan(rate) else f"{rate:.1f} %"
             content[name] = (shown, f"mean of {len(rates.windows)} windows: {note}")
     if values:
-        mean = float(np.mean([one.distance for one in values]))
-        content["GOSPA"] = (f"{mean:.4g} m", f"mean over {len(values)} instants, cutoff {cutoff:g} m")
+        mean = mean_gospa(values)
+        content["GOSPA"] = (
+            f"{mean['distance']:.4g} m", f"root mean square of {len(values)} instants, cutoff {cutoff:g} m"
+        )
         notes = {"localisation": "errors of tracks", "missed": "targets without a track", "false": "tracks of nothing"}
         for part, note in notes.items():
-            value = float(np.mean([getattr(one, part) for one in values])) ** 0.5
-            content[part.capitalize()] = (f"{value:.4g} m", f"part of GOSPA: {note}")
+            content[part.capitalize()] = (f"{mean[part]:.4g} m", f"part of GOSPA: {note}")
     return cards(content)

@@ -51,8 +51,8 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     tours = np.full((parameters.ants, packing.num_rows), -1, dtype=np.int32)
     lengths = np.zeros(parameters.ants, dtype=np.int64)
     starts = run.rng.permutation(costs.size)[np.arange(parameters.ants) % costs.size]
-    best: NDArray[np.int32] | None = None
-    best_weight = np.inf
+    best: NDArray[np.integer] | None = run.start
+    best_weight = np.inf if run.start is None else float(packing.weights[run.start].sum())
     cycle, cut_off = 0, False
     while cycle < parameters.iterations:
         if cycle > 0:

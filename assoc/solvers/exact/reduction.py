@@ -33,6 +33,7 @@ from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_components
 from assoc.packing.kernels.columns import first_row
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
 from assoc.packing.packing import Packing, PackingArrays, assembled, find
 from assoc.packing.run import Run
@@ -140,12 +141,28 @@ class Reduction:
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
         state: _State = _start(self._whole.arrays)
+        self._take_over_start(state)
         while counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
             state = _reduce(state, closed, granularity, self._run.deadline())
         self.closed_columns.append(closed.columns[: counts[1]])
         self.closed_bound = math.fsum(closed.values[: counts[2], 0])
         self.closed_weight = math.fsum(closed.values[: counts[2], 1])
         return self._open_components(state) if state.packing.slack.size else []
+
+    def _take_over_start(self, state: _State) -> None:
+        """Let what is known be the incumbents of the components that it covers as they must be."""
+        if self._run.start is None:
+            return
+        whole = self._whole
+        cover = Cover.of(whole, self._run.start)
+        uncovered = np.flatnonzero((cover.owner < 0) & ~whole.slack)
+        weight = np.bincount(
+            np.searchsorted(whole.col_start, self._run.start, side="right") - 1,
+            weights=whole.weights[self._run.start],
+            minlength=state.weight.size,
+        )
+        weight[np.searchsorted(whole.row_start, uncovered, side="right") - 1] = np.inf
+        state.owner[:], state.weight[:] = cover.owner, weight
 
     def _open_components(self, state: _State) -> list[Component]:
         packing = Packing(*state.packing, state.origin, state.rows, self._whole.granularity)

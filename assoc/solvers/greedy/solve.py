@@ -26,7 +26,9 @@ def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
     InfeasibleError
         No complete choice was found.
     """
-    columns = greedy_choice(packing, run)
+    columns: NDArray[np.integer] | None = greedy_choice(packing, run)
+    if columns is None:
+        columns = run.start
     if columns is None:
         raise infeasible(packing, run)
     run.record(packing.num_columns, float(packing.weights[columns].sum()), -math.inf)

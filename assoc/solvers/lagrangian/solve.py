@@ -104,8 +104,8 @@ class Subgradient:
         self.whole = packing
         self.bound = bound
         self.proof: Floats | None = duals
-        self.columns: NDArray[np.int64] | None = None
-        self.weight = math.inf
+        self.columns = None if run.start is None else run.start.astype(np.int64)
+        self.weight = math.inf if run.start is None else float(packing.weights[run.start].sum())
         self.iterations = 0
         self.cut_off = False
         self._focus(packing, duals, np.arange(packing.num_columns))

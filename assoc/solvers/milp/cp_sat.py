@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compile_time import loading
 from assoc._system.in_time import StopSignal
@@ -18,8 +19,14 @@ _ROUNDING = 1e-7
 _LARGEST_SUM = 57
 
 
-def solve_by_cp_sat(packing: Packing, parameters: MilpParameters, seconds: float, stop: StopSignal | None) -> Answer:
-    """Solve by CP-SAT on integer weights."""
+def solve_by_cp_sat(
+    packing: Packing,
+    parameters: MilpParameters,
+    seconds: float,
+    start: NDArray[np.integer] | None,
+    stop: StopSignal | None,
+) -> Answer:
+    """Solve by CP-SAT on integer weights, from the columns of a solution if one is known."""
     # who takes the other backends does not load this one
     with loading():
         from ortools.sat import cp_model_pb2
@@ -37,6 +44,10 @@ def solve_by_cp_sat(packing: Packing, parameters: MilpParameters, seconds: float
         else:
             model.add_exactly_one(members)
     model.minimize(cp_model.LinearExpr.weighted_sum(take, integers.astype(np.int64).tolist()))
+    if start is not None:
+        chosen_before = np.isin(np.arange(packing.num_columns), start).tolist()
+        for variable, value in zip(take, chosen_before, strict=True):
+            model.add_hint(variable, value)
     solver = cp_model.CpSolver()
     solver.parameters.num_workers = parameters.workers
     solver.parameters.relative_gap_limit = 0.0

@@ -20,8 +20,10 @@ _TOLERANCE = 1e-9
 _LARGEST_COST = 7
 
 
-def solve_by_math_opt(packing: Packing, parameters: MilpParameters, seconds: float) -> Answer:
-    """Solve by SCIP or HiGHS through MathOpt."""
+def solve_by_math_opt(
+    packing: Packing, parameters: MilpParameters, seconds: float, start: NDArray[np.integer] | None
+) -> Answer:
+    """Solve by SCIP or HiGHS through MathOpt, SCIP from the columns of a solution if one is known."""
     # who takes the other backend does not load this one
     with loading():
         from ortools.math_opt.python import mathopt
@@ -39,7 +41,11 @@ def solve_by_math_opt(packing: Packing, parameters: MilpParameters, seconds: flo
     else:
         for name in ("mip_feasibility", "primal_feasibility", "dual_feasibility"):
             options.highs.double_options[f"{name}_tolerance"] = _TOLERANCE
-    result = mathopt.solve(model, kind, params=options)
+    known = mathopt.ModelSolveParameters()
+    if start is not None and parameters.backend == "scip":  # MathOpt hands HiGHS no hints
+        values = np.isin(np.arange(packing.num_columns), start).astype(float).tolist()
+        known.solution_hints = [mathopt.SolutionHint(dict(zip(model.variables(), values, strict=True)))]
+    result = mathopt.solve(model, kind, params=options, model_params=known)
     reason = result.termination.reason
     columns = None
     if result.has_primal_feasible_solution():

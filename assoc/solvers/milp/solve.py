@@ -53,7 +53,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     bound, duals = -math.inf, None
     columns: NDArray[np.integer] | None = None
     if run.time_limit is None:
-        answer = _solve(packing, parameters, math.inf)
+        answer = _solve(packing, parameters, math.inf, run)
     else:
         # made first: when the time is over it would be too late
         columns = _quick(packing, run)
@@ -75,10 +75,12 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     return Outcome(columns, answer.nodes, bound, duals)
 
 
-def _solve(packing: Packing, parameters: MilpParameters, seconds: float, stop: StopSignal | None = None) -> Answer:
+def _solve(
+    packing: Packing, parameters: MilpParameters, seconds: float, run: Run, stop: StopSignal | None = None
+) -> Answer:
     if parameters.backend == "cp_sat":
-        return solve_by_cp_sat(packing, parameters, seconds, stop)
-    return solve_by_math_opt(packing, parameters, seconds)
+        return solve_by_cp_sat(packing, parameters, seconds, run.start, stop)
+    return solve_by_math_opt(packing, parameters, seconds, run.start)
 
 
 def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> Answer:
@@ -94,7 +96,7 @@ def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> An
         # MathOpt's own interrupter makes SCIP 9 complain on stderr: its time limit must do
         stop = StopSignal() if parameters.backend == "cp_sat" else None
         seconds = run.remaining()
-        answer = in_time(lambda: _solve(packing, parameters, 0.98 * run.remaining(), stop), seconds, "milp", stop)
+        answer = in_time(lambda: _solve(packing, parameters, 0.98 * run.remaining(), run, stop), seconds, "milp", stop)
     if answer is None:
         run.stopped_by = run.stopped_by or "time_limit"
         return Answer(None, -math.inf, False, False, 0)

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from assoc._system import temporary
-from assoc._system.processes import end_with_parent, require_processes, signals_as_they_are
+from assoc._system.processes import end_with_parent, not_sent, require_processes, signals_as_they_are
 from assoc.errors import InvalidInputError
 from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
@@ -54,6 +54,8 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
                 "--jobs: a worker process was killed (is the memory used up?); fewer jobs need less; "
                 "finished runs are kept, and the same command goes on from there"
             ) from None
+        except pickle.PicklingError as error:
+            raise not_sent(error.__cause__ or error) from None
         finally:
             stop_workers()
 

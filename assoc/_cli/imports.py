@@ -1,0 +1,38 @@
+"""Modules of the user's own, imported before the options are read: their solvers have options, too."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+
+from assoc.errors import InvalidInputError
+
+HELP = "import modules of your own first, which register solvers (docs/own_solver.md)"
+
+
+def import_modules(names: str | None) -> None:
+    """Import modules by their names, joined by commas; those in the current folder are found.
+
+    Raises
+    ------
+    InvalidInputError
+        There is no such module, or it cannot be imported.
+    """
+    if names is None:
+        return
+    folder = os.getcwd()
+    # python -m puts it there, an installed command does not; worker processes get the same path
+    if folder not in sys.path and "" not in sys.path:
+        sys.path.insert(0, folder)
+    for name in names.split(","):
+        if name.endswith(".py") or os.sep in name:
+            raise InvalidInputError(f"--import: expected the name of a module (mine, not mine.py), got {name!r}")
+        try:
+            import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name is not None and (name == error.name or name.startswith(error.name + ".")):
+                raise InvalidInputError(f"--import: no module {name!r} is here or among what is installed") from None
+            raise InvalidInputError(f"--import: {name} cannot be imported ({error})") from None
+        except Exception as error:  # whatever a module of the user's does
+            raise InvalidInputError(f"--import: {name} cannot be imported ({type(error).__name__}: {error})") from None
