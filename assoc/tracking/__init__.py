@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
-from assoc.tracking.late_plots import LatePlots
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.live import LiveTracker, Picture
+from assoc.tracking.live.late_plots import LatePlots
+from assoc.tracking.live.live_tracker import LiveTracker, Picture
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker

@@ -28,7 +28,8 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import concatenate, predict_each
+from assoc.filters.base import predict_each
+from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.problem import AssignmentProblem
 from assoc.ranking.marginals import marginals

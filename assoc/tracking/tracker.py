@@ -17,8 +17,7 @@ from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.costs.tracks.own_times import Places, TimedScan
 from assoc.costs.tracks.scores import log_birth, score_terms
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Filter
-from assoc.filters.batches import predict_each
+from assoc.filters.base import Filter, predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
 from assoc.registration.online import OnlineRegistration

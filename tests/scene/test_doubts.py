@@ -20,7 +20,7 @@ from assoc.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import names, recording_names, simulate, simulate_recording
 from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
-from assoc.tracking.plot_windows import step_windows
+from assoc.tracking.plots.plot_windows import step_windows
 
 FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(
     f"{t},{who},{47.0 + 0.02 * k + 0.001 * t},{8.0 + 0.03 * k},{9000 + 300 * k}\n"

@@ -27,7 +27,7 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import predict_each
+from assoc.filters.base import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.scene.scan import Scan

@@ -17,7 +17,7 @@ from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.tracking.checking import checked
-from assoc.tracking.late_plots import HORIZON, LatePlots
+from assoc.tracking.live.late_plots import HORIZON, LatePlots
 from assoc.tracking.track import Track
 from assoc.tracking.tracker import Tracker
 

@@ -10,7 +10,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it
 from assoc.recordings import Recording, Window
-from assoc.tracking.plot_windows import step_windows
+from assoc.tracking.plots.plot_windows import step_windows
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
