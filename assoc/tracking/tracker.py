@@ -417,8 +417,7 @@ class Tracker(Checkpoint):
 
     def _log_birth(self, covariances: Array) -> Array:
         """What new targets add to the score of their measurements, by the covariances of their positions."""
-        region = self._place.region
-        return log_birth(covariances, float(np.prod(region[:, 1] - region[:, 0])), self.initiation.birth_rate)
+        return log_birth(covariances, self._place.region, self.initiation.birth_rate)
 
     def _new_scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
         """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""

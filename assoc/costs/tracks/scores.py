@@ -52,19 +52,20 @@ def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
     return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread)
 
 
-def log_birth(covariances: Array, volume: float, birth_rate: float) -> Array:
+def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     """Logarithm of the birth density integrated over the places where a new target may be.
 
     The cost of a tuple is taken at the most likely position. A target is born anywhere in the region with density
     birth rate / volume; integrated over the position (Laplace's approximation, exact for linear sensors) the
-    likelihood is the one at the best position times this.
+    likelihood is the one at the best position times this. In directions in which the region has no width, targets
+    are where it is: there is nothing to integrate.
 
     Parameters
     ----------
     covariances : array (K, 3, 3)
         Of the fused positions, m^2.
-    volume : float
-        Of the region, m^3.
+    region : array (3, 2)
+        Lower and upper bounds of x, y, z, m.
     birth_rate : float
         Mean number of new targets in a scan, all over the region.
 
@@ -73,8 +74,11 @@ def log_birth(covariances: Array, volume: float, birth_rate: float) -> Array:
     array (K,)
         To be added to the score, at most ln(birth rate).
     """
-    log_det = np.linalg.slogdet(2.0 * math.pi * covariances)[1]
-    limited: Array = np.minimum(0.5 * log_det, math.log(volume)) + math.log(birth_rate / volume)
+    widths = region[:, 1] - region[:, 0]
+    wide = np.flatnonzero(widths > 0.0)
+    log_volume = float(np.log(widths[wide]).sum())
+    log_det = np.linalg.slogdet(2.0 * math.pi * covariances[:, wide[:, None], wide])[1]
+    limited: Array = np.minimum(0.5 * log_det, log_volume) + math.log(birth_rate) - log_volume
     return limited
 
 
