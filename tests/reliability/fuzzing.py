@@ -156,7 +156,7 @@ def _use_plots(path: Path) -> None:
 def _use_solver_config(path: Path) -> None:
     from assoc import solve
 
-    solve._solver(["x.npz", "--config", str(path)])
+    solve._solver({"solver": None, "config": str(path)})
 
 
 def _use_design(path: Path) -> None:

@@ -132,7 +132,10 @@ def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: A
     best = np.full(depth, -1, np.int64)
     lost = np.zeros(depth + 1)
     least = np.inf
-    margin = 1e-12 * (known.trees[trees].sum() + 1.0)
+    total = 0.0
+    for t in trees:
+        total += known.trees[t]
+    margin = 1e-12 * (total + 1.0)
     i = 0
     place[0] = start[trees[0]]
     while i >= 0:
