@@ -3,6 +3,7 @@
 # make test-all         all tests: what a release needs
 # make lint   ruff, mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
+# make mutants          faults put in on purpose: each must make the tests of its room fail
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
 # make test-uncompiled  a part of the tests with numba switched off
@@ -24,7 +25,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz dist check-dist audit bench bench-quick bench-cold clean
+.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz mutants dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -50,6 +51,9 @@ docs: $(VENV)/.installed-docs
 fuzz: $(VENV)/.installed-test
 	$(PY) -m tests.reliability.fuzzing --count 20000 --processes 2
 	$(PY) -m tests.reliability.differential --count 3000 --processes 2
+
+mutants: $(VENV)/.installed-test
+	$(PY) -m tests.mutations
 
 # numba keeps the kernels of one version only: they must not take the place of the others
 test-oldest: $(OLDEST)/.installed-test

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from assoc._system.lazy import lazy_names
 from assoc._version import __version__
-from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
+from assoc.errors import AssocError, AssocWarning, InfeasibleError, InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
     from assoc import plotting, solvers, sweeps
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AssignmentProblem",
     "AssocError",
+    "AssocWarning",
     "Association",
     "InfeasibleError",
     "InvalidInputError",

@@ -23,6 +23,7 @@ PROGRAMS = {
 """Name of each: a module ``assoc.NAME`` with a function ``start``; what it does, and an example."""
 
 _OTHERS = {
+    "check": ("check a proof, or a solution, in exact arithmetic", "problem.npz proof.json"),
     "completion": ("print what a shell needs to complete names and options", "bash (or zsh, fish)"),
 }
 
@@ -34,6 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     while words and words[0] in SPEECH_FLAGS:
         forwarded.append(words.pop(0))
     name, *rest = words or ["--help"]
+    if name == "check":
+        # a file that stands alone: it shares nothing with the other programs
+        prepare_streams()
+        return import_module("assoc.check").main(rest)
     if name in PROGRAMS:
         start = import_module(f"assoc.{name}").start
         code: int = start([*forwarded, *rest])
@@ -55,7 +60,7 @@ def _list() -> None:
     print_lines("assoc: which measurements, from several sensors, came from the same target?")
     print_lines("\nPrograms (each has --help, -q to say nothing and -v to say more):")
     for name, (purpose, example) in {**PROGRAMS, **_OTHERS}.items():
-        called = f"assoc {name}" if name in _OTHERS else command(name)
+        called = f"assoc {name}" if name == "completion" else command(name)
         print_lines(f"  {name:<10}  {purpose}: {called} {example}")
     print_lines("\nassoc --version prints the version.")
 
@@ -64,7 +69,7 @@ def _complete(words: Sequence[str]) -> None:
     from assoc._cli.completion import SHELLS, script
 
     programs = {name: import_module(f"assoc.{name}").completions() for name in PROGRAMS}
-    print(script(words[0] if words else "", {**programs, "completion": {"": SHELLS}}), end="")
+    print(script(words[0] if words else "", {**programs, "check": {}, "completion": {"": SHELLS}}), end="")
 
 
 if __name__ == "__main__":

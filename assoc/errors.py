@@ -1,6 +1,9 @@
-"""The errors that the package raises on purpose; all are ValueErrors with one clear line."""
+"""The errors that the package raises on purpose, all ValueErrors with one clear line; and its warnings."""
 
 from __future__ import annotations
+
+import sys
+import warnings
 
 
 class AssocError(ValueError):
@@ -21,3 +24,16 @@ class LimitExceededError(AssocError):
 
 class MissingExtraError(AssocError, ImportError):
     """An optional dependency is not installed; the message names the command that installs it."""
+
+
+class AssocWarning(UserWarning):
+    """What is legal and almost surely a mistake, as degrees where radians are meant; one clear line."""
+
+
+def warn(message: str) -> None:
+    """Issue an `AssocWarning` at the line of the user's code that called the package."""
+    level = 2  # where `frame` stands, seen from `warnings.warn`
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "assoc":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, AssocWarning, stacklevel=level)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from os import PathLike
 from typing import Any
 
@@ -218,7 +219,12 @@ class AssignmentProblem:
         return sorted(parts, key=lambda part: int(part[0]))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write ``problem.npz`` (format "assoc.problem", version 1; docs/formats.md)."""
+        """Write ``problem.npz``, or plain text where the name ends in ``.txt`` (docs/formats.md, docs/proofs.md)."""
+        if os.fspath(path).endswith(".txt"):
+            from assoc._files.problem_text import write_problem_text
+
+            write_problem_text(path, self.tuples, self.costs, self.sizes, self.dummy)
+            return
         from assoc._files.npz import save_npz
 
         save_npz(
@@ -230,13 +236,26 @@ class AssignmentProblem:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> AssignmentProblem:
-        """Read ``problem.npz``.
+        """Read ``problem.npz``, or plain text where the name ends in ``.txt``.
 
         Raises
         ------
         InvalidInputError
             The file is missing, damaged, of another format or a future version, or its content is wrong.
         """
+        try:
+            data = cls._read(path)
+            return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(data["dummy"]))
+        except InvalidInputError as error:
+            text = str(error)
+            raise InvalidInputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+
+    @staticmethod
+    def _read(path: str | PathLike[str]) -> dict[str, Any]:
+        if os.fspath(path).endswith(".txt"):
+            from assoc._files.problem_text import read_problem_text
+
+            return read_problem_text(path)
         from assoc._files.npz import Field, load_npz
 
         fields = {
@@ -245,12 +264,7 @@ class AssignmentProblem:
             "sizes": Field("int", 1),
             "dummy": Field("bool", 0, required=False),
         }
-        data = load_npz(path, FORMAT, VERSION, fields)
-        dummy = data.get("dummy", np.array(True))
-        try:
-            return cls(data["tuples"], data["costs"], data["sizes"], dummy=bool(dummy))
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{path}: {error}") from None
+        return {"dummy": True, **load_npz(path, FORMAT, VERSION, fields)}
 
 
 def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:

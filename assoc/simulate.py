@@ -77,6 +77,8 @@ def _simulate(words: list[str]) -> None:
         scene = simulation.simulate(scenario, seed, **values)
         scene.save(parsed["output"])
         print_lines(f"{printable(parsed['output'])}: {scene!r}")
+        for what, count in scene.notes.items():
+            print_lines(f"{what}: {count:,}")
 
 
 def completions() -> dict[str, Sequence[str]]:

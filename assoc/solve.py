@@ -27,7 +27,7 @@ from assoc._cli.program import Parser, command, prepare_process, run_program, wr
 from assoc._cli.progress import with_progress
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
-from assoc._cli.values import check_kind, cores, scan_range
+from assoc._cli.values import check_kind, cores, density, scan_range
 from assoc._files.output import write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
-_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", "gate_probability", "max_tuples", "kbest")
+_GATING = ("gate_probability", "max_tuples", "target_density")
+_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 
 def start(arguments: Sequence[str] | None = None) -> int:
@@ -89,7 +90,9 @@ def _associate(
     files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    plan, items = _plan(sources, files, solver, settings, parameters)
+    plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    if parsed["verbose"]:
+        print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
     association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
     elapsed = time.perf_counter() - started
@@ -136,9 +139,9 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--csv", metavar="FILE", help="write the table as CSV")
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
-    add_common_options(parser, ["gate_probability", "max_tuples"])
+    add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
     add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "each improvement of cost and bound, and the time of each scan")
+    add_speech_options(parser, "all parameters, the defaults included")
     parser.elsewhere = lambda: flags_of_solvers(solver)
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
@@ -167,6 +170,9 @@ def _read_config(path: str) -> dict[str, Any]:
             continue
         if key not in _SETTINGS:
             raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
+        if key == "target_density":
+            density(str(value), f"{path}: {key}")
+            continue
         kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
         check_kind(value, kind, f"{path}: {key}")
     return config
@@ -189,11 +195,13 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
+    *,
+    pheromone: bool,
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
     gating: dict[str, Any] = {
-        key: settings[key] for key in ("gate_probability", "max_tuples") if key in settings
+        key: settings[key] for key in _GATING if key in settings
     }
     plan = Plan(
         tuple(sources),
@@ -203,6 +211,7 @@ def _plan(
         parameters,
         gating,
         settings.get("kbest"),
+        pheromone,
     )
     items = plan.items()
     if "scans" in settings:

@@ -94,6 +94,7 @@ EXPERIMENTS = (
         "docs/filters.md (consistency); with --publish experiments/results/filters.endurance.json",
     ),
     Experiment("filters.tune", "tuning of the fuzzy rules and of the IMM", "assoc/filters/fuzzy/tuned_parameters.json"),
+    Experiment("trackers.asynchronous", "turning radars, late plots", "docs/tracking.md (turning radars)"),
     Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
     Experiment("trackers.biases", "registration of biased radars", "docs/registration.md (measured)"),
     Experiment("trackers.close_targets", "trackers where association is hard", "docs/tracking.md (close targets)"),
@@ -102,6 +103,9 @@ EXPERIMENTS = (
         "trackers.fusion_in_stone_soup",
         "fusion before tracking, in Stone Soup",
         "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
+    ),
+    Experiment(
+        "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"
     ),
     Experiment(
         "sweep_overhead",

@@ -102,10 +102,10 @@ def convergence(figure: Any) -> None:
 def pheromone(figure: Any) -> None:
     """Draw how the ants of the paper agree on a tour."""
     from assoc.plotting import plot_pheromone
-    from assoc.solvers.aco.pheromone_history import pheromone_history
+    from assoc.solvers import pheromone
 
     problem = assoc.build_problem(simulate("crowd", 0, targets=8, scans=1), 0)
-    plot_pheromone(pheromone_history(problem, seed=0, alpha=1.0, beta=1.0, rho=0.9), ax=figure.subplots())
+    plot_pheromone(pheromone(problem, mode="paper", rho=0.9), ax=figure.subplots())
 
 
 def heat_map(figure: Any) -> None:

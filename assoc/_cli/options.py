@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.program import Parser
-from assoc._cli.values import number, processes, seconds, whole_number
+from assoc._cli.values import density, number, processes, seconds, whole_number
 
 if TYPE_CHECKING:
     from assoc._parameters import Option
@@ -32,6 +32,9 @@ COMMON_OPTIONS = {
     ),
     "max_tuples": CommonOption(
         "N", partial(whole_number, least=1), "stop if a scan has more candidate tuples than this"
+    ),
+    "target_density": CommonOption(
+        "D", density, "targets per m^3 (in the plane per m^2), or auto: positions integrated out (default: equation 5)"
     ),
     "jobs": CommonOption("N", processes, "number of processes, or 'all' for one per core (default 1)"),
     "kbest": CommonOption("K", partial(whole_number, least=1), "the K best associations of each scan, in order"),

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from assoc._cli.lines import HelpFormatter
 from assoc._cli.signals import exit_on_signals
+from assoc._cli.warnings import warnings_as_lines
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
@@ -62,7 +63,8 @@ def command(name: str) -> str:
 def run_program(program: Callable[[], None], name: str) -> int:
     """Run a program and turn what it raises into one line on stderr and an exit code."""
     try:
-        program()
+        with warnings_as_lines(name):
+            program()
         sys.stdout.flush()
     except (InfeasibleError, LimitExceededError) as error:
         print(f"{name}: {one_line(error)}", file=sys.stderr)

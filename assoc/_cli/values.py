@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import Any
 
@@ -73,6 +74,30 @@ def number(text: str, label: str) -> float:
         return float(text)
     except ValueError:
         raise InvalidInputError(f"{label}: expected a number, got {text!r}") from None
+
+
+def density(text: str, label: str) -> float | str:
+    """Parse a number above 0, or "auto"."""
+    if text == "auto":
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise InvalidInputError(f"{label}: expected a number above 0, or auto, got {text!r}")
+    return value
+
+
+def place_on_earth(text: str, label: str) -> tuple[float, float, float]:
+    """Parse LAT,LON or LAT,LON,HEIGHT (degrees, metres) into radians and metres."""
+    parts = text.split(",")
+    if len(parts) not in (2, 3):
+        raise InvalidInputError(f"{label}: expected LAT,LON or LAT,LON,HEIGHT in degrees and metres, got {text!r}")
+    lat, lon, height = (number(part, label) for part in [*parts, "0"][:3])
+    if not (abs(lat) <= 90 and abs(lon) <= 360 and abs(height) <= 1e6):
+        raise InvalidInputError(f"{label}: expected a latitude within +-90 and a longitude within +-360, got {text!r}")
+    return math.radians(lat), math.radians(lon), height
 
 
 def check_kind(value: Any, kind: type, label: str) -> None:

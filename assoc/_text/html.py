@@ -41,3 +41,13 @@ def facts(content: Mapping[str, object]) -> str:
         for name, value in content.items()
     )
     return f"<table><tbody>{''.join(rows)}</tbody></table>"
+
+
+def warning_list(lines: Iterable[str]) -> str:
+    """Return warnings, each once, under their number; nothing where there are none."""
+    different = list(dict.fromkeys(lines))
+    if not different:
+        return ""
+    items = "".join(f"<li>{escape(line)}</li>" for line in different)
+    plural = "s" if len(different) > 1 else ""
+    return f'<div class="warned"><b>{len(different)} warning{plural}</b><ul>{items}</ul></div>'

@@ -37,7 +37,7 @@ def associate(
         Number of processes. A script that asks for more than one must guard its own start by
         ``if __name__ == "__main__"``, because the processes are spawned.
     gating : mapping, optional
-        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``.
+        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``target_density``.
     **parameters
         Parameters of the solver (``assoc.solvers.parameters(solver)``).
 

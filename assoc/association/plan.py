@@ -23,6 +23,10 @@ from assoc.scene.scene import Scene
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
+from assoc.solvers.pheromone_history import PheromoneHistory, pheromone
+
+# tuples whose pheromone is kept
+_NODES = 30
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Plan:
         Options of ``assoc.build_problem``.
     kbest : int, optional
         Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
+    pheromone : bool
+        Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
     """
 
     sources: Sequence[Source]
@@ -47,6 +53,7 @@ class Plan:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     gating: Mapping[str, Any] = field(default_factory=dict)
     kbest: int | None = None
+    pheromone: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
@@ -73,7 +80,8 @@ class Plan:
         source = self.sources[item[0]]
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
-            return self._best([_of_problem(source, one) for one in self._solve(source, self.seed)], compiled)
+            solutions, history = self._solve(source, self.seed)
+            return self._best([_of_problem(source, one) for one in solutions], history, compiled)
         return self.associate(source, source.scan(item[1]))
 
     def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
@@ -82,16 +90,24 @@ class Plan:
         # a seed of its own for each scan, whichever process solves it and whatever was solved before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
-        return self._best([_of_scan(scene, scan, problem, one) for one in self._solve(problem, seed)], compiled)
+        solutions, history = self._solve(problem, seed)
+        return self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
 
-    def _solve(self, problem: AssignmentProblem, seed: int | np.random.SeedSequence) -> list[Solution]:
+    def _solve(
+        self, problem: AssignmentProblem, seed: int | np.random.SeedSequence
+    ) -> tuple[list[Solution], PheromoneHistory | None]:
         if self.kbest is not None:
-            return kbest(problem, self.kbest, time_limit=self.time_limit)
-        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)]
+            return kbest(problem, self.kbest, time_limit=self.time_limit), None
+        if self.pheromone and self.solver == "aco":
+            history = pheromone(problem, seed=seed, time_limit=self.time_limit, **self.parameters).top(_NODES)
+            return [history.solution], history
+        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)], None
 
-    def _best(self, scans: list[ScanAssociation], compiled: float) -> ScanAssociation:
+    def _best(
+        self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float
+    ) -> ScanAssociation:
         """Return the first of ranked associations, which carries all of them where they were asked for."""
-        scans = [replace(one, compile_time=compile_seconds() - compiled) for one in scans]
+        scans = [replace(one, pheromone=history, compile_time=compile_seconds() - compiled) for one in scans]
         return scans[0] if self.kbest is None else replace(scans[0], ranked=tuple(scans))
 
     def items(self) -> list[tuple[int, int]]:
@@ -117,19 +133,22 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Pla
     return Plan(*values)
 
 
-def _targets(problem: AssignmentProblem, solution: Solution) -> NDArray[np.int32]:
+def _targets(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Tuples that are targets, and what each costs."""
     number = np.count_nonzero(solution.tuples, axis=1)
     alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
-    return solution.tuples[(number >= 2) | alone_but_real]
+    real = (number >= 2) | alone_but_real
+    return solution.tuples[real], problem.costs[solution.indices[real]]
 
 
 def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
     sizes = tuple(int(n) for n in problem.sizes)
-    return ScanAssociation(0, None, sizes, solution, _targets(problem, solution))
+    targets, costs = _targets(problem, solution)
+    return ScanAssociation(0, None, sizes, solution, targets, costs=costs)
 
 
 def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
-    targets = _targets(problem, solution)
+    targets, costs = _targets(problem, solution)
     positions, covariances = positions_and_covariances(scene, scan, targets)
     truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
@@ -141,6 +160,7 @@ def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Sol
         targets=targets,
         positions=positions,
         covariances=covariances,
+        costs=costs,
         true_tuples=None if truth is None else len(truth),
         correct_tuples=correct,
     )

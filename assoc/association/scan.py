@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc.solution import Solution
+
+if TYPE_CHECKING:
+    from assoc.solvers.pheromone_history import PheromoneHistory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,12 +35,16 @@ class ScanAssociation:
         Fused (maximum-likelihood) positions, metres; None without a scene.
     covariances : array (T, 3, 3) or None
         Their covariances, m^2.
+    costs : array (T,) or None
+        What each target costs in the problem that was solved; None in associations made elsewhere.
     true_tuples : int or None
         Targets that at least two sensors detected; None where the truth is not known.
     correct_tuples : int or None
         Those of them whose measurements, all of them and no other, form a chosen tuple.
     ranked : tuple of ScanAssociation
         The k best associations of the scan, this one first; empty where they were not asked for.
+    pheromone : PheromoneHistory or None
+        What the ants left on the tuples with the most of it, where that was asked for (solver aco).
     compile_time : float
         Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
         no part of ``solution.runtime``.
@@ -50,9 +57,11 @@ class ScanAssociation:
     targets: NDArray[np.int32]
     positions: NDArray[np.float64] | None = None
     covariances: NDArray[np.float64] | None = None
+    costs: NDArray[np.float64] | None = None
     true_tuples: int | None = None
     correct_tuples: int | None = None
     ranked: tuple[ScanAssociation, ...] = ()
+    pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
 
     @property

@@ -6,6 +6,7 @@ from assoc._files.npz import format_of
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
+from assoc.solvers.doubts import doubts_about_costs
 
 Source = Scene | AssignmentProblem
 
@@ -18,6 +19,8 @@ def load_source(path: str) -> Source:
     InvalidInputError
         It is neither, or cannot be read.
     """
+    if path.endswith(".txt"):
+        return AssignmentProblem.load(path)
     found = format_of(path)
     if found is None and _is_table(path):
         raise InvalidInputError(
@@ -40,3 +43,8 @@ def _is_table(path: str) -> bool:
     except (OSError, ValueError):  # ValueError: no text, or no name of a file
         return False
     return line.replace("\t", " ").strip().isprintable() and any(line.count(mark) >= 2 for mark in ",;\t")
+
+
+def warnings_of(source: Source) -> tuple[str, ...]:
+    """What is almost surely a mistake in a scene or a problem, one line each."""
+    return source.warnings if isinstance(source, Scene) else doubts_about_costs(source)

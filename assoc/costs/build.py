@@ -18,6 +18,7 @@ from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.own_times import timed_costs, timed_positions, timed_problem
 from assoc.costs.pairs import compatible_pairs
 from assoc.costs.positions import scan_of
+from assoc.costs.prices import position_prior, with_prior
 from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
@@ -36,6 +37,7 @@ def build_problem(
     gate_probability: float = GATE_PROBABILITY,
     max_tuples: int = MAX_TUPLES,
     speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
     all_tuples: bool = False,
 ) -> AssignmentProblem:
     """Write down which measurements of a scan may be one target, and at what cost.
@@ -66,6 +68,12 @@ def build_problem(
     speed : float or sequence of float
         Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
         against, and what a target may fly between measurements of different times; without either it has no effect.
+    target_density : float or "auto", optional
+        None is equation 5: the likelihood at the best position. A number is the density of targets in the region,
+        per m^3 (per m^2 if no sensor measures full positions): positions are integrated out under it, and a cost gains
+        -ln(density (2 pi)^(n/2) |P|^(1/2)) with P the covariance of the position. "auto" takes the density from the
+        numbers of measurements in the scene. The prior is right where measurements hardly determine positions, as
+        bearings: equation 5 then finds too many targets.
     all_tuples : bool
         Whether to list every tuple, (n_1 + 1) ... (n_S + 1) - 1 of them, gated or not and whatever it costs: the
         papers' full grid. Its optimum is that of the candidates; `AssignmentProblem.to_dense` makes it a tensor.
@@ -95,22 +103,27 @@ def build_problem(
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
     one = scan_of(scene, scan)
     if all_tuples:
-        return _whole_grid(scene, one, int(max_tuples), speed)
+        return _whole_grid(scene, one, int(max_tuples), speed, target_density)
     if not one.at_once:
+        _refuse_prior(target_density)
         return timed_problem(scene, one, probability, int(max_tuples), speed)
-    sensors = sensor_arrays(scene)
+    bare = sensor_arrays(scene)
+    prior = position_prior(scene, bare, target_density)
+    sensors = with_prior(bare, prior)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
     measured, index = scan_arrays(sensors, one, reach, least)
     limits = {"number": one.index, "max_tuples": int(max_tuples)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
     return AssignmentProblem(padded[rows], costs, one.sizes)
 
 
-def _whole_grid(scene: Scene, one: Scan, most: int, speed: float | Sequence[float]) -> AssignmentProblem:
+def _whole_grid(
+    scene: Scene, one: Scan, most: int, speed: float | Sequence[float], density: float | str | None
+) -> AssignmentProblem:
     shape = [int(size) + 1 for size in one.sizes]
     count = math.prod(shape) - 1
     if count > most:
@@ -119,11 +132,19 @@ def _whole_grid(scene: Scene, one: Scan, most: int, speed: float | Sequence[floa
         )
     # the first of the grid is the tuple without measurements, which no problem has
     tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
-    return AssignmentProblem(tuples, tuple_costs(scene, one, tuples, speed=speed), one.sizes)
+    costs = tuple_costs(scene, one, tuples, speed=speed, target_density=density)
+    return AssignmentProblem(tuples, costs, one.sizes)
 
 
-def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:
-    """Cost of given tuples (equation 5), gated or not; a single measurement is a false alarm and costs 0.
+def tuple_costs(
+    scene: Scene,
+    scan: int | Scan,
+    tuples: Array,
+    *,
+    speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
+) -> Array:
+    """Cost of given tuples, gated or not, by equation 5 or with a prior; a single measurement costs 0, a false alarm.
 
     Parameters
     ----------
@@ -131,7 +152,7 @@ def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float |
         See `build_problem`.
     tuples : array_like of int (K, S)
         1-based measurement of each sensor, 0 where it missed the target.
-    speed : float or sequence of float
+    speed, target_density
         See `build_problem`.
 
     Returns
@@ -145,7 +166,8 @@ def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float |
     """
     one = scan_of(scene, scan)
     if one.at_once:
-        return positions.tuple_costs(scene, one, tuples, speed=speed)
+        return positions.tuple_costs(scene, one, tuples, speed=speed, target_density=target_density)
+    _refuse_prior(target_density)
     return timed_costs(scene, one, tuples, speed)
 
 
@@ -179,11 +201,19 @@ def positions_and_covariances(
     return timed_positions(scene, one, tuples, speed)
 
 
-_known_gates: weakref.WeakKeyDictionary[Scene, dict[float, Gates]] = weakref.WeakKeyDictionary()
+def _refuse_prior(target_density: float | str | None) -> None:
+    if target_density is not None:
+        raise InvalidInputError(
+            "target_density: measurements with times of their own have costs without a prior only; leave it out"
+        )
+
+
+_known_gates: weakref.WeakKeyDictionary[Scene, dict[tuple[float, float], Gates]] = weakref.WeakKeyDictionary()
 
 
 def _gates(scene: Scene, sensors: SensorArrays, probability: float) -> Gates:
     known = _known_gates.setdefault(scene, {})
-    if probability not in known:
-        known[probability] = make_gates(sensors, probability)
-    return known[probability]
+    key = (probability, sensors.base)
+    if key not in known:
+        known[key] = make_gates(sensors, probability)
+    return known[key]

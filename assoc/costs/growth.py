@@ -13,7 +13,8 @@ from assoc.costs.estimation import fit
 from assoc.costs.gating import SLACK, Gates, degrees_of_freedom
 from assoc.costs.limits import refuse, too_many
 from assoc.costs.pairs import Pairs
-from assoc.costs.range_rates import RangeRates, prices
+from assoc.costs.prices import PositionPrior, prices
+from assoc.costs.range_rates import RangeRates
 from assoc.sensors.codes import BEARING
 
 # an azimuth predicted with a larger standard deviation (rad) is not trusted to rule measurements out
@@ -99,6 +100,7 @@ def grow(
     gates: Gates,
     *,
     rates: RangeRates | None = None,
+    prior: PositionPrior | None = None,
     number: int,
     max_tuples: int,
 ) -> tuple[Array, Array]:
@@ -106,7 +108,7 @@ def grow(
 
     A tuple is a candidate if each pair in it passes the pair gate, its chi-square value passes the joint
     gate of its degrees of freedom, and its cost is below zero, the cost of its measurements as false alarms.
-    Range rates have no part in the gates; their price is part of the cost.
+    Range rates and the prior of positions have no part in the gates; their price is part of the cost.
     On the way, a tuple is given up only if no tuple that contains it can be a candidate: chi-square values
     only grow with a tuple, so one above the largest gate ahead, or above all that further detections can take
     off the cost, is of no use.
@@ -128,6 +130,7 @@ def grow(
     chi: Array = np.empty(0)
     price: Array = np.empty(0)
     worth: Array = np.empty(0)
+    priced = rates is not None or prior is not None
     for t in range(1, count):
         grown_rows, grown_chi = _grown(sensors, scan, pairs, gates, rows, chi, t, number, max_tuples)
         chosen = np.flatnonzero(second_owner == t) if count > 2 else slice(None)
@@ -137,16 +140,16 @@ def grow(
         rows = np.concatenate([rows, new, grown_rows])
         chi = np.concatenate([chi, pairs.chi[chosen], grown_chi])
         worth = (rows >= 0) @ sensors.gain - sensors.base
-        if rates is not None:
-            price = np.append(price, prices(sensors, scan, rates, rows[len(price) :]))
-        total = chi if rates is None else chi + price
+        if priced:
+            price = np.append(price, prices(sensors, scan, rows[len(price) :], rates, prior))
+        total = chi + price if priced else chi
         hopeful: Array = 0.5 * total < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
         if not hopeful.all():
             rows, chi, worth = rows[hopeful], chi[hopeful], worth[hopeful]
-            price = price[hopeful] if rates is not None else price
+            price = price[hopeful] if priced else price
         if len(rows) > max_tuples:
             raise refuse(number, len(rows), max_tuples)
-    costs = 0.5 * (chi if rates is None else chi + price) - worth
+    costs = 0.5 * (chi + price if priced else chi) - worth
     good = (chi <= gates.joint[degrees_of_freedom(sensors, rows >= 0)]) & (costs < 0.0)
     return rows[good], costs[good]
 

@@ -38,7 +38,7 @@ def timed_problem(
     A tuple has at least one measurement that tells a position: bearings alone are not compared over time.
     """
     timed = _timed_scan(scene, scan, gate_probability, speed)
-    looked = timed.looked(scan.time)
+    looked = timed.looked()
     found = grow_timed_tuples(timed, _terms(scene), looked, max_tuples)
     rows = found.rows[np.count_nonzero(found.rows, axis=1) > 1]
     costs = found.costs[np.count_nonzero(found.rows, axis=1) > 1] - _fusion(timed, rows)
@@ -51,7 +51,7 @@ def timed_costs(scene: Scene, scan: Scan, tuples: Array, speed: float | Sequence
     timed = _timed_scan(scene, scan, 1.0, speed)
     rows = _checked(timed, tuples)
     followed = timed.follow(np.full(len(rows), -1), rows)
-    looked = timed.looked(scan.time)[timed.anchors(rows, followed.lead)]
+    looked = timed.looked()[timed.anchors(rows, followed.lead)]
     costs = score_costs(timed, followed, rows, _terms(scene), looked) - _fusion(timed, rows)
     return np.where(np.count_nonzero(rows, axis=1) == 1, 0.0, costs)
 
@@ -61,7 +61,7 @@ def timed_positions(scene: Scene, scan: Scan, tuples: Array, speed: float | Sequ
     timed = _timed_scan(scene, scan, 1.0, speed)
     rows = _checked(timed, tuples)
     followed = timed.follow(np.full(len(rows), -1), rows)
-    states = timed.at(followed, np.arange(len(rows)), scan.time)
+    states = timed.at_end(followed, np.full(len(rows), -1))
     return states.mean[:, :3].copy(), states.covariance[:, :3, :3].copy()
 
 
@@ -76,7 +76,7 @@ def _timed_scan(scene: Scene, scan: Scan, gate_probability: float, speed: float 
     nobody = start(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
     return TimedScan(
         filter, nobody, scan.time, scan.measurements, scan.own_times(), scene.sensors, _places(scene, scan), start,
-        scan.sectors, gate_probability,
+        scan.sectors, gate_probability, scan.time,
     )  # fmt: skip
 
 

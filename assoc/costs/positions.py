@@ -10,21 +10,30 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays, scan_arrays, sensor_arrays
 from assoc.costs.estimation import fit
-from assoc.costs.range_rates import SPEED, prices, range_rates
+from assoc.costs.prices import position_prior, prices, with_prior
+from assoc.costs.range_rates import SPEED, range_rates
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.codes import POSITION
 
 
-def tuple_costs(scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED) -> Array:
+def tuple_costs(
+    scene: Scene,
+    scan: int | Scan,
+    tuples: Array,
+    *,
+    speed: float | Sequence[float] = SPEED,
+    target_density: float | str | None = None,
+) -> Array:
     """Cost of given tuples of measurements of one time; see `assoc.costs.tuple_costs`."""
-    sensors = sensor_arrays(scene)
-    rows, chi, positions, _ = _fit_tuples(scene, scan, tuples)
+    prior = position_prior(scene, sensor_arrays(scene), target_density)
+    sensors = with_prior(sensor_arrays(scene), prior)
+    rows, chi, _, _ = _fit_tuples(scene, scan, tuples)
     rates = range_rates(scene, scan_of(scene, scan), speed)
-    if rates is not None:
+    if rates is not None or prior is not None:
         flat, _ = scan_arrays(sensors, scan_of(scene, scan), 1.0, 1.0)
-        chi = chi + prices(sensors, flat, rates, rows, positions)
+        chi = chi + prices(sensors, flat, rows, rates, prior)
     detected = rows >= 0
     costs = 0.5 * chi - detected @ sensors.gain + sensors.base
     return np.where(detected.sum(axis=1) == 1, 0.0, costs)

@@ -15,6 +15,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.filters.batches import concatenate
 from assoc.filters.kernels.gates import pairs
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
 from assoc.filters.measurement import Measurement, Observation, observation
@@ -128,7 +129,7 @@ class Filter(ABC, Generic[S]):
         """Return the state dt seconds later."""
 
     def predict_each(self, state: S, dt: Array) -> S:
-        """Return each state its own dt seconds later; `assoc.filters.batches.predict_each` is the door to it.
+        """Return each state its own dt seconds later; `assoc.filters.base.predict_each` is the door to it.
 
         Parameters
         ----------
@@ -137,10 +138,19 @@ class Filter(ABC, Generic[S]):
         dt : array (B,)
             Seconds, 0 or more, not all the same.
         """
-        # batches knows of filters, and joins states of any kind
-        from assoc.filters.batches import predict_by_step
-
-        return predict_by_step(self, state, dt)
+        # one prediction for each time step that occurs: any filter can
+        steps, which = np.unique(dt, return_inverse=True)
+        order = np.argsort(which, kind="stable")
+        bounds = np.searchsorted(which[order], np.arange(len(steps) + 1))
+        parts: list[Any] = []
+        states: Any = state
+        for number, step in enumerate(steps):
+            rows = states[order[bounds[number] : bounds[number + 1]]]
+            parts.append(self.predict(rows, float(step)) if step > 0 else rows)
+        back = np.empty(len(order), dtype=np.int64)
+        back[order] = np.arange(len(order))
+        joined: S = concatenate(parts)[back]
+        return joined
 
     @abstractmethod
     def update(self, state: S, measured: Array, sensor: Measurement) -> Update[S]:
@@ -291,3 +301,29 @@ def check_dimension(state: Gaussian, dim: int) -> Gaussian:
     if state.mean.shape[1] != dim:
         raise InvalidInputError(f"state must have {dim} components, got {state.mean.shape[1]}")
     return state
+
+
+def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
+    """Predict each target by a time step of its own.
+
+    Parameters
+    ----------
+    filter : Filter
+    state
+        B targets.
+    dt : array (B,)
+        Seconds, 0 or more.
+
+    Raises
+    ------
+    InvalidInputError
+        A time step is negative.
+    """
+    if not len(dt):
+        return state
+    low, high = float(dt.min()), float(dt.max())
+    if low < 0:
+        raise InvalidInputError(f"dt must be a number >= 0, got {low!r}")
+    if low == high:
+        return filter.predict(state, low) if low > 0 else state
+    return filter.predict_each(state, dt)

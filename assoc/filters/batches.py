@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
-from assoc.errors import InvalidInputError
-from assoc.filters.base import Filter
 from assoc.filters.state import Gaussian, gaussian
 
 
@@ -65,43 +63,3 @@ def _padded(value: Array, shape: Array) -> Array:
     if not missing.any():
         return value
     return np.pad(value, [(0, 0), *((0, int(width)) for width in missing)])
-
-
-def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
-    """Predict each target by a time step of its own.
-
-    Parameters
-    ----------
-    filter : Filter
-    state
-        B targets.
-    dt : array (B,)
-        Seconds, 0 or more.
-
-    Raises
-    ------
-    InvalidInputError
-        A time step is negative.
-    """
-    if not len(dt):
-        return state
-    low, high = float(dt.min()), float(dt.max())
-    if low < 0:
-        raise InvalidInputError(f"dt must be a number >= 0, got {low!r}")
-    if low == high:
-        return filter.predict(state, low) if low > 0 else state
-    return filter.predict_each(state, dt)
-
-
-def predict_by_step(filter: Filter[Any], state: Any, dt: Array) -> Any:
-    """`predict_each` by one prediction for each time step that occurs, for any filter."""
-    steps, which = np.unique(dt, return_inverse=True)
-    order = np.argsort(which, kind="stable")
-    bounds = np.searchsorted(which[order], np.arange(len(steps) + 1))
-    parts = []
-    for number, step in enumerate(steps):
-        rows = state[order[bounds[number] : bounds[number + 1]]]
-        parts.append(filter.predict(rows, float(step)) if step > 0 else rows)
-    back = np.empty(len(order), dtype=np.int64)
-    back[order] = np.arange(len(order))
-    return concatenate(parts)[back]

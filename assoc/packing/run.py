@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class Run:
     start : int array or None
         Columns of a solution that is known; no answer costs more, and solvers begin with it where they can.
     watch : callable or None
-        Called by solvers that keep a state worth seeing (the pheromone), with the iteration and a copy of it.
+        Called by solvers that keep a state worth seeing, after each iteration: `aco` with its ``Cycle``.
     compiled : float
         Seconds that this thread had spent on compiling before the run.
     """
@@ -57,7 +57,7 @@ class Run:
     offset: float = 0.0
     time_limit: float | None = None
     callback: Callback | None = None
-    watch: Callable[[int, NDArray[np.float64]], object] | None = None
+    watch: Callable[[Any], object] | None = None
     started: float = field(default_factory=time.perf_counter)
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""

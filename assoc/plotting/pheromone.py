@@ -1,4 +1,4 @@
-"""The pheromone of the ant colony over its cycles."""
+"""The pheromone of the ant colony over its cycles, how the ants see the tuples, and what they draw them with."""
 
 from __future__ import annotations
 
@@ -6,53 +6,69 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import VERMILION
 
 if TYPE_CHECKING:
-    from assoc.solvers.aco.pheromone_history import PheromoneHistory
+    from assoc.solvers.pheromone_history import PheromoneHistory
 
 _NAMED = 40
+_LABELS = {
+    "pheromone": "share of all pheromone (%)",
+    "visibility": "share of all visibility (%)",
+    "probability": "probability to be drawn (%)",
+}
 
 
-def plot_pheromone(history: PheromoneHistory, *, nodes: int = 25, ax: Any = None) -> Any:
+def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: int = 25, ax: Any = None) -> Any:
     """Draw how the pheromone increases on some tuples and evaporates from the others.
 
     Parameters
     ----------
     history : PheromoneHistory
-        Of ``assoc.solvers.aco.pheromone_history.pheromone_history``.
+        Of ``assoc.solvers.pheromone``.
+    of : {"pheromone", "visibility", "probability"}
+        tau_j or eta_j, as shares of their sum over all tuples, or p_j of eq. 8.
     nodes : int
-        So many nodes are shown, those with the most pheromone in the end and those chosen first.
+        So many tuples are shown, those that were chosen first, then those with the most pheromone in the end.
     ax : matplotlib Axes, optional
         Where to draw; new ones without it.
 
     Returns
     -------
     Axes
+
+    Raises
+    ------
+    InvalidInputError
+        ``of`` is none of the three.
     """
+    if of not in _LABELS:
+        raise InvalidInputError(f"of: expected {', '.join(_LABELS)}, got {of!r}")
     ax = axes_or_new(ax)
-    last = history.pheromone[-1] if len(history.pheromone) else np.zeros(len(history.tuples))
-    shown = np.lexsort((-last, ~history.chosen))[:nodes]
+    shown = history.top(nodes)
+    values = getattr(shown, of)
+    if of != "probability":
+        values = values / np.maximum(np.nansum(getattr(history, of), axis=1, keepdims=True), 1e-300)
     # on top what was chosen, in the order of its pheromone
-    shown = shown[::-1]
-    share = history.pheromone[:, shown] / np.maximum(history.pheromone.sum(axis=1, keepdims=True), 1e-300)
+    values, chosen = values[:, ::-1], np.flatnonzero(shown.chosen[::-1])
     cycles = history.cycles
     edges = (float(cycles[0]) - 0.5, float(cycles[-1]) + 0.5) if len(cycles) else (0.5, 1.5)
+    count = len(shown.tuples)
     image = ax.imshow(
-        100.0 * share.T,
+        100.0 * values.T,
         origin="lower",
         aspect="auto",
         interpolation="nearest",
         cmap="cividis",
-        extent=(*edges, -0.5, len(shown) - 0.5),
+        extent=(*edges, -0.5, count - 0.5),
     )
-    ax.figure.colorbar(image, ax=ax, label="share of all pheromone (%)")
-    chosen = np.flatnonzero(history.chosen[shown])
+    ax.figure.colorbar(image, ax=ax, label=_LABELS[of])
     ax.plot(np.full(chosen.size, edges[1]), chosen, "<", color=VERMILION, markersize=7, clip_on=False, label="chosen")
-    if len(shown) <= _NAMED:
-        names = [f"({', '.join(map(str, row))})" for row in history.tuples[shown].tolist()]
-        ax.set_yticks(range(len(shown)), names, fontsize=7)
+    if count <= _NAMED:
+        names = [f"({', '.join(map(str, row))})" for row in shown.tuples[::-1].tolist()]
+        ax.set_yticks(range(count), names, fontsize=7)
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.set_xlabel("cycle (number)")
     ax.set_ylabel("tuple (measurement of each sensor, 0: missed)")

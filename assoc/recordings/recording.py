@@ -37,6 +37,8 @@ class Recording:
         Altitudes that cannot be right.
     lines : array_like of int (n,), optional
         Where the plot stood in its file.
+    addresses : array_like of int (n,), optional
+        ICAO addresses of 24 bits; 0 is "not known", and the default.
     sources : array_like of int (n,), optional
         The aircraft that really caused the plot, -1 for a false plot; only a simulation knows.
     notes : mapping of str to int, optional
@@ -59,6 +61,7 @@ class Recording:
     sources: Array | None = None
     notes: Mapping[str, int] = field(default_factory=dict)
     name: str = ""
+    addresses: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -80,7 +83,8 @@ class Recording:
             raise InvalidInputError(f"altitudes must be numbers or NaN of shape {shape}, got {altitudes.shape}")
         altitudes.setflags(write=False)
         put(self, "altitudes", altitudes)
-        for name, default in (("identities", UNDECODED), ("lines", 0), ("garbled", False), ("sources", None)):
+        numbers = (("identities", UNDECODED), ("addresses", 0), ("lines", 0), ("garbled", False), ("sources", None))
+        for name, default in numbers:
             value: Any = getattr(self, name)
             if value is None and default is None:
                 continue
@@ -165,4 +169,4 @@ class Recording:
         return f"Recording({name}{len(self)} plots{span})"
 
 
-_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines")
+_COLUMNS = ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "lines", "addresses")

@@ -11,6 +11,7 @@ import numpy as np
 from assoc._files.npz import Field, load_npz, save_npz
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_parts
 from assoc.sensors import KINDS
 
 FORMAT = "assoc.scene"
@@ -38,6 +39,7 @@ _FIELDS = {
     "truth_offsets": Field("int", 1, required=False),
     "truth_ids": Field("int", 1, required=False),
     "truth_positions": Field("float", 2, required=False),
+    **METADATA_FIELDS,
 }
 
 
@@ -81,6 +83,7 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         arrays["sectors"] = parts["sectors"]
     if parts["measurement_times"] is not None:
         arrays["measurement_times"] = _flat(parts["measurement_times"], len(sensors))
+    arrays |= metadata_arrays(parts)
     truth = parts["truth"]
     if truth is not None:
         arrays["truth_offsets"] = np.cumsum([0, *(len(ids) for ids in truth["target_ids"])], dtype=np.int64)
@@ -155,12 +158,18 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
     if "measurement_times" in arrays:
         _check_shape(arrays, "measurement_times", (sum(int(n) for n in rows[:, -1]),))
         times = _split(arrays["measurement_times"], rows, scans)
+    metadata = metadata_parts(arrays)
+    truth = _read_truth(arrays, scans, rows)
+    if truth is not None:
+        truth["names"] = metadata["names"]
     return {
+        "origin": metadata["origin"],
+        "notes": metadata["notes"],
         "sensors": sensors,
         "times": arrays["times"],
         "measurements": measurements,
         "region": arrays.get("region"),
-        "truth": _read_truth(arrays, scans, rows),
+        "truth": truth,
         "name": str(arrays["name"][()]) if "name" in arrays else "",
         "measurement_times": times,
         "sectors": arrays.get("sectors"),

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from assoc._text.html import escape, table
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
+from assoc.scene.doubts import doubts_about
 from assoc.scene.file import load_parts, save_parts
+from assoc.scene.geodesy import Origin, checked_origin, geodetic
+from assoc.scene.instants import as_seconds
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
@@ -31,7 +35,8 @@ class Scene:
     sensors : sequence of Sensor
         At least one.
     times : array_like (K,)
-        Time stamps in seconds, not decreasing; at least one scan.
+        Time stamps in seconds, not decreasing; at least one scan. Dates (datetime, datetime64, pandas) become
+        seconds since 1970-01-01 UTC.
     measurements : sequence over scans of sequences over sensors of arrays (n, d_s)
         What each sensor reported; n may be 0.
     region : array_like (3, 2), optional
@@ -47,11 +52,21 @@ class Scene:
         From which to which azimuth (radians, from +x towards +y) each sensor looked in each scan; the second is 0
         to 2 pi above the first, and a sector without width means that the sensor did not look. Left out, all
         sensors look everywhere in every scan. What was not looked at is not missed.
+    origin : tuple of latitude, longitude, height, optional
+        Where the scene's frame stands on the earth: x east, y north, z up in the plane that touches the WGS-84
+        ellipsoid there; radians, radians, metres. Tracks and reports then have latitudes and longitudes.
+    notes : mapping of str to int, optional
+        What was left out or mended when the scene was made from a file, and how often.
 
     Raises
     ------
     InvalidInputError
         One line that names the argument and what was expected.
+
+    Warns
+    -----
+    AssocWarning
+        The measurements of a sensor do not fit what it says of itself, as with degrees or kilometres.
     """
 
     sensors: Sequence[Sensor]
@@ -62,6 +77,8 @@ class Scene:
     name: str = ""
     measurement_times: Sequence[Sequence[Array]] | None = None
     sectors: Array | None = None
+    origin: Origin | None = field(default=None, kw_only=True)
+    notes: Mapping[str, int] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -75,7 +92,7 @@ class Scene:
                 )
         if not isinstance(self.name, str):
             raise InvalidInputError(f"name must be text, got {type(self.name).__name__}")
-        times = finite_array(self.times, "times")
+        times = finite_array(as_seconds(self.times, "times"), "times")
         if times.ndim != 1 or not times.size:
             raise InvalidInputError(f"times must have shape (K,) with K >= 1, got {times.shape}")
         if (np.diff(times) < 0).any():
@@ -93,8 +110,22 @@ class Scene:
             for k, one in enumerate(given):
                 checked_sectors(one, len(self.sensors), f"sectors of scan {k}")
             put(self, "sectors", given)
+        if self.origin is not None:
+            put(self, "origin", checked_origin(self.origin))
+        put(self, "notes", {str(what): int(count) for what, count in dict(self.notes).items()})
         if self.truth is not None:
             self._check_truth(self.truth)
+        for line in self._doubts:
+            warn(line)
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return doubts_about(self.sensors, self.measurements)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is almost surely a mistake in the sensors and their measurements, one line each."""
+        return (*(line for sensor in self.sensors for line in sensor.warnings), *self._doubts)
 
     def _checked_measurement_times(self, given: Sequence[Sequence[Array]]) -> tuple[tuple[Array, ...], ...]:
         if len(given) != self.num_scans:
@@ -217,6 +248,9 @@ class Scene:
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
             place = ", ".join(f"{x:g}" for x in sensor.position)
+            if self.origin is not None:
+                lat, lon, _ = geodetic(sensor.position, self.origin)[0]
+                place += f" ({np.degrees(lat):.5f}°, {np.degrees(lon):.5f}°)"
             sigmas = np.sqrt(np.diagonal(sensor.covariance))
             noise = ", ".join(
                 f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} {units.get(name, 'm')}"

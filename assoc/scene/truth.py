@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -38,11 +38,14 @@ class Truth:
         Where they were, metres.
     sources : sequence over scans of sequences over sensors of int arrays (n,), optional
         The target that caused each measurement, or -1 for a false alarm.
+    names : mapping of int to str, optional
+        What targets are called, as call signs, by their ids.
     """
 
     target_ids: Sequence[Array]
     positions: Sequence[Array]
     sources: Sequence[Sequence[Array]] | None = None
+    names: Mapping[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.target_ids) != len(self.positions):
@@ -72,6 +75,14 @@ class Truth:
                     )
                 sources.append(tuple(row))
             object.__setattr__(self, "sources", tuple(sources))
+        for target, name in self.names.items():
+            if isinstance(target, bool) or not isinstance(target, (int, np.integer)) or not isinstance(name, str):
+                raise InvalidInputError(f"truth: names must be texts by target ids, got {target!r}: {name!r}")
+        object.__setattr__(self, "names", {int(target): name for target, name in self.names.items()})
+
+    def name_of(self, target: int) -> str:
+        """What a target is called: its name, or its id where it has none."""
+        return self.names.get(int(target), str(int(target)))
 
     def __repr__(self) -> str:
         targets = len({int(i) for one in self.target_ids for i in one})

@@ -11,10 +11,13 @@ from typing import ClassVar
 import numpy as np
 
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
 
 ANGLES = ("azimuth", "elevation")
 """Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
+
+LARGEST_ANGLE_NOISE = 0.3
+"""Standard deviation of an angle (rad, 17 degrees) from which a sensor is asked whether it means degrees."""
 
 LARGEST = 1e12
 """Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
@@ -26,12 +29,18 @@ def wrap_angle(angle: Array) -> Array:
     return wrapped
 
 
+def _kind_of(value: object) -> str:
+    return str(value.dtype) if isinstance(value, np.ndarray) else type(value).__name__
+
+
 def finite_array(value: object, what: str, shape: tuple[int, ...] | None = None) -> Array:
     """Return a read-only float64 copy; what is not finite numbers is refused by a line naming `what`."""
     try:
+        if np.asarray(value).dtype.kind in "mM":
+            raise TypeError  # numpy would count their days or nanoseconds
         array = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} must be numbers, got {type(value).__name__}") from error
+        raise InvalidInputError(f"{what} must be numbers, got {_kind_of(value)}") from error
     if shape is not None and array.shape != shape:
         raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -65,6 +74,11 @@ class Sensor(ABC):
     ------
     InvalidInputError
         Any of these is not as described.
+
+    Warns
+    -----
+    AssocWarning
+        The noise of an angle, or the field of view of an elevation, is hardly one in radians.
     """
 
     position: Array
@@ -116,6 +130,28 @@ class Sensor(ABC):
                 raise InvalidInputError(
                     f"{label}: field_of_view of {component} spans {high - low:g} rad, more than a full circle"
                 )
+        for line in self.warnings:
+            warn(line)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is almost surely a mistake in these values, one line each."""
+        found = []
+        for axis in range(self.dim):
+            name, (low, high) = self.components[axis], self.field_of_view[axis]
+            sigma = float(np.sqrt(self.covariance[axis, axis]))
+            if name in ANGLES and sigma > LARGEST_ANGLE_NOISE:
+                found.append(f"{self._label}: noise of {name} is {sigma:.4g} rad: degrees? radians are expected")
+            if name == "elevation" and max(-low, high) > 1.1 * math.pi / 2:
+                found.append(
+                    f"{self._label}: field_of_view of elevation is {low:.4g} to {high:.4g} rad, but nothing is seen "
+                    "beyond pi/2: degrees? radians are expected"
+                )
+        return tuple(found)
+
+    def label(self, number: int) -> str:
+        """What to call the sensor in a message: its kind and name, or its number where it has none."""
+        return self._label if self.name else f"{self._label} (sensor {number})"
 
     def _checked_noise(self) -> Array:
         label = self._label

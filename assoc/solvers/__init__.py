@@ -1,7 +1,8 @@
 """Interchangeable solvers of the S-D assignment problem; ``assign`` is the front door.
 
-What a solver of your own is written with: `Parameters`, `Run`, `Outcome`, and `Packing` and `Cover`, which are loaded
-on first use, so that who only asks for names and parameters loads no compiler.
+What a solver of your own is written with: `Parameters`, `Run`, `Outcome`, and `Packing` and `Cover`; `pheromone` shows
+the ants at work. The last three are loaded on first use, so that who only asks for names and parameters loads no
+compiler.
 """
 
 from __future__ import annotations
@@ -16,10 +17,15 @@ from assoc.solvers.registry import names, parameters, register
 if TYPE_CHECKING:
     from assoc.packing.neighbourhoods.cover import Cover
     from assoc.packing.packing import Packing
+    from assoc.solvers.pheromone_history import pheromone
 
-__all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "parameters", "register"]
+__all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "parameters", "pheromone", "register"]
 
-_HOME = {"Cover": "assoc.packing.neighbourhoods.cover", "Packing": "assoc.packing.packing"}
+_HOME = {
+    "Cover": "assoc.packing.neighbourhoods.cover",
+    "Packing": "assoc.packing.packing",
+    "pheromone": "assoc.solvers.pheromone_history",
+}
 
 
 def __getattr__(name: str) -> Any:

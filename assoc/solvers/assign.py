@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -10,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._files.output import FilePath, check_writable
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.interrupts import interruptible
-from assoc.errors import InfeasibleError, InvalidInputError
+from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Callback, Outcome, Run
@@ -21,6 +23,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify
+from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.start import start_columns
 
@@ -33,6 +36,9 @@ def assign(
     time_limit: float | None = None,
     callback: Callback | None = None,
     start: Solution | None = None,
+    watch: Callable[[Any], object] | None = None,
+    advise: bool = True,
+    proof: FilePath | None = None,
     **parameters: Any,
 ) -> Solution:
     """Solve an assignment problem.
@@ -51,6 +57,14 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
+    watch : callable, optional
+        Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
+        gives the same by tuples of the problem.
+    advise : bool, default True
+        Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
+    proof : path-like, optional
+        Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
+        (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
     **parameters
         Parameters of that solver (``assoc.solvers.parameters(name)``).
 
@@ -65,6 +79,11 @@ def assign(
         Unknown solver or parameter, a value out of range, or a start that is no solution of this problem.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
+
+    Warns
+    -----
+    AssocWarning
+        No tuple costs less than its measurements as false alarms, so that nothing can be a target.
     """
     started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
@@ -72,7 +91,9 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
-    run = Run(_seed(seed), time_limit=limit, callback=callback, started=started, compiled=compiled)
+    if proof is not None:
+        check_writable(proof)
+    run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
     with interruptible():
         prepared = prepare(problem)
         run.offset = prepared.offset
@@ -95,7 +116,16 @@ def assign(
             outcome = _lighter(packing, outcome, run.start, run)
         if run.stopped_by == "time_limit":
             outcome = _not_worse(packing, outcome, run)
-        return certify(problem, prepared, outcome, run, solver, chosen)
+        solution = certify(problem, prepared, outcome, run, solver, chosen)
+        if proof is not None:
+            from assoc.proofs import write_proof  # loads what few calls need
+
+            write_proof(proof, problem, solution)
+    # only where nothing was found is it worth a look why
+    if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
+        for line in doubts_about_costs(problem):
+            warn(line)
+    return solution
 
 
 def _checked(outcome: object, solver: str) -> Outcome:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from assoc.tracking.initiation import Initiation
-from assoc.tracking.late_plots import LatePlots
+from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.live.late_plots import LatePlots
+from assoc.tracking.live.live_tracker import LiveTracker, Picture
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
 from assoc.tracking.single_scan.multi_sensor import MultiSensorTracker
 from assoc.tracking.single_scan.static import StaticFusionTracker
+from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
@@ -22,6 +25,7 @@ TRACKERS: dict[str, type[Tracker]] = {
         TrackOrientedMHT,
         HypothesisOrientedMHT,
         NearestNeighbourTracker,
+        JointProbabilisticTracker,
     )
 }
 """Trackers by the names that programs know them by."""
@@ -31,15 +35,20 @@ __all__ = [
     "Decision",
     "HypothesisOrientedMHT",
     "Initiation",
+    "JointProbabilisticTracker",
     "LatePlots",
     "LifeCycle",
+    "LiveTracker",
     "MultiSensorTracker",
     "NearestNeighbourTracker",
+    "PairProbabilities",
+    "Picture",
     "StaticFusionTracker",
     "Step",
     "Track",
     "TrackOrientedMHT",
     "TrackTable",
     "Tracker",
+    "smoothed",
     "track_scene",
 ]

@@ -34,10 +34,11 @@ def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor
         raise InvalidInputError(
             f"measurements of {len(measurements)} sensors, expected {len(sensors)} (one array for each)"
         )
-    return [_checked(z, s, sensor) for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True))]
+    return [checked(z, s, sensor) for s, (z, sensor) in enumerate(zip(measurements, sensors, strict=True))]
 
 
-def _checked(z: Array, s: int, sensor: Sensor) -> Array:
+def checked(z: Array, s: int, sensor: Sensor) -> Array:
+    """Measurements (n, d) of the sensor of this number; see `checked_measurements`."""
     what = f"measurements of sensor {s}"
     if z is None:
         raise InvalidInputError(f"{what} must be an array of shape (n, {sensor.dim}), got None; n may be 0")

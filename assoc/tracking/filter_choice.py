@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from assoc import filters
+from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
 from assoc.sensors import PositionSensor, Radar3D, Sensor
@@ -46,6 +48,22 @@ def two_speeds(noise: float = MANOEUVRE_NOISE, dimensions: int = 3) -> Filter[An
     ]
     transition = np.array([[1 - _CHANGE, _CHANGE], [_CHANGE, 1 - _CHANGE]])
     return filters.InteractingMultipleModel(modes, transition, interval=_TURN)
+
+
+def pace_of(times: Array) -> float:
+    """Usual seconds from one scan to the next; 1 where there is one scan only."""
+    steps = np.diff(np.unique(times))
+    return float(np.median(steps)) if len(steps) else 1.0
+
+
+def manoeuvre_noise(pace: float) -> float:
+    """Process noise of `two_speeds` that suits scans so many seconds apart, m/s^1.5.
+
+    From scan to scan a velocity changes by 50 m/s (standard deviation) in a manoeuvre: turns of 5 g at a scan a
+    second, as fighters fly them, and turns as airliners fly them where scans are 10 s apart, because nobody turns
+    with 5 g for so long.
+    """
+    return MANOEUVRE_NOISE / math.sqrt(max(pace, 1.0))
 
 
 def planar(sensors: Sequence[Sensor]) -> bool:
@@ -88,7 +106,7 @@ FILTERS = tuple(_MAKERS)
 
 
 def make_filter(
-    name: str, sensors: Sequence[Sensor], process_noise: float | None = None, seed: int = 0
+    name: str, sensors: Sequence[Sensor], process_noise: float | None = None, seed: int = 0, pace: float = 1.0
 ) -> Filter[Any]:
     """Make a filter with nearly constant velocity (imm and fuzzy: with turns) that suits the sensors.
 
@@ -100,9 +118,11 @@ def make_filter(
         Where none tells a height, states are planar.
     process_noise : float, optional
         Root of the acceleration's spectral density, m/s^1.5, of imm-cv that of its manoeuvring model; of imm and
-        fuzzy the acceleration, m/s^2. Left out, 50 for imm-cv and 30 for all others.
+        fuzzy the acceleration, m/s^2. Left out, `manoeuvre_noise` of the pace for imm-cv and 30 for all others.
     seed : int
         Of the ensemble's noise.
+    pace : float
+        Seconds from scan to scan.
 
     Raises
     ------
@@ -112,7 +132,7 @@ def make_filter(
     if name not in _MAKERS:
         raise InvalidInputError(f"filter: unknown name {name!r}; known: {', '.join(FILTERS)}")
     if process_noise is None:
-        process_noise = MANOEUVRE_NOISE if name == "imm-cv" else PROCESS_NOISE
+        process_noise = manoeuvre_noise(pace) if name == "imm-cv" else PROCESS_NOISE
     made = _MAKERS[name](process_noise, planar(sensors), seed)
     for sensor in sensors:
         made.observe(sensor)

@@ -44,6 +44,9 @@ class LifeCycle:
         probability 1e-4, and at least three scans, at the usual pace of the scans.
     deletion_count : int
     deletion_drop : float
+    lifetime : float
+        Mean time for which a target stays, seconds. It says how soon a track that is no longer detected is taken for
+        gone: `Track.existence`. A track is deleted later, and comes back if it is detected in between.
     """
 
     confirmation: Confirmation = field(default="score", metadata={"help": "what confirms a track"})
@@ -57,6 +60,7 @@ class LifeCycle:
     )
     deletion_count: int = field(default=5, metadata={"help": "scans in a row without a detection"})
     deletion_drop: float = field(default=25.0, metadata={"help": "fall of the score from its best"})
+    lifetime: float = field(default=600.0, metadata={"help": "mean time for which a target stays, seconds"})
 
     def __post_init__(self) -> None:
         if self.confirmation not in get_args(Confirmation):

@@ -67,21 +67,22 @@ class NearestNeighbourTracker(Tracker):
             chosen = self._choose(pairs.track, pairs.measurement, gain, missed, batch.score, len(z))
             batch, hit, ids = self._take_in(batch, pairs, chosen, s, len(z), time)
             free = np.flatnonzero(ids == 0)
-            states, fit, positions = self._singles(s, z[free])
+            states, fit, positions, score = self._singles(s, z[free])
             free = free[fit]
             order = np.lexsort(positions.T)
             new = self._new_ids(len(free))
             ids[free[order]] = new
-            score = np.full(len(free), self._birth[s])
-            batch = TrackBatch.concatenate([batch, TrackBatch.new(states[order], new, score, time)])
+            batch = TrackBatch.concatenate([batch, TrackBatch.new(states[order], new, score[order], time)])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
-        return batch, assigned, seen, None
+        crossed = self._crossed(scan, assigned)
+        batch = TrackBatch.concatenate([batch, crossed])
+        return batch, assigned, np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)]), None
 
     def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], Array, Array]:
         """Take in a scan whose measurements have times of their own; as `_at_once`, and which were looked at."""
         timed, old = self._timed(scan), len(self._batch)
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         # the sensors that have been taken in: only they can have missed a track
         past = np.zeros_like(looked)
         anchor = track = np.arange(old)
@@ -112,7 +113,7 @@ class NearestNeighbourTracker(Tracker):
             score = np.append(score, np.zeros(len(own)))
             done.append(s)
         followed = timed.follow(track, rows)
-        states = timed.at(followed, np.arange(len(track)), scan.time)
+        states = timed.at_end(followed, track)
         seen = rows.any(axis=1)
         when = np.where(seen, followed.when, np.nan)
         order = old + np.lexsort((*states.mean[old:, list(self.filter.motion.position)].T, followed.first[old:]))
@@ -128,9 +129,7 @@ class NearestNeighbourTracker(Tracker):
         at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(order), dtype=np.bool_)])
         return batch, assigned, np.asarray(seen), at_all
 
-    def _choose(
-        self, track: Array, measurement: Array, gain: Array, missed: Array, scores: Array, count: int
-    ) -> Array:
+    def _choose(self, track: Array, measurement: Array, gain: Array, missed: Array, scores: Array, count: int) -> Array:
         """Rows of the pairs that are taken, given what each and a miss of each track adds to the score."""
         tracks, own = len(scores), scores[track]
         seen = doubted_gain(own, gain)

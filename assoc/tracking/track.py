@@ -30,6 +30,8 @@ class Track:
         Scans (of any sensor) in which it was detected.
     started, last_detection : float
         Seconds.
+    existence : float
+        Probability that the target is still there.
     """
 
     track_id: int
@@ -43,6 +45,19 @@ class Track:
     hits: int
     started: float
     last_detection: float
+    existence: float
+
+    @property
+    def reported(self) -> bool:
+        """Whether it is confirmed and its target rather there than not."""
+        return self.confirmed and self.existence >= 0.5
+
+    def named(self, track_id: int) -> Track:
+        """The same track under another id."""
+        # `dataclasses.replace` takes longer than all else that is done with a track
+        made = object.__new__(Track)
+        made.__dict__.update(self.__dict__, track_id=track_id)
+        return made
 
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.position)

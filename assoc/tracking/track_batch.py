@@ -19,14 +19,14 @@ MASK = (1 << HISTORY) - 1
 """The scans whose detections are remembered, one a bit."""
 
 
-SCORE, BEST, STARTED, LAST = 0, 1, 2, 3
+SCORE, BEST, STARTED, LAST, EXISTS = 0, 1, 2, 3, 4
 """Columns of the numbers of a batch."""
 ID, SURE, BITS, MISSED, HITS = 0, 1, 2, 3, 4
 """Columns of the counts of a batch."""
 
-_NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST}
+_NUMBERS = {"score": SCORE, "best": BEST, "started": STARTED, "last_detection": LAST, "existence": EXISTS}
 _COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISSED, "hits": HITS}
-_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection")
+_HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence")
 
 
 class TrackBatch:
@@ -38,8 +38,8 @@ class TrackBatch:
     ----------
     states
         The filter's states, all of one time.
-    numbers : array (T, 4)
-        Score, best score, start, last detection.
+    numbers : array (T, 5)
+        Score, best score, start, last detection, logarithm of the odds of existence.
     counts : int64 array (T, 5)
         Track id, confirmed, detections, missed, hits.
     """
@@ -68,6 +68,11 @@ class TrackBatch:
     def last_detection(self) -> Array:
         """Seconds, (T,)."""
         return self.numbers[:, LAST]
+
+    @property
+    def existence(self) -> Array:
+        """Logarithm of the odds that the target is still there, (T,)."""
+        return self.numbers[:, EXISTS]
 
     @property
     def track_id(self) -> Array:
@@ -105,8 +110,8 @@ class TrackBatch:
     def new(states: Any, track_id: Array, score: Array | float, when: Array | float) -> TrackBatch:
         """Tracks that begin now, each with one detection that the scan's `counted` will count."""
         count = len(track_id)
-        numbers, counts = np.empty((count, 4)), np.zeros((count, 5), dtype=np.int64)
-        numbers[:, SCORE] = numbers[:, BEST] = score
+        numbers, counts = np.empty((count, 5)), np.zeros((count, 5), dtype=np.int64)
+        numbers[:, SCORE] = numbers[:, BEST] = numbers[:, EXISTS] = score
         numbers[:, STARTED] = numbers[:, LAST] = when
         counts[:, ID] = track_id
         return TrackBatch(states, numbers, counts)
@@ -136,10 +141,27 @@ class TrackBatch:
         """
         numbers = self.numbers.copy()
         numbers[:, SCORE] += gain
+        numbers[:, EXISTS] += gain
         np.maximum(numbers[:, BEST], numbers[:, SCORE], out=numbers[:, BEST])
         if detected_at is not None:
             np.fmax(numbers[:, LAST], detected_at, out=numbers[:, LAST])
         return TrackBatch(states, numbers, self.counts)
+
+    def survived(self, lifetimes: float) -> TrackBatch:
+        """Tracks so many mean lifetimes later: exp(-lifetimes) of the targets are still there."""
+        if lifetimes == 0.0:
+            return self
+        numbers = self.numbers.copy()
+        # odds p / (1 - p) with p = exp(-lifetimes) / (1 + exp(-odds before))
+        gone = np.logaddexp(-numbers[:, EXISTS], np.log(-np.expm1(-lifetimes)))
+        numbers[:, EXISTS] = -lifetimes - gone
+        return TrackBatch(self.states, numbers, self.counts)
+
+    def not_overlooked(self, gain: Array) -> TrackBatch:
+        """The same tracks, their existence (not their score) mended by what misses took that were none, (T,)."""
+        numbers = self.numbers.copy()
+        numbers[:, EXISTS] += gain
+        return TrackBatch(self.states, numbers, self.counts)
 
     def counted(self, detected: Array, looked: Array | None = None) -> TrackBatch:
         """Tracks at the end of a scan in which these (bool (T,)) were detected by any sensor.
@@ -196,7 +218,9 @@ class TrackBatch:
         position[:, : len(motion.position)] = mean[:, list(motion.position)]
         places = velocity_components(motion)
         velocity[:, : len(places)] = mean[:, places]
-        columns = [getattr(self, name).tolist() for name in _HANDED_OUT]
+        values = {name: getattr(self, name) for name in _HANDED_OUT}
+        values["existence"] = 1.0 / (1.0 + np.exp(np.clip(-self.existence, -500.0, 500.0)))
+        columns = [value.tolist() for value in values.values()]
         return [
             Track(i, time, mean[row].copy(), covariance[row].copy(), position[row], velocity[row], *rest)
             for row, (i, *rest) in enumerate(zip(*columns, strict=True))

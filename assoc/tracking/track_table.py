@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._types import Array
+from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
+from assoc.tracking.maps import coordinates, followed_targets
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed", "score", "hits", "started", "last_detection",
-    "sigma_x", "sigma_y", "sigma_z", "speed", "heading", "altitude",
+    "sigma_x", "sigma_y", "sigma_z", "existence", "speed", "heading", "altitude",
 )  # fmt: skip
 """Columns of a table of tracks: metres, m/s, seconds; sigmas are standard deviations of the position.
 
@@ -33,9 +35,22 @@ class TrackTable:
     """Collects tracks of scan after scan.
 
     It grows with what it is given; trackers do not. Write parts of it away where a recording never ends.
+
+    Parameters
+    ----------
+    origin : tuple of latitude, longitude, height, optional
+        Of the scene (`assoc.Scene.origin`): the table then has latitude and longitude in degrees, and altitudes
+        above the ellipsoid.
+
+    Attributes
+    ----------
+    targets : dict of int to str
+        Name of the target that a track followed most, where the truth has names: column target.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, origin: Origin | None = None) -> None:
+        self.origin = origin
+        self.targets: dict[int, str] = {}
         self._rows: list[tuple[Any, ...]] = []
 
     def add(
@@ -71,6 +86,7 @@ class TrackTable:
                     track.started,
                     track.last_detection,
                     *sigma.tolist(),
+                    track.existence,
                     math.hypot(vx, vy),
                     math.degrees(math.atan2(vx, vy)) % 360.0,
                     told if altitudes is None else altitudes.get(track.track_id, math.nan),
@@ -86,7 +102,15 @@ class TrackTable:
 
         frame = pd.DataFrame.from_records(self._rows, columns=list(COLUMNS))
         kinds = dict.fromkeys(COLUMNS, "float64") | {"track_id": "int64", "confirmed": "bool", "hits": "int64"}
-        return frame.astype(kinds)
+        frame = frame.astype(kinds)
+        if self.origin is not None:
+            latitude, longitude, height = coordinates(frame[["x", "y", "z"]].to_numpy(dtype=float), self.origin).T
+            # a track in the plane has no height of its own; what its transponder told stays
+            frame["altitude"] = np.where(frame["sigma_z"] > 0, height, frame["altitude"])
+            frame = frame.assign(latitude=latitude, longitude=longitude)
+        if self.targets:
+            frame["target"] = [self.targets.get(number, "") for number in frame["track_id"].tolist()]
+        return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV; the file appears whole or not at all."""
@@ -128,7 +152,7 @@ def track_scene(
     tracker : Tracker
     scene : Scene
     confirmed : bool
-        Whether only confirmed tracks are listed.
+        Whether only confirmed tracks are listed, while their targets are rather there than not (`Track.reported`).
     scans : iterable of int, optional
         Numbers of the scans; by default all.
 
@@ -137,13 +161,15 @@ def track_scene(
     table, decisions
         The tracks as they were after each scan, and the final decisions, the open ones at the end included.
     """
-    table = TrackTable()
+    table = TrackTable(scene.origin)
     decisions: list[Decision] = []
     for k in range(scene.num_scans) if scans is None else scans:
         scan = scene.scan(k)
         step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
         decisions += step.final
         table.add(
-            (track for track in tracker.tracks if track.confirmed or not confirmed), tracker.filter.motion.position
+            (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
         )
+    if scene.truth is not None and scene.truth.names:
+        table.targets = followed_targets(*table.arrays(), scene)
     return table, [*decisions, *tracker.flush()]

@@ -15,10 +15,9 @@ from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.costs.tracks.own_times import Places, TimedScan
-from assoc.costs.tracks.scores import score_terms
+from assoc.costs.tracks.scores import log_birth, score_terms
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Filter
-from assoc.filters.batches import predict_each
+from assoc.filters.base import Filter, predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
 from assoc.registration.online import OnlineRegistration
@@ -31,8 +30,9 @@ from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint
-from assoc.tracking.filter_choice import two_speeds
+from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.initiation import Initiation
+from assoc.tracking.joint_starts import Crossings, crossings
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch, empty_batch
@@ -153,9 +153,9 @@ class Tracker(Checkpoint):
         if not (registration is None or isinstance(registration, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
         self.registration = registration
-        self.terms = score_terms(self.sensors, self.initiation.birth_rate)
+        self.terms = score_terms(self.sensors)
         # a target that appears with a sensor's measurement was missed by the sensors before it
-        self._birth = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
+        self._appears = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
         self._widest = self.initiation.widest * float(np.linalg.norm(np.diff(self._place.region, axis=1)))
         self._time: float | None = None
         self._pace = 0.0
@@ -164,10 +164,17 @@ class Tracker(Checkpoint):
         self._scan = 0
         self._next_id = 1
         self._batch = empty_batch(self.filter)
+        self.solver_calls = 0
+        """Problems that the solver was given so far."""
 
     @classmethod
     def for_scene(cls, scene: Scene, *arguments: Any, **options: Any) -> Self:
-        """A tracker for the sensors and the region of a scene; further arguments as for the class."""
+        """A tracker for the sensors and the region of a scene; further arguments as for the class.
+
+        Without a `filter`, the default one's process noise suits the pace of the scans.
+        """
+        if not arguments and options.get("filter") is None:
+            options["filter"] = two_speeds(manoeuvre_noise(pace_of(scene.times)))
         return cls(scene.sensors, *arguments, region=scene.region, **options)
 
     @property
@@ -276,6 +283,7 @@ class Tracker(Checkpoint):
                 if looks is not None:
                     turns = (looks[:, 1] - looks[:, 0]) / FULL_TURN
                     self._turns = self._turns + (turns - self._turns) * share
+            self._batch = self._batch.survived(dt / self.life_cycle.lifetime)
             with interruptible():
                 step = self._step(scan)
         except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -287,6 +295,8 @@ class Tracker(Checkpoint):
         except BaseException:
             self.go_back(before)
             raise
+        if scan.at_once:
+            self._batch = self._batch.not_overlooked(-(self._out_of_view() @ self.terms.miss))
         self._time = when
         self._scan += 1
         return step
@@ -338,7 +348,7 @@ class Tracker(Checkpoint):
             positions.append(where)
             covariances.append(np.asarray(spread))
             fit.append(self._narrow(covariances[s]))
-            births.append(np.full(len(z), self.terms.birth[s]))
+            births.append(self.terms.birth[s] + self._log_birth(covariances[s]))
 
         def start(where: Array, spread: Array, lag: Array) -> Any:
             return self.initiation.start(self.filter, where, spread, lag)
@@ -347,18 +357,30 @@ class Tracker(Checkpoint):
         return TimedScan(
             self.filter, self._batch.states, before, scan.measurements, scan.own_times(), self.sensors,
             Places(positions, covariances, fit, births), start, scan.sectors, self.gate_probability,
+            scan.time,
         )  # fmt: skip
+
+    def _out_of_view(self) -> Array:
+        """Which sensors cannot see which tracks: they have not missed them; bool (T, S)."""
+        position = list(self.filter.motion.position)
+        where = np.zeros((len(self._batch), 3))
+        where[:, : len(position)] = self._batch.states.mean[:, position]
+        views = [sensor.position_part for sensor in self.sensors]
+        return ~np.stack([one.in_view(one.measure(where)) for one in views], axis=1)
 
     def _seed(self) -> np.random.SeedSequence:
         """Source of the randomness of this step alone, so that a restored tracker goes on alike."""
         return np.random.SeedSequence((self.seed, self._scan))
 
     def _assign(self, problem: AssignmentProblem) -> Solution:
+        self.solver_calls += 1
         parameters = self.solver_parameters
         if self.solver == "exact" and self.time_limit is None:
             nodes = max(_LEAST_NODES, _VISITS // max(problem.num_tuples, 1))
             parameters = {"nodes": nodes, "patience": 0} | parameters
-        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, **parameters)
+        return assign(
+            problem, self.solver, seed=self._seed(), time_limit=self.time_limit, advise=False, **parameters
+        )
 
     def _elapsed(self, time: float) -> float:
         return 0.0 if self._time is None else time - self._time
@@ -393,14 +415,59 @@ class Tracker(Checkpoint):
             return np.asarray(covariances[:, 0, 0] <= limit)
         return np.asarray((covariances[:, 0, 0] <= limit) & (covariances[:, 1, 1] <= limit))
 
-    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array]:
-        """States of new tracks from single measurements (n, d) of sensor s, which can start one, and where."""
+    def _log_birth(self, covariances: Array) -> Array:
+        """What new targets add to the score of their measurements, by the covariances of their positions."""
+        return log_birth(covariances, self._place.region, self.initiation.birth_rate)
+
+    def _new_scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
+        """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
+        seen = rows > 0
+        # to `tuple_costs` a single measurement is a false alarm
+        alone = seen @ self.terms.birth + ~seen @ self.terms.miss
+        return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
+
+    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
+        """New tracks of single measurements (n, d) of sensor s: states, which can start one, where, and scores."""
         positions, covariances = single_positions(self._place, s, measured)
         fit = self._narrow(covariances)
         if not fit.all():
             positions, covariances = positions[fit], covariances[fit]
-        return self.initiation.start(self.filter, positions, covariances), fit, positions
+        scores = self._appears[s] + self._log_birth(covariances)
+        return self.initiation.start(self.filter, positions, covariances), fit, positions, scores
 
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
+
+    def _crossings(self, scan: Scan, free: Sequence[Array]) -> tuple[Crossings, Array] | None:
+        """Tuples that may start tracks where all sensors measure angles alone, and their scores as new targets.
+
+        `free` are masks over the measurements of each sensor; see `assoc.tracking.joint_starts`.
+        """
+        # angles alone tell no distance
+        if not all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors):
+            return None
+        found = crossings(
+            self._place, scan, free, gate_probability=self.gate_probability, max_tuples=self.max_tuples,
+            speed=self.initiation.speed,
+        )  # fmt: skip
+        if found is None:
+            return None
+        fit = self._narrow(found.covariances)
+        kept = Crossings(*(one[fit] for one in found))
+        return kept, self._new_scores(kept.rows, kept.costs, kept.covariances)
+
+    def _crossed(self, scan: Scan, assigned: list[Array]) -> TrackBatch:
+        """New tracks of what is left over of sensors that start none alone; their ids are put into `assigned`."""
+        found = self._crossings(scan, [ids == 0 for ids in assigned])
+        if found is None or not len(found[1]):
+            return self._batch[:0]
+        several, scores = found
+        solution = self._assign(AssignmentProblem(several.rows, several.costs, scan.sizes))
+        chosen = solution.indices[solution.indices < len(scores)]
+        chosen = chosen[np.lexsort(several.positions[chosen].T)]
+        ids = self._new_ids(len(chosen))
+        for s, numbers in enumerate(several.rows[chosen].T):
+            assigned[s][numbers[numbers > 0] - 1] = ids[numbers > 0]
+        states = self.initiation.start(self.filter, several.positions[chosen], several.covariances[chosen])
+        return TrackBatch.new(states, ids, scores[chosen], scan.time)

@@ -1,10 +1,11 @@
 """Our trackers compared: three radars, and recorded air traffic if a file is given.
 
-    python -m experiments.trackers.comparison [FILE.csv] [--scans N] [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.trackers.comparison [FILE.csv] [--scans N] [--seeds N] [--quick] [--seed N] [--json FILE]
+                                              [--figure FILE]
 
-Multi-sensor S-D, static fusion, MHT in both forms and nearest neighbour, with one filter and one life cycle, on the
-three-radar scene (several seeds) and on trajectories of a CSV file that simulated radars see (scenario from-tracks).
-GOSPA (order 2), identity switches, and CPU time per scan.
+All trackers with default settings, and an oracle that is told which measurement is whose, on the three-radar scene
+(ten seeds) and on trajectories of a CSV file that simulated radars see (scenario from-tracks, --seeds of them). GOSPA
+(order 2), identity switches, and CPU time per scan.
 """
 
 from __future__ import annotations
@@ -19,18 +20,14 @@ from assoc._types import Array
 from assoc.metrics import Trajectories, gospa_over_time, identity, mean_gospa
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
-from assoc.tracking.filter_choice import make_filter
 from experiments.common.claims import Claim
 from experiments.common.command import make_parser, run
+from experiments.trackers.close_targets import make
 from experiments.trackers.running import through
 
 CUTOFF = 500.0
 """Of GOSPA, metres."""
-THREE_RADAR_NOISE, TRAFFIC_NOISE = 20.0, 5.0
-"""Process noise, m/s^1.5: the paper's second target turns with 50 m/s^2, airliners do not."""
-OPTIONS: dict[str, dict[str, Any]] = {"mht": {"depth": 2}, "mht-hypothesis": {"depth": 2}}
-"""Windows of two scans of three radars: six frames."""
-NAMES = tuple(TRACKERS)
+NAMES = ("oracle", *TRACKERS, "GNN")
 
 
 class Judged(NamedTuple):
@@ -43,10 +40,9 @@ class Judged(NamedTuple):
     seconds: Array
 
 
-def judge(name: str, scene: Scene, noise: float) -> Judged:
+def judge(name: str, scene: Scene) -> Judged:
     """Run a tracker over a scene."""
-    tracker = TRACKERS[name].for_scene(scene, make_filter("ekf", scene.sensors, noise), **OPTIONS.get(name, {}))
-    run = through(tracker, scene)
+    run = through(make(name, scene), scene)
     truth = Trajectories.from_scene(scene)
     times, values = gospa_over_time(truth, run.tracks, CUTOFF)
     by_time = dict(zip(times.tolist(), values, strict=True))
@@ -55,9 +51,9 @@ def judge(name: str, scene: Scene, noise: float) -> Judged:
     return Judged(np.array(distances), mean_gospa(values), switches, run.seconds)
 
 
-def compare(label: str, scenes: list[Scene], noise: float) -> tuple[list[Claim], dict[str, Array]]:
+def compare(label: str, scenes: list[Scene]) -> tuple[list[Claim], dict[str, Array]]:
     """All trackers on the same scenes."""
-    found = {name: [judge(name, scene, noise) for scene in scenes] for name in NAMES}
+    found = {name: [judge(name, scene) for scene in scenes] for name in NAMES}
     means = {name: np.array([one.distances.mean() for one in runs]) for name, runs in found.items()}
     claims = []
     for name, runs in found.items():
@@ -101,23 +97,27 @@ def _interval(values: Array) -> tuple[float, float] | None:
     return float(values.mean()) - half, float(values.mean()) + half
 
 
-def experiment(file: str | None, scans: int | None, quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(
+    file: str | None, scans: int | None, seeds: int, quick: bool, rng: np.random.Generator
+) -> tuple[list[Claim], Any]:
     """Compare on the three-radar scene, and on the file's traffic."""
     seed = int(rng.integers(2**31))
     count, length = (2, 15) if quick else (10, 100)
     scenes = [simulation.simulate("three-radar", seed + k, scans=length) for k in range(count)]
-    claims, curves = compare("three radars", scenes, THREE_RADAR_NOISE)
+    claims, curves = compare("three radars", scenes)
     shown = {"three radars": (scenes[0].times, curves)}
     if file is not None:
         values = {} if scans is None else {"scans": scans}
-        traffic = [simulation.simulate("from-tracks", seed, file=file, **values)]
-        more, curves = compare("recorded traffic", traffic, TRAFFIC_NOISE)
+        runs = range(1 if quick else seeds)
+        traffic = [simulation.simulate("from-tracks", seed + k, file=file, **values) for k in runs]
+        more, curves = compare("recorded traffic", traffic)
         claims += more
         shown["recorded traffic"] = (traffic[0].times, curves)
     return claims, shown
 
 
-COLOURS = dict(zip(NAMES, ("#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd", "#8c8c8c"), strict=True))
+_SHADES = ("#000000", "#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd", "#8c8c8c", "#d62728", "#17becf")
+COLOURS = dict(zip(NAMES, _SHADES, strict=True))
 
 
 def draw(figure: Any, shown: dict[str, tuple[Array, dict[str, Array]]]) -> None:
@@ -133,7 +133,7 @@ def draw(figure: Any, shown: dict[str, tuple[Array, dict[str, Array]]]) -> None:
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
     axes.set_xlabel("time, s")
-    axes.legend(ncols=len(NAMES), fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.18))
+    axes.legend(ncols=4, fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.18))
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
@@ -141,13 +141,16 @@ def program(arguments: Sequence[str] | None = None) -> int:
     parser = make_parser(NAME, TITLE)
     parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
     parser.add_argument("--scans", type=int, metavar="N", help="scans of the recorded trajectories (default: all)")
+    parser.add_argument("--seeds", type=int, default=3, metavar="N", help="runs on recorded trajectories (default 3)")
     chosen = parser.parse_args(arguments)
+    if chosen.seeds < 1:
+        parser.error("--seeds must be at least 1")
     return run(
         parser,
         chosen,
         NAME,
         TITLE,
-        lambda quick, rng: experiment(chosen.file, chosen.scans, quick, rng),
+        lambda quick, rng: experiment(chosen.file, chosen.scans, chosen.seeds, quick, rng),
         draw,
         (8, 4.0 if chosen.file is None else 7.0),
     )

@@ -12,6 +12,7 @@ from assoc.costs.tracks.own_times import TimedScan
 from assoc.scene import Scene
 from assoc.scene.scan import Scan
 from assoc.tracking import Step
+from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
@@ -29,7 +30,8 @@ class OracleTracker(SingleScanTracker):
     name = "oracle"
 
     def __init__(self, scene: Scene, **options: Any) -> None:
-        super().__init__(scene.sensors, region=scene.region, **options)
+        noise = manoeuvre_noise(pace_of(scene.times))
+        super().__init__(scene.sensors, **{"filter": two_speeds(noise), "region": scene.region} | options)
         assert scene.truth is not None and scene.truth.sources is not None
         self._sources = scene.truth.sources
         self._target_of: dict[int, int] = {}
@@ -57,7 +59,7 @@ class OracleTracker(SingleScanTracker):
 
     def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
         rows, fresh = self._true_rows(scan)
-        return self._outcome(scan, timed, timed.looked(scan.time), rows, fresh)
+        return self._outcome(scan, timed, timed.looked(), rows, fresh)
 
     def _associate(self, scan: Scan, states: Any, scores: Array) -> ScanOutcome:
         rows, fresh = self._true_rows(scan)

@@ -44,7 +44,7 @@ def through(tracker: Tracker, scene: Scene, scans: int | None = None) -> Run:
         begin = time.process_time()
         tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
         seconds.append(time.process_time() - begin)
-        tracks = [track for track in tracker.tracks if track.confirmed]
+        tracks = [track for track in tracker.tracks if track.reported]
         table.add(tracks, tracker.filter.motion.position)
         places = np.array([track.position for track in tracks]).reshape(-1, 3)
         confirmed.append((np.array([track.track_id for track in tracks], dtype=np.int64), places))

@@ -40,14 +40,22 @@ def test_no_pair_within_the_gate_is_left_out(angular, seed):
     assert inside.all()
 
 
+CUBE = np.array([[0.0, 1e3]] * 3)
+
+
 def test_birth_integrated_over_a_linear_position():
     rng = np.random.default_rng(0)
     root = rng.normal(0, 5, (3, 3))
     P = root @ root.T + np.eye(3)
     # the integral of exp(-x' P^-1 x / 2) over space, times birth rate / volume
-    found = log_birth(P[None], 1e9, 0.2)[0]
+    found = log_birth(P[None], CUBE, 0.2)[0]
     assert found == pytest.approx(0.5 * np.linalg.slogdet(2 * math.pi * P)[1] + math.log(0.2 / 1e9))
-    assert log_birth(1e30 * P[None], 1e9, 0.2)[0] == pytest.approx(math.log(0.2))
+    assert log_birth(1e30 * P[None], CUBE, 0.2)[0] == pytest.approx(math.log(0.2))
+    # a region of one height: the same in the plane
+    flat = np.array([[0.0, 1e3], [-2e3, 0.0], [500.0, 500.0]])
+    found = log_birth(P[None], flat, 0.2)[0]
+    assert found == pytest.approx(0.5 * np.linalg.slogdet(2 * math.pi * P[:2, :2])[1] + math.log(0.2 / 2e6))
+    assert log_birth(P[None], np.zeros((3, 2)), 0.2)[0] == pytest.approx(math.log(0.2))
 
 
 def test_walds_threshold():

@@ -8,6 +8,7 @@ import re
 import pytest
 
 from experiments.common.claims import load_json
+from experiments.common.results import Results
 from experiments.filters import benchmark, consistency, manoeuvres
 from experiments.filters.b1 import Setting
 from experiments.papers.dubins_enkf import __main__ as dubins_enkf
@@ -25,9 +26,22 @@ def test_programs_whose_claims_hold(module, tmp_path, capsys):
     judged = [c for c in claims if c.holds is not None and c.source.endswith("chosen by us") and "%" not in c.source]
     judged = [c for c in judged if not re.search("table|figure|section|equation|abstract", c.source)]
     assert len(judged) >= 5
-    assert not [c.quantity for c in judged if not c.holds]
+    assert not [c.quantity for c in judged if not (c.holds or may_hold(c))]
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
     assert "holds" in capsys.readouterr().out
+
+
+def may_hold(claim):
+    """Whether the interval of a small run reaches into what is accepted."""
+    if claim.interval is None or claim.band is None:
+        return False
+    (low, high), (least, most) = claim.interval, claim.band
+    return (most is None or low <= most) and (least is None or high >= least)
+
+
+def test_b1_holds_at_full_size():
+    claims = [claim for claim in Results("papers.modified_ekf").starting("B1") if claim.band is not None]
+    assert len(claims) == 3 and all(claim.holds for claim in claims)
 
 
 def test_beta_of_b1():

@@ -13,7 +13,7 @@ from experiments.trackers.running import in_plane
 
 
 def test_comparison_as_a_program(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(comparison, "NAMES", ("multi-sensor", "static", "mht", "nearest-neighbour"))
+    monkeypatch.setattr(comparison, "NAMES", ("oracle", "multi-sensor", "static", "mht", "nearest-neighbour"))
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert comparison.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
     by_name = {claim.quantity: claim for claim in load_json(files[0])}

@@ -130,6 +130,7 @@ def test_position_across_the_cut_of_the_azimuth():
     assert abs(enkf.update(enkf.start(state), z, RADAR).state.mean[0, 1] + 200) < 30
 
 
+@pytest.mark.filterwarnings("ignore:.*radians are expected")
 @pytest.mark.parametrize("noise", [1e-3, 1.0, 1e3])
 def test_covariances_stay_positive_definite_for_1e5_steps(noise):
     filters = [ExtendedKalmanFilter(MOTION), UnscentedKalmanFilter(MOTION)]

@@ -29,7 +29,7 @@ from assoc.filters import (
     paper_rules,
     transition_from_sojourns,
 )
-from assoc.filters.batches import predict_each
+from assoc.filters.base import predict_each
 from assoc.filters.motion.models import differences
 from tests.filters.common import MOTION, PLACE, RADAR, kalman_update, random_state
 

@@ -5,10 +5,24 @@ import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import first_solution
-from assoc.packing.branching.nodes import OpenNodes, is_dropped, new_node, push_children, take_node
+from assoc.packing.branching.nodes import OpenNodes, new_node, push_children, take_node
+from assoc.packing.branching.open_nodes import OpenNodes as OpenBases
+from assoc.packing.branching.pairs import (
+    NEITHER,
+    TOGETHER,
+    answer,
+    any_open_pair,
+    decide,
+    doubtful_pairs,
+    is_dropped,
+    new_trials,
+)
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values
+from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
+from assoc.packing.simplex.program import all_allowed, make_feasible, program_of, weight_limit
 from experiments.common.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
 
 
@@ -77,10 +91,18 @@ def test_only_better_solutions_are_looked_for():
 
 def test_without_memory_the_deepest_node_is_given_up():
     packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
-    nodes = OpenNodes(packing, np.zeros(packing.num_rows))
-    nodes.arrays.bound[0] = -7.0
-    nodes.grow(lambda needed: False)
-    assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
+    for kind in (OpenNodes, OpenBases):
+        nodes = kind(packing, np.zeros(packing.num_rows))
+        nodes.arrays.bound[0] = -7.0
+        nodes.grow(lambda needed: False)
+        assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
+
+
+def test_without_memory_for_its_tables_a_search_gives_up_its_root():
+    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
+    search = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, memory_allows=lambda needed: False)
+    search.run(10)
+    assert search.done and search.out_of_memory and search.nodes == 0 and search.lower_bound == -np.inf
 
 
 def test_the_two_children_of_a_node_partition_its_solutions():
@@ -111,6 +133,69 @@ def test_the_two_children_of_a_node_partition_its_solutions():
             ]
             # both alone, or apart in two columns: apart
             assert inside == [not together, together]
+
+
+def relaxed(packing):
+    """The linear program of a packing and its optimal basis."""
+    program = program_of(packing.arrays)
+    allowed = all_allowed(program, packing.slack)
+    basis = new_basis(program)
+    duals = dual_bound(packing)
+    make_feasible(program, allowed, duals)
+    begin_from_duals(program, allowed, duals, basis)
+    assert solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))[0] == OPTIMAL
+    return program, allowed, basis
+
+
+def test_a_verdict_on_a_pair_is_true():
+    """Pairs are in doubt by the LP's values; where one side is ruled out, no solution below the cutoff is on it."""
+    rng = np.random.default_rng(77)
+    verdicts, asked = 0, 0
+    for _ in range(60):
+        packing = prepare(gated_problem(rng, (4, 4, 4), 0.5)).packing
+        if not packing.num_columns:
+            continue
+        program, allowed, basis = relaxed(packing)
+        primal = np.zeros(packing.num_columns)
+        primal_values(program, basis, primal)
+        trials = new_trials(program)
+        count = doubtful_pairs(packing.cols, basis, trials)
+        doubts = trials.values[:count] * (1.0 - trials.values[:count])
+        assert (np.diff(doubts) <= 1e-12).all() and not trials.mass.any()
+        for (one, two), value in zip(trials.pairs[:count].tolist(), trials.values, strict=False):
+            with_both = ((packing.cols == one).any(axis=1)) & ((packing.cols == two).any(axis=1))
+            assert primal[with_both].sum() == pytest.approx(value) and 0.0 < value < 1.0
+        if not count:
+            continue
+        asked += 1
+        solutions = all_covers(packing)
+        best = min(packing.weights[list(cover)].sum() for cover in solutions)
+        cutoff = best + 0.01 * abs(best)
+        which, verdict = decide(program, packing.cols, allowed, basis, trials, count, Effort(cutoff, 0, np.inf))
+        if verdict == NEITHER:
+            continue
+        verdicts += 1
+        side = trials.side
+        left_over = answer(packing.cols, allowed, trials.pairs[which], verdict != TOGETHER, side)
+        left = set(side.active[:left_over].tolist())
+        for cover in solutions:
+            if set(cover) <= left and must_be_covered(packing, side.slack, cover):
+                assert packing.weights[list(cover)].sum() >= cutoff - 1e-9
+    assert asked > 15 and verdicts > 3
+
+
+def test_an_open_pair_is_answered_both_ways_by_columns():
+    rng = np.random.default_rng(78)
+    for _ in range(20):
+        packing = prepare(gated_problem(rng, (3, 3, 3), 0.3)).packing
+        allowed = all_allowed(program_of(packing.arrays), packing.slack)
+        one, two = any_open_pair(packing.cols, allowed, np.empty(packing.num_rows, dtype=np.int32))
+        rows = [set(cols) - {-1} for cols in packing.cols.tolist()]
+        if one >= 0:
+            uses = [len({one, two} & own) for own in rows]
+            assert 2 in uses and 1 in uses
+        else:
+            assert all(a == b or not a & b for a in rows for b in rows)
 
 
 def all_covers(packing):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import time
 
 import numpy as np
 import pytest
 
 import assoc
+from assoc.association.plan import Plan
 from assoc.plotting.report import write_association_report
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
@@ -17,6 +19,9 @@ from tests.plotting.test_association_report import EVIL
 
 CURRENT = "return document.querySelector('#scan-table tr[aria-current=true]').dataset.row"
 LINK = '<a href="javascript:alert(2)">b</a>'
+MOVE = (
+    "const s = document.getElementById(arguments[0]); s.value = arguments[1];s.dispatchEvent(new Event(arguments[2]))"
+)
 READY = "return document.documentElement.dataset.ready"
 
 
@@ -145,3 +150,62 @@ def test_a_script_that_slips_through_does_not_run(browser, page, tmp_path):
     show(browser, broken)
     assert browser.execute_script("return window.slipped === undefined")
     assert any("Content Security Policy" in one for one in complaints(browser))
+
+
+@pytest.mark.parametrize("mode", ["paper", "mmas"])
+def test_the_ants_over_their_cycles(browser, tmp_path, pictures, mode):
+    """A slider over the cycles: the bars are the history's, and a scan that no ant walked says so."""
+    scene = simulate("bearing-only", 0, targets=12, scans=3)
+    parameters = {"mode": mode, "iterations": 20, "refinement": "none"}
+    plan = Plan((scene,), "aco", parameters=parameters, pheromone=True)
+    association = plan.gather(plan.run(plan.items()))
+    history = association.scans[0].pheromone
+    assert len(history.cycles) > 2
+    path = tmp_path / "out.html"
+    write_association_report(path, association, scene)
+    bars = "return document.getElementById('ants-plot').data.map((t) => [t.y, t.x])"
+    for size in (DESKTOP, PHONE):
+        show(browser, path, size)
+        for _ in range(100):
+            if browser.execute_script("return Boolean(document.getElementById('ants-plot').data)"):
+                break
+            time.sleep(0.1)
+        for name, factor in (("pheromone", 1.0), ("probability", 100.0), ("visibility", 1.0)):
+            browser.execute_script(MOVE, "ants-measure", name, "change")
+            for cycle in (0, len(history.cycles) - 1):
+                browser.execute_script(MOVE, "cycle-slider", str(cycle), "input")
+                drawn = {y: x for trace in browser.execute_script(bars) for y, x in zip(*trace, strict=True)}
+                names = [f"({', '.join(map(str, row))})" for row in history.tuples.tolist()]
+                expected = factor * getattr(history, name)[cycle]
+                assert [drawn[one] for one in names] == pytest.approx(expected.tolist(), rel=6e-3)
+            screenshot(browser, pictures / f"ants-{mode}-{name}-{size[0]}.png")
+        assert f"of {history.cycles[-1]}" in browser.find_element("id", "cycle-slider-label").text
+        assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
+    assert complaints(browser) == []
+
+
+def test_dark_pages_phones_and_crowds(browser, tmp_path, pictures):
+    scene = simulate("crowd", 0, targets=60)
+    path = tmp_path / "crowd.html"
+    write_association_report(path, assoc.associate(scene), scene)
+    try:
+        media = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        show(browser, path, PHONE)
+        layout = "return document.getElementById('scene-plot').layout"
+        assert browser.execute_script(f"{layout}.paper_bgcolor") == "#161b22"
+        assert browser.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(13, 17, 23)"
+        # the picture stands above the summary, its legend is folded and opens
+        top = "return document.getElementById(arguments[0]).getBoundingClientRect().top"
+        assert browser.execute_script(top, "scene") < browser.execute_script(top, "summary")
+        assert browser.execute_script(f"{layout}.showlegend") is False
+        press(browser, browser.find_element("id", "legend"))
+        assert browser.execute_script(f"{layout}.showlegend") is True
+        screenshot(browser, pictures / "crowd-phone-dark.png")
+        # the targets fill the view: no sensor outside of the crowd makes it wider
+        show(browser, path, DESKTOP)
+        low, high = browser.execute_script(f"{layout}.yaxis.range")
+        reach = (scene.region[1, 1] - scene.region[1, 0]) / (1000.0 if scene.region.max() > 3000 else 1.0)
+        assert high - low < 1.6 * reach
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

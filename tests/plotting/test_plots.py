@@ -19,7 +19,7 @@ from assoc.plotting.places import distances_to_border, places
 from assoc.plotting.study_figures import new_figure
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation import simulate
-from assoc.solvers.aco.pheromone_history import pheromone_history
+from assoc.solvers import pheromone
 
 mpl.use("agg")
 
@@ -172,7 +172,7 @@ def test_convergence(ax):
 
 def test_pheromone_gathers_on_what_is_chosen(ax):
     problem = assoc.build_problem(simulate("crowd", 0, targets=6, scans=1), 0)
-    history = pheromone_history(problem, seed=4, rho=0.8)
+    history = pheromone(problem, seed=4, mode="paper", rho=0.8)
     solution = assoc.assign(problem, "aco", seed=4, mode="paper", rho=0.8)
     assert len(history.cycles) == solution.iterations
     chosen = {tuple(row) for row in history.tuples[history.chosen].tolist()}

@@ -75,10 +75,29 @@ def test_program_and_online_use_agree(scene_file, tmp_path, capsys):
 @pytest.mark.parametrize("name", list(TRACKERS))
 def test_every_tracker(name, scene_file, tmp_path, capsys):
     assert track.main([str(scene_file), "--tracker", name, "-o", str(tmp_path / "tracks.csv"), "--all"]) == 0
-    assert f"{name}, exact" in capsys.readouterr().out
+    # the last line does not name a solver that was never asked
+    asked = "exact" if name in ("multi-sensor", "static") else "no solver used"
+    assert f"{name}, {asked}: " in capsys.readouterr().out
     table = pd.read_csv(tmp_path / "tracks.csv")
     assert table[table.confirmed].track_id.nunique() >= 3
     assert set(track.TRACKERS) == set(TRACKERS)
+
+
+def test_the_rule_of_nearest_neighbours_asks_the_solver(scene_file, tmp_path, capsys):
+    words = [str(scene_file), "--tracker", "nearest-neighbour", "-o", str(tmp_path / "tracks.csv")]
+    assert track.main([*words, "--rule", "assignment", "--solver", "tabu"]) == 0
+    assert "nearest-neighbour, tabu: " in capsys.readouterr().out
+    assert track.main([*words, "--rule", "best"]) == 2
+    assert "rule must be 'greedy' or 'assignment', got 'best'" in capsys.readouterr().err
+
+
+def test_smoothed_tracks(scene_file, tmp_path):
+    assert track.main([str(scene_file), "--tracker", "mht", "--smooth", "-o", str(tmp_path / "tracks.csv")]) == 0
+    table = pd.read_csv(tmp_path / "tracks.csv")
+    assert table.track_id.nunique() == 3
+    # from the first detection on, and later detections have their say
+    assert (table.groupby("track_id").time.min() < table.time.max() / 2).all()
+    assert table.confirmed.all()
 
 
 @pytest.mark.parametrize("name", ["kalman", "ukf", "modified-ekf", "enkf", "imm", "fuzzy", "ekf"])
@@ -185,7 +204,7 @@ def test_gospa_in_one_convention_and_its_cutoff(scene_file, tmp_path, capsys):
 def test_plots_are_judged_where_their_aircraft_are_known(tmp_path, capsys):
     from assoc.metrics import ct_mt_it
     from assoc.recordings import clustering_time_window, radar_of, read_plots
-    from assoc.tracking.plot_tracks import track_plots
+    from assoc.tracking.plots.plot_tracks import track_plots
 
     plots(tmp_path / "plots.csv")
     words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE]

@@ -32,7 +32,7 @@ _SCENES = {
     "uav": ("dubins-uav",),
 }
 _SOLVERS = ("greedy", "exact", "aco", "genetic", "tabu", "lagrangian")
-_TRACKERS = ("multi-sensor", "static", "mht", "mht-hypothesis", "nearest-neighbour")
+_TRACKERS = ("multi-sensor", "static", "mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic")
 _FILTERS = ("imm-cv", "ekf", "modified-ekf", "ukf", "imm")
 _PLOT_FILTERS = ("ekf", "ukf")
 

@@ -38,6 +38,8 @@ _PURPOSES = {
     "plot": "`assoc[plot]`",
     "stonesoup": "`assoc[stonesoup]`",
     "report": "`assoc[report]`",
+    "parquet": "`assoc[parquet]`",
+    "asterix": "`assoc[asterix]`",
     "bench": "`assoc[bench]`, comparisons",
     "docs": "pages",
     "test": "tests",

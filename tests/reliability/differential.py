@@ -23,7 +23,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from assoc._system.processes import ordered_map
-from assoc.errors import InfeasibleError
+from assoc.errors import AssocWarning, InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
@@ -113,6 +113,7 @@ def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "none of the .* tuples costs less", AssocWarning)
             answers = way(problem)
     except InfeasibleError:
         if optimum is not None:
@@ -150,6 +151,7 @@ def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], flo
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "none of the .* tuples costs less", AssocWarning)
             found = marginals(problem, k)
     except InfeasibleError:
         if truth is not None:

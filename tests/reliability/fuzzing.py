@@ -142,9 +142,9 @@ def _use_problem(path: Path) -> None:
 
 
 def _use_tracks(path: Path) -> None:
-    from assoc.simulation.scenarios.from_tracks import FromTracksParameters, read
+    from assoc.simulation.flight_reports import read_flight_reports
 
-    read(FromTracksParameters(file=str(path)))
+    read_flight_reports(str(path), {})
 
 
 def _use_plots(path: Path) -> None:
@@ -156,7 +156,7 @@ def _use_plots(path: Path) -> None:
 def _use_solver_config(path: Path) -> None:
     from assoc import solve
 
-    solve._solver(["x.npz", "--config", str(path)])
+    solve._solver({"solver": None, "config": str(path)})
 
 
 def _use_design(path: Path) -> None:

@@ -220,11 +220,11 @@ def test_branch_and_bound_gives_nodes_up(little: Callable[[float], None]) -> Non
 
 
 def test_exact_says_that_memory_ended_it(little: Callable[[float], None], monkeypatch: pytest.MonkeyPatch) -> None:
-    from assoc.packing.branching import nodes
+    from assoc.packing.branching import open_nodes
 
     problem = axial(14, seed=1)
     optimum = assign(problem, "exact")
-    monkeypatch.setattr(nodes, "_DEPTH", 2)
+    monkeypatch.setattr(open_nodes, "_DEPTH", 2)
     little(0.0)
     short = assign(problem, "exact")
     assert optimum.status == "optimal"

@@ -38,7 +38,7 @@ def test_jacobian_is_the_derivative_of_the_measurement(sensor):
 
 def test_azimuth_turns_from_x_to_y_and_elevation_up():
     radar = Radar3D(
-        position=[1, 2, 3], noise=[1, 1, 1], field_of_view=[[0, 9], CIRCLE, [-math.pi / 2, math.pi / 2]]
+        position=[1, 2, 3], noise=[1, 0.1, 0.1], field_of_view=[[0, 9], CIRCLE, [-math.pi / 2, math.pi / 2]]
     )
     places = np.array([[1, 7, 3], [-4, 2, 3], [1, 2, 8], [4, 2, 3 + 4], [1, -3, 3]], dtype=float)
     expected = [
@@ -49,9 +49,9 @@ def test_azimuth_turns_from_x_to_y_and_elevation_up():
         [5, -math.pi / 2, 0],
     ]
     np.testing.assert_allclose(radar.measure(places), expected, atol=1e-12)
-    flat = Radar2D(position=[1, 2, 3], noise=[1, 1], field_of_view=[[0, 9], CIRCLE])
+    flat = Radar2D(position=[1, 2, 3], noise=[1, 0.1], field_of_view=[[0, 9], CIRCLE])
     np.testing.assert_allclose(flat.measure(places), np.array(expected)[:, :2], atol=1e-12)
-    only = BearingSensor(position=[1, 2, 3], noise=[1])
+    only = BearingSensor(position=[1, 2, 3], noise=[0.1])
     np.testing.assert_allclose(only.measure(places), np.array(expected)[:, 1:2], atol=1e-12)
 
 
@@ -77,7 +77,7 @@ def test_wrapping_keeps_pi():
 
 
 def test_field_of_view_may_pass_through_pi():
-    sensor = BearingSensor(position=[0, 0, 0], noise=[1], field_of_view=[[3, 4]])
+    sensor = BearingSensor(position=[0, 0, 0], noise=[0.1], field_of_view=[[3, 4]])
     assert sensor.volume == pytest.approx(1)
     z = np.array([[3.1], [-3.1], [4 - 2 * math.pi], [2.9], [0.0], [-2.0]])
     assert sensor.in_view(z).tolist() == [True, True, True, False, False, False]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.scene.geodesy import earth_centered, east_north_up
 from assoc.simulation import simulate
-from assoc.simulation.geodesy import earth_centered, east_north_up
 
 A, B = 6378137.0, 6356752.314245
 """WGS-84 semi-axes, metres."""

@@ -8,9 +8,8 @@ from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-from assoc.tracking.mht import best_hypothesis
-from assoc.tracking.mht.best_hypothesis import choose
-from assoc.tracking.mht.losses import losses
+from assoc.tracking.mht.best_hypothesis import VISITS, choose
+from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import decide, keep_best, same_tree
 
 VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
@@ -35,8 +34,8 @@ def by_solver(tree, score, history):
 @pytest.mark.parametrize("seed", range(60))
 def test_the_best_hypothesis_is_that_of_a_solver(seed):
     tree, score, history = branches(seed, trees=2 + seed % 12, measurements=2 + seed % 17)
-    chosen = choose(tree, score, history)
-    assert chosen is not None
+    chosen, proved = choose(score, history, priced(tree, score, history), VISITS)
+    assert proved
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
     assert len(set(tree[chosen])) == chosen.sum()
     for column in history[chosen].T:
@@ -44,13 +43,34 @@ def test_the_best_hypothesis_is_that_of_a_solver(seed):
         assert len(set(used)) == len(used)
 
 
-def test_too_much_work_is_left_to_a_solver(monkeypatch):
+@pytest.mark.parametrize("seed", range(20))
+def test_prices_that_say_nothing_change_nothing_but_the_work(seed):
+    tree, score, history = branches(seed, trees=2 + seed % 6, measurements=3 + seed % 5)
+    known = priced(tree, score, history)
+    top = np.array([max(score[known.number == t].max(), 0.0) for t in range(len(known.trees))])
+    plain = known._replace(trees=top, measurements=np.zeros_like(known.measurements), loss=top[known.number] - score)
+    chosen, proved = choose(score, history, plain, 10**9)
+    assert proved
+    assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
+
+
+def test_when_the_work_is_too_much_a_hypothesis_is_found_and_not_called_the_best():
     tree, score, history = branches(1, trees=12, measurements=9)
-    monkeypatch.setattr(best_hypothesis, "VISITS", 20)
-    assert choose(tree, score, history) is None
-    assert not choose(tree, -np.abs(score), history).any()
-    nothing = choose(tree[:0], score[:0], history[:0])
-    assert nothing is not None and not len(nothing)
+    chosen, proved = choose(score, history, priced(tree, score, history), 20)
+    assert chosen.any()
+    assert not proved
+    assert len(set(tree[chosen])) == chosen.sum()
+    assert all(len(set(c[c > 0])) == np.count_nonzero(c) for c in history[chosen].T)
+
+
+def test_nothing_good_is_nothing_chosen():
+    tree, score, history = branches(1, trees=12, measurements=9)
+    for rows in (slice(None), slice(0)):
+        t, s, h = tree[rows], -np.abs(score[rows]), history[rows]
+        chosen, proved = choose(s, h, priced(t, s, h), VISITS)
+        assert proved
+        assert not chosen.any()
+        assert len(chosen) == len(t)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -68,7 +88,7 @@ def test_the_branches_of_each_tree_that_cost_least(seed):
 @pytest.mark.parametrize("seed", range(40))
 def test_a_loss_is_a_bound_on_what_the_branch_costs_the_best_hypothesis(seed):
     tree, score, history = branches(seed, trees=2 + seed % 9, measurements=4 + seed % 9)
-    loss = losses(tree, score, history)
+    loss = priced(tree, score, history).loss
     best = by_solver(tree, score, history)
     assert loss.min() >= -1e-9
     for b in range(0, len(tree), 3):
@@ -86,7 +106,7 @@ GAP = 1.5
 def test_losses_of_trees_that_share_nothing_are_differences_of_scores():
     tree, score = np.array([1, 1, 2, 2, 3]), np.array([9.0, 4.0, 7.0, -1.0, -2.0])
     history = np.array([[1, 0], [0, 0], [2, 1], [0, 0], [3, 0]], dtype=np.int32)
-    np.testing.assert_allclose(losses(tree, score, history), [0.0, 5.0, 0.0, 8.0, 2.0], atol=1e-12)
+    np.testing.assert_allclose(priced(tree, score, history).loss, [0.0, 5.0, 0.0, 8.0, 2.0], atol=1e-12)
 
 
 def test_losses_know_who_needs_a_measurement_more():
@@ -94,7 +114,7 @@ def test_losses_know_who_needs_a_measurement_more():
     # the price of the measurement says how the two trees share that
     tree, score = np.array([1, 1, 2, 2]), np.array([16.0, 10.0, 22.0, 20.0])
     history = np.array([[1], [0], [1], [0]], dtype=np.int32)
-    found = losses(tree, score, history)
+    found = priced(tree, score, history).loss
     np.testing.assert_allclose(found[[0, 3]], 0.0, atol=1e-9)
     assert found[1] + found[2] == pytest.approx(4.0)
 

@@ -101,6 +101,8 @@ class TimedScan:
     sectors : array (S, 2) or None
         See `assoc.Scene`.
     gate_probability : float
+    end : float
+        Time of the scan, seconds; no measurement is after it.
     """
 
     def __init__(
@@ -115,10 +117,14 @@ class TimedScan:
         start: Callable[[Array, Array, Array], Any],
         sectors: Array | None,
         gate_probability: float,
+        end: float,
     ) -> None:
         self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
         self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
         self.measurements, self.times, self.start, self.sectors = measurements, times, start, sectors
+        self.end = end
+        self.late = self._moved(states, np.maximum(end - self.before, 0.0))
+        """The tracks as predicted to the end of the scan."""
         self.gates = [gate_of(sensor, gate_probability) for sensor in sensors]
         sizes = [len(z) for z in measurements]
         self.offsets = np.cumsum([len(states), *sizes])
@@ -186,11 +192,17 @@ class TimedScan:
             positions[mine], covariances[mine] = self.places.positions[s][number], self.places.covariances[s][number]
         return lead, self.start(positions, covariances, stamps[np.arange(len(rows)), lead] - first)
 
-    def at(self, followed: Followed, rows: Array, time: float) -> Any:
-        """States of these rows of `followed` at a later time."""
-        return self._moved(followed.states[rows], time - followed.when[rows])
+    def at_end(self, followed: Followed, track: Array) -> Any:
+        """States of followed tuples, and of tracks without measurements, at the end of the scan."""
+        idle = (followed.first == np.inf) & (track >= 0)
+        if not idle.any():
+            return self._moved(followed.states, self.end - followed.when)
+        seen, missed = np.flatnonzero(~idle), np.flatnonzero(idle)
+        moved = self._moved(followed.states[seen], self.end - followed.when[seen])
+        back = np.argsort(np.concatenate([seen, missed]), kind="stable")
+        return concatenate([moved, self.late[track[missed]]])[back]
 
-    def looked(self, time: float) -> Array:
+    def looked(self) -> Array:
         """Whether each sensor looked where each track and each measurement (as anchors) is, bool (A, S)."""
         total = int(self.offsets[-1])
         result = np.ones((total, len(self.sensors)), dtype=np.bool_)
@@ -198,9 +210,8 @@ class TimedScan:
             return result
         places = np.zeros((total, 3))
         axes = self.filter.motion.position
-        tracks = self._moved(self.states, np.maximum(time - self.before, 0.0))
-        places[: len(tracks), : len(axes)] = tracks.mean[:, list(axes)]
-        places[len(tracks) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
+        places[: len(self.late), : len(axes)] = self.late.mean[:, list(axes)]
+        places[len(self.late) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
         for s, (sensor, sector) in enumerate(zip(self.sensors, self.sectors, strict=True)):
             away = places - sensor.position
             result[:, s] = looked_at(sector, np.arctan2(away[:, 1], away[:, 0]))
@@ -244,16 +255,24 @@ class TimedScan:
         if not len(self.states) or not len(times):
             return nothing, nothing
         sensor, gate = self.sensors[s], self.gates[s]
-        early, late = (
-            self.filter.expected(self._moved(self.states, time - self.before), sensor)
-            for time in (float(times.min()), float(times.max()))
-        )
-        angles = angular_components(sensor)
-        way = late.mean - early.mean
-        turning = np.array(angles)
-        way[:, turning] -= 2 * np.pi * np.round(way[:, turning] / (2 * np.pi))
-        spread = np.sqrt(gate * np.maximum(*(np.einsum("bii->bi", one.covariance) for one in (early, late))))
-        box = Expected(early.mean + 0.5 * way, _diagonal((spread + 0.5 * _CURVED * np.abs(way)) ** 2 / gate))
+        angles, axes = angular_components(sensor), len(self.filter.motion.position)
+        # the gate is widest at the end of the scan; on the way there it was where the velocity says
+        late = self.filter.expected(self.late, sensor)
+        velocity = np.zeros((len(self.states), 3))
+        moving = [k for k in range(axes, 2 * axes) if k < self.filter.motion.dim]
+        velocity[:, : len(moving)] = self.late.mean[:, moving]
+        place = np.zeros((len(self.states), 3))
+        place[:, :axes] = self.late.mean[:, list(self.filter.motion.position)]
+        here = _measured(sensor, place, velocity)
+        ways = []
+        for back in (self.end - float(times.max()), self.end - float(times.min())):
+            way = _measured(sensor, place - back * velocity, velocity) - here
+            turning = np.array(angles)
+            way[:, turning] -= 2 * np.pi * np.round(way[:, turning] / (2 * np.pi))
+            ways.append(way)
+        spread = np.sqrt(gate * np.einsum("bii->bi", late.covariance))
+        reach = spread + 0.5 * _CURVED * np.abs(ways[1] - ways[0])
+        box = Expected(late.mean + 0.5 * (ways[0] + ways[1]), _diagonal(reach**2 / gate))
         return near_pairs(box, self.measurements[s], angles, gate)
 
     def near_beginnings(self, r: int, s: int) -> tuple[Array, Array]:
@@ -269,6 +288,10 @@ class TimedScan:
         expected = self.filter.expected(wide, sensor)
         first, second = near_pairs(expected, self.measurements[s], angular_components(sensor), self.gates[s])
         return able[first], second
+
+
+def _measured(sensor: Sensor, places: Array, velocities: Array) -> Array:
+    return sensor.measure(places, velocities) if sensor.measures_velocity else sensor.measure(places)
 
 
 def _diagonal(variances: Array) -> Array:

@@ -37,47 +37,48 @@ class ScoreTerms(NamedTuple):
     miss: Array
     """ln(1 - P_D), (S,)."""
     birth: Array
-    """ln(P_D beta_NT / beta_FA) of a single measurement, (S,); beta_NT = birth rate / V."""
+    """ln(P_D / beta_FA) - 1/2 ln det(2 pi R) of what tells of the position, (S,): with `log_birth` of the position's
+    covariance it is the score of a single measurement as a new target."""
 
 
-def score_terms(sensors: Sequence[Sensor], birth_rate: float) -> ScoreTerms:
-    """Terms of the score.
-
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-    birth_rate : float
-        Mean number of new targets in a scan, all over the region.
-    """
+def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
+    """Terms of the score."""
     P = np.array([sensor.detection_probability for sensor in sensors])
     density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in sensors])
-    rate = np.array([sensor.false_alarm_rate for sensor in sensors])
-    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P * birth_rate / rate))
+    # a range rate says as little of a new target as of a false alarm
+    located = [sensor.position_part for sensor in sensors]
+    there = np.array([one.false_alarm_rate / one.volume for one in located])
+    spread = np.array([np.linalg.slogdet(2.0 * math.pi * one.covariance)[1] for one in located])
+    return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread)
 
 
-def log_birth(covariances: Array, volume: float, birth_rate: float) -> Array:
+def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
     """Logarithm of the birth density integrated over the places where a new target may be.
 
-    The cost of a tuple of several sensors is taken at the most likely position. A target is born anywhere
-    in the region with density birth rate / volume; integrated over the position (Laplace's approximation,
-    exact for linear sensors) the likelihood is the one at the best position times this.
+    The cost of a tuple is taken at the most likely position. A target is born anywhere in the region with density
+    birth rate / volume; integrated over the position (Laplace's approximation, exact for linear sensors) the
+    likelihood is the one at the best position times this. In directions in which the region has no width, targets
+    are where it is: there is nothing to integrate.
 
     Parameters
     ----------
     covariances : array (K, 3, 3)
         Of the fused positions, m^2.
-    volume : float
-        Of the region, m^3.
+    region : array (3, 2)
+        Lower and upper bounds of x, y, z, m.
     birth_rate : float
-        As in `score_terms`.
+        Mean number of new targets in a scan, all over the region.
 
     Returns
     -------
     array (K,)
         To be added to the score, at most ln(birth rate).
     """
-    log_det = np.linalg.slogdet(2.0 * math.pi * covariances)[1]
-    limited: Array = np.minimum(0.5 * log_det, math.log(volume)) + math.log(birth_rate / volume)
+    widths = region[:, 1] - region[:, 0]
+    wide = np.flatnonzero(widths > 0.0)
+    log_volume = float(np.log(widths[wide]).sum())
+    log_det = np.linalg.slogdet(2.0 * math.pi * covariances[:, wide[:, None], wide])[1]
+    limited: Array = np.minimum(0.5 * log_det, log_volume) + math.log(birth_rate) - log_volume
     return limited
 
 

@@ -77,7 +77,9 @@ class AssignmentAssociator(DataAssociator):  # type: ignore[misc]
         chosen = dict(missed)
         if pairs:
             problem = _problem(pairs, missed, (len(ordered), len(found)))
-            self.solution = assign(problem, self.solver, seed=self.seed, time_limit=self.time_limit, **self.parameters)
+            self.solution = assign(
+                problem, self.solver, seed=self.seed, time_limit=self.time_limit, advise=False, **self.parameters
+            )
             for t, d in self.solution.tuples.tolist():
                 if t and d:
                     chosen[t] = pairs[t, d]

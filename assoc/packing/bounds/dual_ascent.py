@@ -89,14 +89,11 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     duals = np.zeros(packing.num_rows)
     point = SmoothPoint(duals, *(np.empty(n) for n in (packing.num_columns, packing.num_columns, packing.num_rows)))
     temperature = START * spread(arrays)
-    # under a time limit the passes of large problems are made in turns, with a look at the clock between them
-    limited = run is not None and run.time_limit is not None
-    turn = max(6, _VISITS // max(packing.row_cols.size, 1)) if limited else passes
     deadline = math.inf if run is None else run.deadline()
     done = -1
     while done < levels:
-        done = _ascend(arrays, point, temperature, done, (levels, passes, turn), deadline)
-        if limited and run is not None and run.remaining() <= 0.0:
+        done = _ascend(arrays, point, temperature, done, (levels, passes), deadline)
+        if run is not None and run.remaining() <= 0.0:
             deadline = -math.inf  # for systems where kernels cannot read the clock
     return duals
 
@@ -107,23 +104,19 @@ def _ascend(
     point: SmoothPoint,
     temperature: Floats,
     done: int,
-    course: tuple[int, int, int],
+    course: tuple[int, int],
     deadline: float,
 ) -> int:
     """Cool through levels until all are done or the visits are used up; how many are done (-1: none, not begun)."""
-    levels, passes, turn = course
-    size = packing.row_cols.size
+    levels, passes = course
     if done < 0:
         hard_sweeps(packing, point.duals, point.reduced, 1)
         done = 0
     total = 0
     while done < levels and total < _VISITS:
-        left = passes
-        while left > 0 and not is_over(deadline):
-            now = min(left, turn)
-            visits = smooth_passes(packing, point, temperature, now, deadline)
-            left = left - now if visits == now * size else 0
-            total += visits
+        if not is_over(deadline):
+            # in one go: in turns the passes would begin plainly again and again
+            total += smooth_passes(packing, point, temperature, passes, deadline)
         temperature *= COOLING
         done += 1
     if done == levels:

@@ -12,15 +12,13 @@ Transport (1981), 269-280.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc.packing.branching.nodes import Node, hard_sweeps, is_dropped, row_total, scale_row
-from assoc.packing.packing import PackingArrays
+from assoc.packing.branching.nodes import Node
 
 
 class Doubts(NamedTuple):
@@ -34,14 +32,6 @@ class Doubts(NamedTuple):
     partners: NDArray[np.int32]
 
 
-class Child(NamedTuple):
-    """Room for the child of a node whose bound is estimated."""
-
-    slack: NDArray[np.bool_]
-    duals: NDArray[np.float64]
-    reduced: NDArray[np.float64]
-
-
 @njit
 def new_doubts(count: int, num_rows: int) -> Doubts:
     """Room for so many pairs."""
@@ -52,12 +42,6 @@ def new_doubts(count: int, num_rows: int) -> Doubts:
         np.zeros(num_rows),
         np.empty(num_rows, np.int32),
     )
-
-
-@njit
-def new_child(node: Node) -> Child:
-    """Room for a child of any node that fits in ``node``."""
-    return Child(np.empty(node.slack.size, np.bool_), np.empty(node.slack.size), np.empty(node.reduced.size))
 
 
 @njit
@@ -104,46 +88,3 @@ def doubtful_pairs(cols: Any, node: Node, found: Doubts) -> int:
     while count < doubts.size and doubts[count] >= 0.0:
         count += 1
     return count
-
-
-@njit
-def child_bound(
-    packing: PackingArrays, node: Node, num: int, child: Child, one: int, two: int, joined: bool, temperature: float
-) -> float:
-    """Estimate the bound of a child by a few passes; ``inf`` when it has no solution."""
-    cols, active, row_ptr = packing.cols, node.active, node.row_ptr
-    slack, duals, reduced = child
-    slack[:] = node.slack
-    duals[:] = node.duals
-    for a in range(num):
-        reduced[a] = np.inf if is_dropped(cols, active[a], one, two, joined) else node.reduced[a]
-    if joined:
-        slack[one] = False
-        slack[two] = False
-    for a in range(num):
-        node.primal[a] = math.exp(-reduced[a] / temperature)
-    for r in range(slack.size):
-        node.slack_primal[r] = math.exp(duals[r] / temperature) if slack[r] else 0.0
-    for _ in range(6):
-        for r in range(slack.size):
-            if row_ptr[r] == row_ptr[r + 1]:
-                continue
-            total = row_total(node, r)
-            if not 1e-200 < total < 1e200:
-                continue
-            duals[r] -= temperature * math.log(total)
-            scale_row(node, r, 1.0 / total)
-    for a in range(num):
-        if reduced[a] < np.inf:
-            value = node.reduced[a]
-            for s in range(cols.shape[1]):
-                r = cols[active[a], s]
-                if r >= 0:
-                    value += node.duals[r] - duals[r]
-            reduced[a] = value
-    if not hard_sweeps(node, slack, duals, reduced, 1):
-        return np.inf
-    bound = 0.0
-    for r in range(slack.size):
-        bound += duals[r]
-    return bound

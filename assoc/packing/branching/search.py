@@ -1,9 +1,10 @@
-"""Branch and bound on a packing: dual ascent at every node, branching on pairs of measurements.
+"""Branch and bound on a packing: the linear program at every node, branching on pairs of measurements.
 
-A node is a set of columns and, for some rows, the duty to be covered (nodes.py). Its bound comes from the parent's
-multipliers, improved by smoothed passes at temperatures of the order of the gap that is left; columns whose reduced
-cost exceeds the gap are dropped. Branching (doubtful_pairs.py) asks of two measurements of different sensors whether
-they have the same source: *together* drops the columns with only one of them, *apart* those with both.
+A node is a set of columns and, for some rows, the duty to be covered (open_nodes.py). Its linear program is solved from
+its parent's basis by the dual simplex method (packing/simplex); its bound is computed anew from the multipliers, so
+that it holds whatever rounding did there. Columns and slack whose reduced cost exceeds the gap are dropped. Branching
+(pairs.py) asks of two measurements of different sensors whether they have the same source: *together* drops the
+columns with only one of them, *apart* those with both.
 """
 
 from __future__ import annotations
@@ -17,28 +18,32 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
-from assoc.packing.branching.doubtful_pairs import child_bound, doubtful_pairs, new_child, new_doubts
-from assoc.packing.branching.nodes import (
-    CLOSED,
-    LEVELS,
-    OVER,
-    Node,
-    NodeArrays,
-    OpenNodes,
-    has_room,
-    new_node,
-    next_temperature,
-    push_children,
-    raise_bound,
-    reduced_of,
-    soften,
-    take_node,
-)  # fmt: skip
-from assoc.packing.packing import Packing, PackingArrays
+from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room, push_node, take_node
+from assoc.packing.branching.pairs import (
+    NEITHER,
+    TOGETHER,
+    WHOLE,
+    Trials,
+    answer,
+    any_open_pair,
+    decide,
+    doubtful_pairs,
+    new_trials,
+)
+from assoc.packing.packing import Packing
 from assoc.packing.run import memory_allows
-
-# pairs that are tried on both sides before one is branched on
-CANDIDATES = 8
+from assoc.packing.simplex.basis import Basis, new_basis, refactor
+from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort, restart, solve_dual
+from assoc.packing.simplex.program import (
+    Allowed,
+    Program,
+    all_allowed,
+    certified,
+    make_feasible,
+    program_of,
+    reduced_cost,
+    weight_limit,
+)
 
 
 class Limits(NamedTuple):
@@ -49,6 +54,41 @@ class Limits(NamedTuple):
     deadline: float
 
 
+class _Work(NamedTuple):
+    """What the search of one packing has at hand.
+
+    Attributes
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of the columns, as the packing has them.
+    program : Program
+    basis : Basis
+        Of the node at work.
+    node : Allowed
+        What it allows; ``active`` is room.
+    trials : Trials
+    duals : float array, shape (R,)
+        Multipliers of the node's bound, feasible.
+    key : float array, shape (N,)
+        Room for what columns are sorted by.
+    found, trial : int32 arrays, shape (R,)
+        Columns of the best solution found, and room for another one.
+    limit : float
+        No solution weighs as much.
+    """
+
+    cols: NDArray[np.int32]
+    program: Program
+    basis: Basis
+    node: Allowed
+    trials: Trials
+    duals: Floats
+    key: Floats
+    found: NDArray[np.int32]
+    trial: NDArray[np.int32]
+    limit: float
+
+
 class BranchAndBound:
     """A depth-first search that can be stopped and continued.
 
@@ -57,7 +97,7 @@ class BranchAndBound:
     packing : Packing
         One component or several; the search treats them as one.
     duals : float array, shape (R,)
-        Multipliers to start from (sign-correct for rows with slack).
+        Multipliers to start from.
     incumbent : float
         Only solutions of less weight are looked for; ``inf`` if none is known.
     tolerance : float
@@ -85,6 +125,7 @@ class BranchAndBound:
         self.nodes = 0
         self._memory_allows = memory_allows
         self._open = OpenNodes(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
+        self._work: _Work | None = None
 
     @property
     def done(self) -> bool:
@@ -106,143 +147,207 @@ class BranchAndBound:
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
-        found = np.empty(self._packing.num_rows, dtype=np.int32)
         while not self.done and self.nodes < target and not is_over(self.deadline):
+            if self._work is None and not self._begin():
+                return
             limits = Limits(self.tolerance, target - self.nodes, self.deadline)
             self._open.count, self.weight, count, done = _search(
-                self._packing.arrays, self._open.arrays, self._open.count, self.weight, limits, found
+                self._work, self._open.arrays, self._open.count, self.weight, limits
             )
             self.nodes += done
             if count >= 0:
-                self.columns = found[:count].copy()
+                assert self._work is not None
+                self.columns = self._work.found[:count].copy()
             if not self.done and self.nodes < target and not is_over(self.deadline):
                 self._open.grow(self._memory_allows)
 
+    def _begin(self) -> bool:
+        """Make room for the search; without memory for it the root is given up."""
+        rows, columns = self._packing.num_rows, self._packing.num_columns
+        # two inverses, and what is known of pairs
+        if not self._memory_allows(34.0 * rows * rows + 100.0 * columns):
+            self._open.give_up()
+            return False
+        self._work = _new_work(self._packing.cols, program_of(self._packing.arrays), self._packing.slack)
+        return True
+
 
 @njit
-def _greedy(packing: PackingArrays, node: Node, num: int, covered: Any, found: Any) -> Any:
-    """Take columns by their reduced costs while they fit; the weight (inf when a duty is left) and their number."""
-    cols, weights, active, slack = packing.cols, packing.weights, node.active, node.slack
-    num_sensors = cols.shape[1]
-    covered[:] = False
+def _new_work(cols: Any, program: Program, slack: Any) -> _Work:
+    size = program.sides.size
+    return _Work(
+        cols, program, new_basis(program), all_allowed(program, slack), new_trials(program), np.empty(size),
+        np.empty(program.weights.size), np.empty(size, np.int32), np.empty(size, np.int32), weight_limit(program),
+    )  # fmt: skip
+
+
+@njit
+def _greedy(work: _Work, allowed: Allowed) -> Any:
+    """Take columns by ``key`` while they fit; the weight (inf when a duty is left) and their number."""
+    cols, weights, trial = work.cols, work.program.weights, work.trial
+    covered = np.zeros(allowed.slack.size, np.bool_)
     weight = 0.0
     count = 0
-    for a in np.argsort(node.reduced[:num], kind="mergesort"):
-        j = active[a]
+    for a in np.argsort(work.key[: allowed.active.size], kind="mergesort"):
+        j = allowed.active[a]
         free = True
         duty = False
-        for s in range(num_sensors):
+        for s in range(cols.shape[1]):
             r = cols[j, s]
             if r >= 0:
                 if covered[r]:
                     free = False
                     break
-                duty = duty or not slack[r]
+                duty = duty or not allowed.slack[r]
         if free and (weights[j] < 0.0 or duty):
             weight += weights[j]
-            found[count] = j
+            trial[count] = j
             count += 1
-            for s in range(num_sensors):
-                r = cols[j, s]
-                if r >= 0:
-                    covered[r] = True
-    for r in range(slack.size):
-        if not slack[r] and not covered[r]:
+            for s in range(cols.shape[1]):
+                if cols[j, s] >= 0:
+                    covered[cols[j, s]] = True
+    for r in range(covered.size):
+        if not allowed.slack[r] and not covered[r]:
             return np.inf, count
     return weight, count
 
 
 @njit
-def _most_decisive(
-    packing: PackingArrays, node: Node, num: int, pairs: Any, temperature: float, lower: float, gap: float,
-    deadline: float,
-) -> int:  # fmt: skip
-    """Return which of the doubtful pairs raises the bound most on both sides, by a few passes on each."""
-    child = new_child(node)
-    reduced_of(packing, node, num, node.duals)
-    pick = 0
-    best_score = -1.0
-    for i in range(len(pairs)):
-        # as good a pair as any when time is over
-        if is_over(deadline):
-            break
-        one, two = pairs[i]
-        score = 1.0
-        for joined in range(2):
-            gain = child_bound(packing, node, num, child, one, two, joined == 1, temperature) - lower
-            score *= min(max(gain, 1e-4 * gap), 1.1 * gap)
-        if score > best_score:
-            best_score, pick = score, i
-    return pick
+def _drop(work: _Work, num: int, bound: float, cut: float) -> int:
+    """Drop the columns and the slack that no solution below the cut has; how many columns are left.
+
+    Leaves the reduced costs of those in ``key``.
+    """
+    node, duals = work.node, work.duals
+    kept = 0
+    for a in range(num):
+        j = node.active[a]
+        reduced = reduced_cost(work.program, duals, j)
+        # a column at the cut itself stays
+        if bound + reduced <= cut:
+            node.active[kept] = j
+            work.key[kept] = reduced
+            kept += 1
+        else:
+            node.columns[j] = False
+    for r in range(node.slack.size):
+        if node.slack[r] and bound - duals[r] > cut:
+            node.slack[r] = False
+    return kept
+
+
+@njit
+def _by_values(work: _Work, allowed: Allowed) -> bool:
+    """Lower the keys by the LP's values, so that these decide first; whether all of them are whole numbers."""
+    basis = work.basis
+    whole = True
+    for a in range(allowed.active.size):
+        place = basis.place[allowed.active[a]]
+        if place >= 0:
+            value = basis.values[place]
+            whole = whole and not WHOLE < value < 1.0 - WHOLE
+            work.key[a] -= value * work.limit
+    return whole
 
 
 @search_njit
-def _search(
-    packing: PackingArrays, stack: NodeArrays, num_open: int, incumbent: float, limits: Limits, found: Any
-) -> Any:
-    """Search depth first; the number of open nodes, the incumbent's weight, its columns, the nodes done.
+def _search(work: _Work, stack: Stack, num_open: int, incumbent: float, limits: Limits) -> Any:
+    """Search depth first; the number of open nodes, the incumbent's weight, its number of columns, the nodes done.
 
     Stops early with nodes open when there is no room left for two children, or time is over.
     """
     tolerance, node_limit, deadline = limits
-    node = new_node(packing, stack, num_open)
-    num_rows = node.duals.size
-    doubts = new_doubts(CANDIDATES, num_rows)
-    covered = np.empty(num_rows, np.bool_)
-    trial = np.empty(num_rows, np.int32)
+    cols, program, basis, node, trials = work.cols, work.program, work.basis, work.node, work.trials
     count_found = -1
     nodes = 0
+    # the node whose basis is at work
+    at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
         if not has_room(stack, top):
             break
-        num_open = top
         lower = stack.bound[top]
         if lower >= incumbent - tolerance:
+            num_open = top
             continue
-        nodes += 1
         num = take_node(stack, top, node)
-        kept = num
-        temperature = 0.0
-        for level in range(LEVELS):
-            cut = incumbent - tolerance
-            # a column at the cut itself stays
-            kept, _, lower = raise_bound(
-                packing, node, num, lower, temperature, cut, np.nextafter(cut, np.inf), deadline
-            )
-            if kept < 0:
+        if at_work != top:
+            basis.variable[:] = stack.variable[top]
+            basis.duals[:] = stack.duals[top]
+            basis.anchors[:] = stack.duals[top]
+            refactor(program, Allowed(node.active[:num], node.columns, node.slack), basis)
+        at_work = -1
+        one, two, likely = -1, -1, 0.5
+        closed = False
+        late = False
+        while True:
+            allowed = Allowed(node.active[:num], node.columns, node.slack)
+            cut = min(incumbent - tolerance, work.limit)
+            restart(program, allowed, basis)
+            # a little more than the cut, for what rounding takes off the bound
+            status, _ = solve_dual(program, allowed, basis, Effort(cut + 0.1 * tolerance, 100_000, deadline))
+            if status == STOPPED and is_over(deadline):
+                late = True
                 break
-            if level == 0 or kept < num:
-                # an early look for a better incumbent shrinks everything that follows
-                weight, count = _greedy(packing, node, kept, covered, trial)
-                if weight < incumbent - 1e-3 * tolerance:
-                    incumbent = weight
-                    count_found = count
-                    found[:count] = trial[:count]
-            num = kept
-            gap = incumbent - lower if incumbent < np.inf else max(1.0, 0.1 * abs(lower))
-            temperature = next_temperature(gap, level, 1e-3 * tolerance)
-        if kept == OVER:
-            # the node's columns and multipliers are as they were
-            num_open = top + 1
-            nodes -= 1
+            work.duals[:] = basis.duals
+            make_feasible(program, allowed, work.duals)
+            bound = certified(program, allowed, work.duals)
+            lower = max(lower, bound)
+            if lower >= cut:
+                closed = True
+                break
+            num = _drop(work, num, bound, cut)
+            allowed = Allowed(node.active[:num], node.columns, node.slack)
+            whole = status == OPTIMAL and _by_values(work, allowed)
+            weight, count = _greedy(work, allowed)
+            if weight < incumbent - 1e-3 * tolerance:
+                incumbent = weight
+                count_found = count
+                work.found[:count] = work.trial[:count]
+                if lower >= incumbent - tolerance:
+                    closed = True
+                    break
+                cut = incumbent - tolerance
+                num = _drop(work, num, bound, cut)
+                allowed = Allowed(node.active[:num], node.columns, node.slack)
+            in_doubt = 0
+            if status == OPTIMAL and not whole:
+                in_doubt = doubtful_pairs(cols, basis, trials)
+            if in_doubt == 0:
+                one, two = any_open_pair(cols, allowed, work.trial)
+                break
+            which, verdict = decide(program, cols, allowed, basis, trials, in_doubt, Effort(cut, 0, deadline))
+            one, two, likely = int(trials.pairs[which, 0]), int(trials.pairs[which, 1]), trials.values[which]
+            if verdict == NEITHER:
+                break
+            num = answer(cols, allowed, (one, two), verdict == TOGETHER, trials.side)
+            node.active[:num] = trials.side.active[:num]
+            node.columns[:] = trials.side.columns
+            node.slack[:] = trials.side.slack
+        if late:
+            # the node is as it was on the stack
             break
-        if kept == CLOSED or lower >= incumbent - tolerance:
+        num_open = top
+        nodes += 1
+        if closed:
             continue
-        soften(packing, node, num, node.duals, temperature, deadline)
-        candidates = doubtful_pairs(packing.cols, node, doubts)
-        if candidates == 0:
-            # no two columns compete any more: the greedy choice is this node's optimum
-            weight, count = _greedy(packing, node, num, covered, trial)
+        if one < 0:
+            # columns that share a row are the same: the lightest of each kind
+            allowed = Allowed(node.active[:num], node.columns, node.slack)
+            for a in range(num):
+                work.key[a] = program.weights[node.active[a]]
+            weight, count = _greedy(work, allowed)
             if weight < incumbent:
                 incumbent = weight
                 count_found = count
-                found[:count] = trial[:count]
+                work.found[:count] = work.trial[:count]
             continue
-        pick = 0
-        if candidates > 1:
-            pairs = doubts.pairs[:candidates]
-            pick = _most_decisive(packing, node, num, pairs, temperature, lower, incumbent - lower, deadline)
-        pair = doubts.pairs[pick, 0], doubts.pairs[pick, 1], doubts.values[pick]
-        num_open = push_children(packing, stack, top, node, num, pair, lower, node.duals)
+        for turn in range(2):
+            # the likelier side comes last, and is searched first
+            joined = (turn == 1) == (likely >= 0.5)
+            num = answer(cols, allowed, (one, two), joined, trials.side)
+            side = Allowed(trials.side.active[:num], trials.side.columns, trials.side.slack)
+            push_node(stack, num_open, side, basis, lower)
+            num_open += 1
+        at_work = num_open - 1
     return num_open, incumbent, count_found, nodes

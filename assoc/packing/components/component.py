@@ -13,14 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._types import Floats
 from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.cover import Cover, chosen_columns, is_complete, weight_of
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
-from assoc.packing.neighbourhoods.insertion import search_arrays
+from assoc.packing.neighbourhoods.diving import Diver
+from assoc.packing.neighbourhoods.insertion import insert_and_eject, search_arrays
 from assoc.packing.neighbourhoods.large import LargeNeighbourhood
 from assoc.packing.neighbourhoods.neighbourhood import Neighbourhood
+from assoc.packing.neighbourhoods.random_cover import Trail, walk
 from assoc.packing.packing import PackingArrays
 from assoc.packing.run import Run
 
@@ -82,6 +85,10 @@ class Component(Priced):
         Its weight; ``inf`` when none is known.
     deadline : float
         When time is over, by the kernels' clock (clock.py).
+    refinement : str
+        What improves covers (`SearchParameters`).
+    worker : int
+        Which of several workers searches it (team.py).
     iterations, stalled : int
         Iterations of a metaheuristic, and those since the best cover became better.
     """
@@ -90,10 +97,14 @@ class Component(Priced):
     best: Owner | None = None
     weight: float = np.inf
     deadline: float = np.inf
+    refinement: str = "full"
+    worker: int = 0
     iterations: int = 0
     stalled: int = 0
     _searches: dict[type[Neighbourhood], Neighbourhood] = field(default_factory=dict)
     _arrays: PackingArrays | None = None
+    _diver: Diver | None = None
+    _may_dive: bool = True
 
     @property
     def arrays(self) -> PackingArrays:
@@ -111,6 +122,11 @@ class Component(Priced):
     def late(self) -> bool:
         """Whether time is over."""
         return self.deadline < np.inf and time.monotonic() > self.deadline
+
+    @property
+    def inserts(self) -> bool:
+        """Whether new covers are improved by insertion with ejection."""
+        return self.refinement != "none"
 
     @property
     def temperature(self) -> float:
@@ -144,7 +160,8 @@ class Component(Priced):
         """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
         cover = Cover.empty(self.packing)
         cover.add_greedily(ascending(self.reduced))
-        cover.improve(self.deadline)
+        if self.inserts:
+            cover.improve(self.deadline)
         self.offer(cover.owner, cover.weight)
 
     def offer_start(self, run: Run) -> None:
@@ -153,15 +170,42 @@ class Component(Priced):
             cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.origin, run.start)))
             self.offer(cover.owner, cover.weight)
 
+    def random_cover(self, strictness: float, rng: np.random.Generator) -> Owner:
+        """Return a random greedy cover; the larger ``strictness``, the more the reduced costs decide."""
+        trail = Trail.without_pheromone(self.prices, strictness, self.temperature)
+        owner, _ = walk(self.arrays, self.prices, trail, 1, self.inserts, rng, self.deadline)
+        return np.asarray(owner)
+
+    @property
+    def dives(self) -> bool:
+        """Whether covers are also built in the linear program."""
+        if self._diver is None and self._may_dive:
+            self._may_dive = self.refinement == "full" and Diver.pays(self.packing)
+        return self._may_dive and not self.closed and not self.late
+
+    def dive(self, number: int, rng: np.random.Generator, trail: Floats | None = None, beta: float = 1.0) -> Owner:
+        """Return a cover built in the linear program (`Diver.dive`), and completed by insertion.
+
+        Dives of successive numbers differ in strictness. ``trail`` is tau_j^alpha of each column.
+        """
+        if self._diver is None:
+            self._diver = Diver(self, self.deadline)
+        if trail is None:
+            trail = np.ones(self.packing.num_columns)
+        strictness = beta * 2.0 ** (2 + number % 4)
+        owner = self._diver.dive(trail, strictness, rng, self.weight - self.tolerance, self.deadline)
+        insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
+        return owner
+
     def improve(
         self, owner: Owner, rng: np.random.Generator, clusters: int, moves: Sequence[Move] = NEIGHBOURHOODS
     ) -> float:
         """Improve a new cover in place by what the moves list for it; return its weight."""
         weight = self.weight_of(owner)
-        if not self.is_complete(owner):
+        if not self.is_complete(owner) or self.refinement == "none":
             return weight
         for move in moves:
-            tries = move.on_new(clusters)
+            tries = move.on_new(clusters if self.refinement == "full" else 0)
             if tries and weight - self.bound > self.tolerance and not self.late:
                 weight = self._search(move).improve(self, owner, weight, rng, tries, self.deadline)
         return weight
@@ -174,7 +218,7 @@ class Component(Priced):
 
     def refine(self, run: Run, clusters: int) -> None:
         """Improve the best cover by the moves that `NEIGHBOURHOODS` lists for it."""
-        if self.best is None or clusters == 0:
+        if self.best is None or self.refinement != "full":
             return
         for move in NEIGHBOURHOODS:
             left = move.on_best(clusters, self.packing.num_rows)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,28 +12,24 @@ from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.components.component import Component
+from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.proof import bound_of_component
 from assoc.packing.components.splitting import split_component, split_components
+from assoc.packing.components.team import Make, Team
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 
-
-class Searcher(Protocol):
-    """A metaheuristic at work on one component."""
-
-    def iterate(self, component: Component, rng: np.random.Generator) -> None:
-        """Do one iteration and ``offer`` what it finds to the component."""
+# covers from the linear program with which a search begins
+_DIVES = 3
 
 
 def search_components(
-    make: Callable[[Component, np.random.Generator], Searcher],
+    make: Make,
     packing: Packing,
     run: Run,
-    iterations: int,
-    patience: int,
-    refinement: int = 0,
+    parameters: SearchParameters,
 ) -> Outcome:
     """Run a metaheuristic on every component of the packing.
 
@@ -45,12 +41,7 @@ def search_components(
         The whole problem.
     run : Run
         Clock, random generator, trace.
-    iterations : int
-        Iterations on one component at the most.
-    patience : int
-        A component is left after so many iterations without improvement.
-    refinement : int
-        Exact sub-steps on the best cover after each iteration, for every 30 rows of the component.
+    parameters : SearchParameters
 
     Raises
     ------
@@ -62,44 +53,60 @@ def search_components(
     duals = dual_bound(packing, run=share)
     components = split_components(packing, duals, np.arange(packing.num_columns))
     deadline = run.deadline()
+    parts: list[Component] = []
     for component in components:
-        component.deadline = deadline
+        component.deadline, component.refinement = deadline, parameters.refinement
         component.offer_start(run)
         component.offer_greedy()
-        if not component.closed and not share.should_stop():
+        if component.closed:
+            parts.append(component)
+            continue
+        if not share.should_stop():
             component.sharpen(share)
+        for number in range(_DIVES):
+            # the first one whatever the share: what it finds is worth more than all that comes after it
+            if component.dives and (number == 0 or not share.should_stop()):
+                component.settle(component.dive(number, run.rng), run.rng, parameters.clusters)
+        # what no better cover can use is gone before the search begins
+        parts.extend(split_component(component) or [component])
+    components = parts
     columns: list[NDArray[np.int64]] = []
     bound, weight = 0.0, 0.0
     done = len(components)
     cut_off = False
     root_bound = sum(component.bound for component in components)
     _record_all(run, done, weight, root_bound, components)
-    queue: list[tuple[Component, Searcher | None]] = [(component, None) for component in components]
-    while queue:
-        component, searcher = queue.pop(0)
-        # a component that has a cover takes no turn after time is over, or thousands of components would take one each
-        over = component.closed or (component.best is not None and run.should_stop())
-        if not over:
-            if searcher is None:
-                searcher = make(component, run.rng)
-            before, iterations_before = component.weight, component.iterations
-            over = _take_turn(component, searcher, run, iterations, patience, refinement)
-            done += component.iterations - iterations_before
-            cut_off |= component.iterations >= iterations and component.stalled < patience and not component.closed
-            if component.best is None and over:
-                complete_greedily(component, run)
-            if component.weight < before:
-                _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
-            smaller = None if over else split_component(component)
-            if smaller is not None:
-                queue.extend((one, None) for one in smaller)
-                continue
-        if over:
-            columns.append(component.origin[component.best_columns()])
-            bound += bound_of_component(component, run)
-            weight += component.weight
-        else:
-            queue.append((component, searcher))
+    queue: list[tuple[Component, Team | None]] = [(component, None) for component in components]
+    workers = parameters.workers
+    pool = ThreadPoolExecutor(workers, "assoc-search") if workers > 1 else None
+    with pool or nullcontext():
+        while queue:
+            component, team = queue.pop(0)
+            # who has a cover takes no turn after time is over, or thousands of components would take one each
+            over = component.closed or (component.best is not None and run.should_stop())
+            if not over:
+                if team is None:
+                    team = Team(make, component, run, parameters.clusters, workers, pool)
+                before, iterations_before = component.weight, component.iterations
+                over = _take_turn(component, team, run, parameters)
+                done += component.iterations - iterations_before
+                cut_off |= component.iterations >= parameters.iterations and not (
+                    component.closed or component.stalled >= parameters.patience
+                )
+                if component.best is None and over:
+                    complete_greedily(component, run)
+                if component.weight < before:
+                    _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
+                smaller = None if over else split_component(component)
+                if smaller is not None:
+                    queue.extend((one, None) for one in smaller)
+                    continue
+            if over:
+                columns.append(component.origin[component.best_columns()])
+                bound += bound_of_component(component, run)
+                weight += component.weight
+            else:
+                queue.append((component, team))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     run.record(done, weight, bound)
     if cut_off:
@@ -108,18 +115,19 @@ def search_components(
     return Outcome(chosen, done, bound, duals)
 
 
-def _take_turn(
-    component: Component, searcher: Searcher, run: Run, iterations: int, patience: int, refinement: int
-) -> bool:
-    """Give a component up to ten iterations; whether its search is over."""
+def _take_turn(component: Component, team: Team, run: Run, limits: SearchParameters) -> bool:
+    """Give a component up to ten iterations, until one improves its cover; whether its search is over."""
     for _ in range(10):
         before = component.weight
-        searcher.iterate(component, run.rng)
-        component.refine(run, refinement)
+        team.iterate()
         component.iterations += 1
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
-        if component.closed or component.stalled >= patience or component.iterations >= iterations or run.should_stop():
+        ended = component.stalled >= limits.patience or component.iterations >= limits.iterations
+        if component.closed or ended or run.should_stop():
             return True
+        if component.stalled == 0:
+            # fewer columns may do now
+            return False
     return False
 
 

@@ -57,7 +57,8 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     components = split_components(smaller, duals, whole.origin[smaller.origin])
     give_covers(components, smaller, owner)
     for one in components:
-        one.iterations, one.stalled, one.deadline = whole.iterations, whole.stalled, whole.deadline
+        one.iterations, one.stalled = whole.iterations, whole.stalled
+        one.deadline, one.refinement = whole.deadline, whole.refinement
     return components
 
 

@@ -29,7 +29,7 @@ from assoc.packing.packing import assemble
 # shares of the rows that are set free: at first, at the least and at the most (all would be an exact solver)
 _START, _LEAST, _MOST = 0.5, 0.2, 0.92
 # nodes of one try, and those up to which it was easy
-_NODES, _EASY = 50, 5
+_NODES, _EASY = 20, 5
 # tries on one cover: then only another one helps
 _TRIES = 300
 
@@ -66,26 +66,36 @@ class LargeNeighbourhood:
     ) -> bool:
         """Set rows free and cover them anew; whether something lighter was found."""
         packing = priced.packing
-        limit = max(weight - priced.bound, 0.0)
+        # the present cover's own columns are within it, but for rounding
+        limit = max(weight - priced.bound, 0.0) + priced.tolerance
         free = _set_free(packing.cols, owner, rng.permutation(packing.num_rows), self.share)
         inside = np.flatnonzero(_inside(packing.cols, priced.reduced, free, limit)).astype(np.int32)
         # rows that are not free are covered as they should be
         smaller = assemble(
             packing.cols[inside], packing.weights[inside], packing.slack | ~free, inside, packing.granularity
         )
-        old = chosen_columns(packing.cols, np.where(free, owner, -1))
-        before = float(packing.weights[old].sum())
-        search = BranchAndBound(smaller, priced.duals[smaller.row_origin], before, priced.tolerance, deadline)
-        search.run(_NODES)
-        if not search.done:
+        found, done, nodes = False, True, 0
+        # what falls apart is searched part by part: in one search the nodes of independent parts would multiply
+        for c in range(smaller.num_components):
+            part = smaller.component(c)
+            rows = smaller.row_origin[part.row_origin]
+            duals = priced.duals[rows]
+            before = float(packing.weights[chosen_columns(packing.cols, owner[rows])].sum())
+            if before - float(duals.sum()) <= priced.tolerance:
+                continue
+            search = BranchAndBound(part, duals, before, priced.tolerance, deadline)
+            search.run(_NODES - nodes)
+            nodes += search.nodes
+            done = done and search.done
+            if search.columns is not None:
+                owner[rows] = -1
+                own_all(packing.cols, smaller.origin[part.origin[search.columns]], owner)
+                found = True
+        if not done:
             self.share = max(self.share - 0.02, _LEAST)
-        elif search.nodes <= _EASY:
+        elif nodes <= _EASY:
             self.share = min(self.share + 0.005, _MOST)
-        if search.columns is None:
-            return False
-        owner[free] = -1
-        own_all(packing.cols, smaller.origin[search.columns], owner)
-        return True
+        return found
 
 
 @njit

@@ -5,7 +5,7 @@ staying uncovered where the row has slack, with probability proportional to
 
     tau_j^alpha exp(-beta 2^(ant mod 10) rc_j / T)
 
-with tau_j the pheromone, rc_j the reduced cost and T the temperature; the cover is then improved by insertion.
+with tau_j the pheromone, rc_j the reduced cost and T the temperature; the cover may then be improved by insertion.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import njit
@@ -44,38 +43,21 @@ class Trail(NamedTuple):
     beta: float
     temperature: float
 
-
-def random_cover(
-    packing: PackingArrays,
-    prices: Prices,
-    strictness: float,
-    temperature: float,
-    rng: np.random.Generator,
-    deadline: float,
-) -> NDArray[np.int32]:
-    """Return a random greedy cover, as one ant builds it where no pheromone lies.
-
-    Parameters
-    ----------
-    packing : PackingArrays
-        One component, with the weights to search by.
-    prices : Prices
-    strictness : float
-        The larger, the more the reduced costs decide.
-    temperature : float
-        Scale of the reduced costs that matter.
-    rng : Generator
-    deadline : float
-        After this nothing is begun (clock.py).
-    """
-    trail = Trail(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
-    owner, _ = walk(packing, prices, trail, 1, rng, deadline)
-    return np.asarray(owner)
+    @classmethod
+    def without_pheromone(cls, prices: Prices, strictness: float, temperature: float) -> Trail:
+        """Return the trail that only reduced costs draw."""
+        return cls(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
 
 
 @njit
-def walk(packing: PackingArrays, prices: Prices, trail: Trail, ants: int, rng: Any, deadline: float) -> Any:
-    """Let all ants build a cover and improve it by insertion, until time is over; the best one and its weight."""
+def walk(
+    packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
+) -> Any:
+    """Let all ants build a cover, until time is over; the best one and its weight.
+
+    With ``inserts`` each cover is improved by insertion with ejection. A cover that leaves open what must be covered
+    is taken only where no ant did better.
+    """
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     row_ptr, row_cols = packing.row_ptr, packing.row_cols
     reduced, duals = prices
@@ -136,7 +118,8 @@ def walk(packing: PackingArrays, prices: Prices, trail: Trail, ants: int, rng: A
                 for s in range(num_sensors):
                     if cols[chosen, s] >= 0:
                         owner[cols[chosen, s]] = chosen
-        insert_and_eject(packing, owner, everything, deadline)
+        if inserts:
+            insert_and_eject(packing, owner, everything, deadline)
         weight = 0.0
         for r in range(num_rows):
             j = owner[r]

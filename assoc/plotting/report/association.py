@@ -6,28 +6,38 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from assoc._text.html import escape
+from assoc._text.html import escape, warning_list
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
-from assoc.association.source import Source
+from assoc.association.source import Source, warnings_of
 from assoc.errors import InvalidInputError
-from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
+from assoc.plotting.report.pheromone import add_pheromone
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.views import closed_gap, scan_view, scene_view, source_view, thin
 from assoc.scene.scene import Scene
 
 _SCENE = (
-    CONTROLS
+    controls("scan")
     + """<div class="controls"><div class="buttons" id="dimensions" hidden>
 <button type="button" id="plan" aria-pressed="true">Plan</button>
 <button type="button" id="space" aria-pressed="false">3-D</button></div>
 <div class="buttons" id="zooms"><button type="button" id="nearer" disabled>Zoom to target</button>
-<button type="button" id="whole">Whole scene</button></div>
+<button type="button" id="whole">Whole scene</button>
+<button type="button" id="legend" aria-pressed="true">Legend</button></div>
 <a href="#scans" id="to-row">row of this scan in the table</a></div>
 <div class="split"><div id="scene-plot" class="plot large"></div>
 <div><div id="detail" class="detail" aria-live="polite"></div>
 <h3>Targets of this scan</h3><div class="scroll" id="targets" tabindex="0" role="region" aria-label="targets"></div>
 </div></div>"""
+)
+
+_PHEROMONE = (
+    """<p class="note">How the ants came to agree in this scan: what they lay on a tuple, how they see it, and
+the chance that they draw it. What was chosen comes first, then what has the most pheromone in the end.</p>"""
+    + controls("cycle", "cycle-")
+    + """<div class="controls"><label>show <select id="ants-measure"></select></label></div>
+<div id="ants-plot" class="plot large"></div>"""
 )
 
 _HISTORY = """<div class="halves"><div><h3>This scan: cost and lower bound</h3>
@@ -91,7 +101,8 @@ def _page(association: Association, each: list[Source], files: list[str], words:
         (scene_view(each[i], association.scans[i], views[owners[i]]["decimals"]) for i in drawn),  # type: ignore[arg-type]
         [scans[i] for i in drawn],
     )
-    sections = [("summary", "Summary", _summary(association))]
+    doubts = [line for source in {id(one): one for one in each}.values() for line in warnings_of(source)]
+    sections = [("summary", "Summary", warning_list(doubts) + _summary(association))]
     if association.scans:
         note = ""
         if kept < len(drawn):
@@ -101,10 +112,14 @@ def _page(association: Association, each: list[Source], files: list[str], words:
             ("scans", "Scans", _scans_table(association.scans, files, [views[n]["title"] for n in owners])),
             ("convergence", "Convergence", _HISTORY),
         ]
+    if any(scan.pheromone is not None for scan in association.scans):
+        add_pheromone(scans, association.scans)
+        sections.append(("pheromone", "Pheromone", _PHEROMONE))
     sections += [("sensors", "Sensors", _sensors(each, files)), ("settings", "Settings", _settings(association, words))]
     title = ", ".join(dict.fromkeys(view["title"] for view in views if view["title"])) or "Association"
     lead = f"Association of {len(association.scans)} scans with {association.solver}, seed {association.seed}"
-    return Page(title, lead, sections, {"sources": views, "scans": scans}, ["scene.js", "association.js"])
+    scripts = ["scene.js", "pheromone.js", "association.js"]
+    return Page(title, lead, sections, {"sources": views, "scans": scans}, scripts)
 
 
 def _summary(association: Association) -> str:

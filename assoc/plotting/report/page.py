@@ -21,14 +21,16 @@ from assoc.plotting.report.plotly_script import plotly_script
 
 _VERSIONS = ("numpy", "scipy", "numba", "ortools", "plotly")
 
-CONTROLS = """<div class="controls">
-<div class="buttons"><button type="button" id="before" aria-label="before">&#9664;</button>
-<button type="button" id="play" aria-pressed="false">Play</button>
-<button type="button" id="after" aria-label="next">&#9654;</button></div>
-<input type="range" id="slider" min="0" max="0" value="0" step="1" aria-label="scan or time">
-<output id="slider-label" for="slider"></output>
+
+def controls(label: str, prefix: str = "") -> str:
+    """Return a slider with its buttons; ``makeSlider`` in core.js moves it, and finds it by the prefix of its ids."""
+    return f"""<div class="controls">
+<div class="buttons"><button type="button" id="{prefix}before" aria-label="before">&#9664;</button>
+<button type="button" id="{prefix}play" aria-pressed="false">Play</button>
+<button type="button" id="{prefix}after" aria-label="next">&#9654;</button></div>
+<input type="range" id="{prefix}slider" min="0" max="0" value="0" step="1" aria-label="{label}">
+<output id="{prefix}slider-label" for="{prefix}slider"></output>
 </div>"""
-"""The slider of a report, with its buttons; ``makeSlider`` in core.js moves it."""
 
 
 @dataclass(frozen=True)

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._text.html import escape
+from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
 from assoc.plotting.places import places
-from assoc.plotting.report.page import CONTROLS, Page, cards, definitions, made_with, sortable_table
+from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.plots import plot_data
 from assoc.plotting.report.views import plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
-from assoc.tracking.plot_tracks import PlotTracks
+from assoc.tracking.plots.plot_tracks import PlotTracks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ _MOST_POINTS = 40_000
 _MOST_MEASUREMENTS = 30_000
 
 _SCENE = (
-    CONTROLS
+    controls("time")
     + """<div class="controls"><div class="buttons"><button type="button" id="nearer" disabled>Zoom to track</button>
 <button type="button" id="whole">Whole scene</button></div></div>
 <div id="scene-plot" class="plot large"></div><p class="note" id="detail" aria-live="polite"></p>"""
@@ -102,7 +102,8 @@ def write_tracking_report(
     made = made_with("assoc.track", words)
     command = f"<pre>{escape(made.pop('command'))}</pre>" if "command" in made else ""
     shown = f"<h3>Tracker</h3>{definitions(settings)}" if settings else ""
-    sections = [("summary", "Summary", _summary(frame, len(rows), values, cutoff, plots))]
+    doubts = warning_list(() if scene is None else scene.warnings)
+    sections = [("summary", "Summary", doubts + _summary(frame, len(rows), values, cutoff, plots))]
     if len(frame) or known or (plots is not None and plots.windows):
         sections.append(("scene", "Tracks over time", _SCENE))
     if known:

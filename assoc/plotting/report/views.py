@@ -97,7 +97,9 @@ def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> di
     solution = one.solution
     tuples = one.targets
     costs: Array
-    if isinstance(source, AssignmentProblem):
+    if one.costs is not None:
+        costs = one.costs
+    elif isinstance(source, AssignmentProblem):
         rows = map(tuple, solution.tuples.tolist())
         known = dict(zip(rows, source.costs[solution.indices].tolist(), strict=True))
         costs = np.array([known[tuple(row)] for row in tuples.tolist()])

@@ -3,7 +3,9 @@
 The trajectories, P_d, the false alarm rate and the number of scans are the paper's. It gives neither noise
 nor region nor the places of the radars. Chosen here: the region is the bounding box of the three trajectories
 and 10 % more on each side; the radars stand on the ground, at equal angles around its middle, far enough out
-to see every target from a different side and never to have one straight above.
+to see every target from a different side and never to have one straight above. The paper's scene lasts 100 s. In a
+longer one the targets end then, and three others fly the same ways: the radars stay where they are, and the targets
+near them.
 """
 
 from __future__ import annotations
@@ -65,6 +67,9 @@ class ThreeRadarParameters(Parameters):
         self._probability("detection_probability")
 
 
+DURATION = 100.0
+"""Seconds that the paper's targets fly."""
+
 REFERENCE_RANGE = 50_000.0
 """Range (m) at which the angles' noise across the line of sight equals the range's noise."""
 
@@ -74,10 +79,12 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
     p = parameters
     require_scene_memory(p.scans, p.radars, len(TRAJECTORIES), p.false_alarms, "scans radars targets false_alarms")
     times = parameters.interval * np.arange(parameters.scans)
-    paths = np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
-    speeds = np.stack([trajectory.velocities(times) for trajectory in TRAJECTORIES], axis=1)
+    wave = np.floor(times / DURATION).astype(np.int64)
+    since = times - DURATION * wave
+    paths = np.stack([trajectory.positions(since) for trajectory in TRAJECTORIES], axis=1)
+    speeds = np.stack([trajectory.velocities(since) for trajectory in TRAJECTORIES], axis=1)
     fastest = float(np.linalg.norm(speeds, axis=2).max())
-    region = around(paths, parameters.margin)
+    region = around(paths if not wave[-1] else _whole_paths(), parameters.margin)
     places = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
     sensors = [
         radar_over(
@@ -93,8 +100,13 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
         )
         for number, place in enumerate(places, start=1)
     ]
-    ids = [np.arange(len(TRAJECTORIES))] * parameters.scans
+    ids = [np.arange(len(TRAJECTORIES)) + len(TRAJECTORIES) * one for one in wave.tolist()]
     return observe(sensors, times, ids, list(paths), rng, region=region, name=name, velocities=list(speeds))
+
+
+def _whole_paths() -> Array:
+    times = np.arange(0.0, DURATION, 1.0)
+    return np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
 
 
 def around(positions: Array, margin: float) -> Array:

@@ -12,6 +12,7 @@ between tau_min and 1 (hyper-cube form of eq. 9: tau <- rho tau + (1 - rho) [j i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,8 +34,14 @@ _RENEWAL = 15
 class Colony:
     """The pheromone of one component and the ants that walk on it."""
 
-    def __init__(self, component: Component, parameters: AcoParameters) -> None:
+    def __init__(
+        self,
+        component: Component,
+        parameters: AcoParameters,
+        tell: Callable[[Component, Colony], object],
+    ) -> None:
         self.parameters = parameters
+        self._tell = tell
         self.pheromone = np.ones(component.packing.num_columns)
         self.slack_pheromone = np.ones(component.packing.num_rows)
         # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
@@ -43,15 +50,28 @@ class Colony:
         # the best since the pheromone was laid anew
         self.recent: NDArray[np.int32] | None = None
         self.least = np.inf
+        self.dives = 0
+        # the least weight known after the last cycle
+        self.known = component.weight
         if component.best is not None:
             self._deposit(component.packing.cols, component.best, 1.0 - parameters.rho)
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One cycle: all ants walk, the best is improved, the pheromone evaporates and is laid."""
         packing, p = component.packing, self.parameters
+        if component.best is not None and component.weight < min(self.known, self.least) - component.tolerance:
+            # found by others since the last cycle: by refinement, or by another worker
+            self.recent, self.least = component.best.copy(), component.weight
         trail = Trail(self.pheromone, self.slack_pheromone, float(p.alpha), float(p.beta), component.temperature)
-        owner, _ = walk(component.arrays, component.prices, trail, p.ants, rng, component.deadline)
+        inserts, deadline = component.inserts, component.deadline
+        owner, _ = walk(component.arrays, component.prices, trail, p.ants, inserts, rng, deadline)
         weight = component.settle(owner, rng, p.clusters)
+        for _ in range(p.divers if component.dives else 0):
+            other = component.dive(self.dives, rng, self.pheromone**p.alpha, p.beta)
+            self.dives += 1
+            reached = component.settle(other, rng, p.clusters)
+            if reached < weight and component.is_complete(other):
+                owner, weight = other, reached
         if weight < self.least and component.is_complete(owner):
             self.recent, self.least = owner, weight
         elite = self.recent if self.recent is not None and component.iterations % 3 == 2 else owner
@@ -60,6 +80,8 @@ class Colony:
             self.pheromone[:] = 1.0
             self.slack_pheromone[:] = 1.0
             self.recent, self.least = None, np.inf
+        self.known = component.weight
+        self._tell(component, self)
 
     def _deposit(self, cols: NDArray[np.int32], owner: NDArray[np.int32], share: float) -> None:
         _update(self.pheromone, self.slack_pheromone, owner, share, self.lowest)

@@ -26,6 +26,7 @@ from assoc.packing.components.proof import bound_of_choice
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.aco.cycle import Cycle
 
 if TYPE_CHECKING:
     from assoc.solvers.aco.parameters import AcoParameters
@@ -69,7 +70,9 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
                 run.record(cycle, weight, -np.inf)
         _lay(pheromone, positive, tours, lengths, parameters.rho)
         if run.watch is not None:
-            run.watch(cycle, pheromone.copy())
+            value = pheromone**parameters.alpha * visibility**parameters.beta
+            columns, rows = np.arange(packing.num_columns), np.flatnonzero(packing.slack)
+            run.watch(Cycle(cycle, columns, rows, pheromone.copy(), visibility, value / value.sum()))
         if (owners == owners[0]).all() or run.should_stop():
             break
     else:

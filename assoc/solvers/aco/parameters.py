@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from assoc._parameters import Parameters, is_number
+from assoc._parameters import is_number
+from assoc.packing.components.parameters import SearchParameters
 
 MODES = ("mmas", "paper")
 TRANSFORMS = ("exponential", "shifted", "reciprocal")
 
 
 @dataclass(frozen=True)
-class AcoParameters(Parameters):
+class AcoParameters(SearchParameters):
     """Parameters of the ant colony; the names are the paper's.
+
+    Those of `SearchParameters` are for mode mmas, but for ``iterations``: mode paper is the published rule alone, on
+    the whole problem.
 
     Attributes
     ----------
@@ -20,46 +24,39 @@ class AcoParameters(Parameters):
         "mmas" (max-min ant system with reduced costs and local search) or "paper" (eqs. 7-11 to the letter).
     ants : int
         Ants in a cycle; 15 in the paper.
+    divers : int
+        Mode mmas with refinement "full": further ants of each cycle, which build their covers in the linear program.
     alpha, beta : float
         Exponents of pheromone and visibility in eq. 8.
     rho : float
         Share of the pheromone that stays, eq. 9.
-    iterations : int
-        Cycles on one component at the most.
-    patience : int
-        Mode mmas: a component is left after so many cycles without improvement.
     visibility : str
         Mode paper: transform of the costs, which eq. 7 needs positive. "exponential": exp((c - c_min) / scale);
         "shifted": c - c_min + scale; "reciprocal": c itself, only for positive costs.
     scale : float
         The transform's scale, in units of cost.
-    clusters : int
-        Mode mmas: exact sub-steps on the best ant of a cycle, and for every 30 measurements on the best solution
-        (0: insertion with ejection alone).
     """
 
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
     ants: int = field(default=15, metadata={"help": "ants in a cycle"})
+    divers: int = field(default=1, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
     alpha: float = field(default=1.0, metadata={"help": "exponent of the pheromone, eq. 8"})
     beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
     rho: float = field(default=0.9, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
-    iterations: int = field(default=1000, metadata={"help": "cycles on one component at the most"})
-    patience: int = field(default=150, metadata={"help": "cycles without improvement before a component is left"})
     visibility: str = field(
         default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
     )
     scale: float = field(default=10.0, metadata={"help": "mode paper: scale of the visibility transform"})
-    clusters: int = field(default=10, metadata={"help": "mode mmas: exact sub-steps in a cycle"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require(self.mode in MODES, "mode", " or ".join(MODES))
         self._whole("ants", most=100_000)
+        self._whole("divers", least=0, most=100_000)
         self._number("alpha", "beta", least=0.0, most=20.0)
         self._require(is_number(self.rho) and 0 < self.rho < 1, "rho", "a number between 0 and 1, both excluded")
-        self._whole("iterations", "patience")
         self._require(self.visibility in TRANSFORMS, "visibility", ", ".join(TRANSFORMS))
         self._number("scale", above=0.0)
-        self._whole("clusters", least=0)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """In mode paper: the ants' tours, and the owners of rows from which they are made."""

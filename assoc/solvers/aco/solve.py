@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from assoc.packing.components.component import Component
 from assoc.packing.components.search import search_components
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
+from assoc.solvers.aco.cycle import cycle_of
 from assoc.solvers.aco.max_min import Colony
 from assoc.solvers.aco.paper import solve_as_in_the_paper
 from assoc.solvers.aco.parameters import AcoParameters
@@ -21,11 +23,9 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     """
     if parameters.mode == "paper":
         return solve_as_in_the_paper(packing, parameters, run)
-    return search_components(
-        lambda component, rng: Colony(component, parameters),
-        packing,
-        run,
-        parameters.iterations,
-        parameters.patience,
-        parameters.clusters,
-    )
+
+    def tell(component: Component, colony: Colony) -> None:
+        if run.watch is not None and component.worker == 0:
+            run.watch(cycle_of(packing, component, colony))
+
+    return search_components(lambda component, rng: Colony(component, parameters, tell), packing, run, parameters)

@@ -22,7 +22,7 @@ class ExactParameters(Parameters):
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
     patience: int = field(
-        default=10, metadata={"help": "iterations of tabu search without improvement before branching starts"}
+        default=1, metadata={"help": "iterations of tabu search without improvement before branching starts"}
     )
 
     def __post_init__(self) -> None:

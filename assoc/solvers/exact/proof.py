@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,8 +76,12 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             tasks.extend(_Task(one) for one in _sharpen(component, run))
     columns = reduction.closed_columns
     weight, bound = reduction.closed_weight, reduction.closed_bound
-    _record(run, nodes, weight, bound, settled + tasks)
-    tasks = settled + _improve(tasks, patience, run)
+
+    def show(tasks: list[_Task]) -> None:
+        _record(run, nodes, weight, bound, settled + tasks)
+
+    show(tasks)
+    tasks = settled + _improve(tasks, patience, run, show)
     short = False
     while tasks:
         task = tasks.pop(0)
@@ -148,7 +153,7 @@ def _sharpen(component: Component, run: Run) -> list[Component]:
     return (None if component.closed else split_component(component, share=0.9)) or [component]
 
 
-def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
+def _improve(tasks: list[_Task], patience: int, run: Run, show: Callable[[list[_Task]], None]) -> list[_Task]:
     """Bring the incumbents of open components near the optimum before any branching, and split what that allows."""
     result: list[_Task] = []
     queue = [(task, 0) for task in tasks]
@@ -168,6 +173,8 @@ def _improve(tasks: list[_Task], patience: int, run: Run) -> list[_Task]:
             result.append(task)
             continue
         stalled = 0 if _search_better(task, run) else stalled + 1
+        if stalled == 0:
+            show([*result, task, *(other for other, _ in queue)])
         smaller = split_component(component) if stalled == 0 else None
         if smaller is None:
             queue.append((task, stalled))

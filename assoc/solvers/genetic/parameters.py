@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from assoc._parameters import Parameters, is_whole
+from assoc._parameters import is_whole
+from assoc.packing.components.parameters import SearchParameters
 
 
 @dataclass(frozen=True)
-class GeneticParameters(Parameters):
-    """Parameters of the genetic algorithm.
+class GeneticParameters(SearchParameters):
+    """Parameters of the genetic algorithm, beside those of `SearchParameters`.
 
     Attributes
     ----------
@@ -21,31 +22,20 @@ class GeneticParameters(Parameters):
         A parent is the best of so many drawn at random.
     mutation : float
         Share of a child's tuples that are given up before it is completed anew.
-    iterations : int
-        Generations on one component at the most.
-    patience : int
-        A component is left after so many generations without improvement.
-    clusters : int
-        Exact sub-steps on each child, and for every 30 measurements on the best solution after each generation
-        (0: insertion with ejection alone).
     """
 
     population: int = field(default=20, metadata={"help": "solutions that live at a time"})
     offspring: int = field(default=10, metadata={"help": "children in a generation"})
     tournament: int = field(default=2, metadata={"help": "a parent is the best of so many"})
     mutation: float = field(default=0.05, metadata={"help": "share of a child's tuples that are given up"})
-    iterations: int = field(default=1000, metadata={"help": "generations on one component at the most"})
-    patience: int = field(default=150, metadata={"help": "generations without improvement before a component is left"})
-    clusters: int = field(default=10, metadata={"help": "exact sub-steps on each child"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._whole("population", least=2, most=100_000)
         self._whole("offspring", most=100_000)
         good = is_whole(self.tournament, 1, self.population)
         self._require(good, "tournament", "a whole number from 1 to population")
         self._number("mutation", least=0.0, most=1.0)
-        self._whole("iterations", "patience")
-        self._whole("clusters", least=0)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """The members in a list, and again as an array."""

@@ -20,7 +20,6 @@ from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.neighbourhoods.cover import own
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
-from assoc.packing.neighbourhoods.random_cover import random_cover
 from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 
 # generations without improvement after which a population is renewed
 _RENEWAL = 10
+# members of a new population that come from the linear program
+_DIVES = 4
 
 
 class Breeding:
@@ -38,9 +39,18 @@ class Breeding:
         self.parameters = parameters
         self.members = np.empty((0, component.packing.num_rows), dtype=np.int32)
         self.fitness = np.empty(0)
+        # the least weight known after the last generation
+        self.known = np.inf
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One generation; the first one fills the population."""
+        if component.best is not None and component.weight < self.known - component.tolerance and self.fitness.size:
+            # found by others since: by refinement, or by another worker
+            self._admit(component, component.best.copy(), component.weight)
+        self._breed(component, rng)
+        self.known = component.weight
+
+    def _breed(self, component: Component, rng: np.random.Generator) -> None:
         if self.fitness.size == 0:
             self._populate(component, rng)
             return
@@ -61,21 +71,29 @@ class Breeding:
     def _populate(self, component: Component, rng: np.random.Generator) -> None:
         members = [*self.members]
         fitness = [*self.fitness]
-        if component.best is not None and not members and component.iterations == 0:
+        if component.best is not None and self.known == np.inf:
+            # a first population, and not one that is to be without it
             members.append(component.best.copy())
             fitness.append(component.weight)
         while len(members) < self.parameters.population:
             # random greedy solutions, strict and loose ones by turns
-            strictness = 2.0 ** (len(members) % 10)
-            owner = random_cover(
-                component.arrays, component.prices, strictness, component.temperature, rng, component.deadline
-            )
-            weight = component.settle(owner, rng, 0)
+            if component.dives:
+                # beside covers from the linear program the others are there to be different, not to be good
+                owner = self._differing(component, len(members), rng)
+                weight = component.weight_of(owner)
+                component.offer(owner, weight)
+            else:
+                owner = component.random_cover(2.0 ** (len(members) % 10), rng)
+                weight = component.settle(owner, rng, 0)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
             if component.closed or component.late:
                 break
         self.members, self.fitness = np.array(members, dtype=np.int32), np.array(fitness)
+
+    def _differing(self, component: Component, number: int, rng: np.random.Generator) -> NDArray[np.int32]:
+        """Return a cover of a new population: the first ones from the linear program."""
+        return component.dive(number, rng) if number < _DIVES else component.random_cover(2.0 ** (number % 10), rng)
 
     def _parent(self, rng: np.random.Generator) -> int:
         drawn = rng.integers(0, self.fitness.size, size=self.parameters.tournament)
@@ -83,8 +101,11 @@ class Breeding:
 
     def _child(self, component: Component, one: int, two: int, rng: np.random.Generator) -> NDArray[np.int32]:
         mother, father, mutation = self.members[one], self.members[two], float(self.parameters.mutation)
-        scale, deadline = component.temperature, component.deadline
-        return _cross(component.arrays, component.reduced, mother, father, scale, mutation, rng, deadline)
+        owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, mutation, rng)
+        if component.inserts:
+            rows = np.arange(owner.size, dtype=np.int32)
+            insert_and_eject(component.arrays, owner, rows, component.deadline)
+        return np.asarray(owner)
 
     def _admit(self, component: Component, owner: NDArray[np.int32], weight: float) -> None:
         if not component.is_complete(owner):
@@ -103,9 +124,8 @@ def _cross(
     temperature: float,
     mutation: float,
     rng: Any,
-    deadline: float,
 ) -> Any:
-    """A child of two covers: what they share, then what fits of the rest; mutated, and improved by insertion."""
+    """A child of two covers: what they share, then what fits of the rest; mutated."""
     cols, slack = packing.cols, packing.slack
     num_sensors = cols.shape[1]
     num_rows = slack.size
@@ -134,5 +154,4 @@ def _cross(
             for s in range(num_sensors):
                 if cols[j, s] >= 0:
                     owner[cols[j, s]] = -1
-    insert_and_eject(packing, owner, np.arange(num_rows).astype(np.int32), deadline)
     return owner

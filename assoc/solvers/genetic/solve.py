@@ -18,11 +18,4 @@ def solve(packing: Packing, parameters: GeneticParameters, run: Run) -> Outcome:
     multi-sensor multi-target tracking, Mathematical and Computer Modelling 26 (1997), for the approach;
     crossover and local search are this package's own.
     """
-    return search_components(
-        lambda component, rng: Breeding(component, parameters),
-        packing,
-        run,
-        parameters.iterations,
-        parameters.patience,
-        parameters.clusters,
-    )
+    return search_components(lambda component, rng: Breeding(component, parameters), packing, run, parameters)

@@ -18,7 +18,6 @@ from assoc.packing.components.component import NEIGHBOURHOODS, Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
-from assoc.packing.neighbourhoods.random_cover import random_cover
 from assoc.packing.packing import PackingArrays
 
 if TYPE_CHECKING:
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 _FRESH = 3
 # new solutions of which the best is taken
 _COVERS = 12
+# those from the linear program, where covers are built there
+_DIVES = 3
 
 
 class _Rules(NamedTuple):
@@ -48,6 +49,7 @@ class TabuSearch:
         self.until = np.zeros(component.packing.num_columns, dtype=np.int64)
         self.clock = 1
         self.restarts = 0
+        self.dives = 0
         self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
@@ -70,19 +72,19 @@ class TabuSearch:
         self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
         weight = component.improve(best, rng, 0)
         component.offer(best, weight)
-        if p.clusters and not component.closed:
+        if not component.closed:
             # halves are matched already
             weight = component.improve(best, rng, p.clusters, NEIGHBOURHOODS[1:])
             if component.offer(best, weight):
                 self.owner = best
 
     def _afresh(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
-        """Return the best of some random greedy covers, strict and loose ones, each improved by exact sub-steps."""
+        """Return the best of some covers, dives or random greedy ones, each improved by exact sub-steps."""
         best, least = component.best, np.inf
-        for number in range(_COVERS):
-            owner = random_cover(
-                component.arrays, component.prices, 2.0 ** (number % 6), component.temperature, rng, component.deadline
-            )
+        dives = component.dives
+        for number in range(_DIVES if dives else _COVERS):
+            self.dives += 1
+            owner = component.dive(self.dives, rng) if dives else component.random_cover(2.0 ** (number % 6), rng)
             weight = component.settle(owner, rng, self.parameters.clusters)
             if weight < least and component.is_complete(owner):
                 best, least = owner, weight

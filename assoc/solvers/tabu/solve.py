@@ -18,11 +18,4 @@ def solve(packing: Packing, parameters: TabuParameters, run: Run) -> Outcome:
     target tracking, Progress in Electromagnetics Research 65 (2006), for the approach; the moves are this
     package's own.
     """
-    return search_components(
-        lambda component, rng: TabuSearch(component, parameters),
-        packing,
-        run,
-        parameters.iterations,
-        parameters.patience,
-        parameters.clusters,
-    )
+    return search_components(lambda component, rng: TabuSearch(component, parameters), packing, run, parameters)

@@ -1,9 +1,10 @@
-"""The best global hypothesis where few trees contest the same measurements: depth first, in one compiled call.
+"""The best global hypothesis by the prices of its trees and measurements: depth first, in one compiled call.
 
-A general solver's bounds and bookkeeping cost a millisecond or two, most of it calls, whatever the size; with a
-handful of targets that is all the time a scan takes. The trees fall apart into groups that share no
-measurement; in each group the branches are tried tree by tree, the best first, and a choice is given up when
-even the best branches that still fit cannot reach what has been found.
+The prices of `assoc.tracking.mht.losses` bound the score of every global hypothesis: it is their sum, less the losses
+of the branches taken, less the prices of trees and measurements that are left over. The trees fall apart into groups
+that share no measurement; in each group the branches are tried tree by tree, the least loss first, and a choice is
+given up when even the branches that still fit cannot reach what has been found. Where prices are good the first
+descent is nearly always the best.
 """
 
 from __future__ import annotations
@@ -13,89 +14,66 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit, search_njit
-from assoc._types import Array
+from assoc.tracking.mht.losses import Priced
 
 VISITS = 100_000
-"""Branches looked at before all is left to a solver; a millisecond or two."""
+"""Branches looked at before the best found so far must do; a millisecond or two."""
 
 
-def choose(tree: Array, score: Array, history: Array) -> Array | None:
-    """Branches of the best global hypothesis, or None where that is too much work.
+@search_njit
+def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
+    """Branches of the best global hypothesis.
 
     Parameters
     ----------
-    tree : int64 array (B,)
-        Tree of each branch; those of one tree stand together.
     score : array (B,)
         Only branches of positive score are taken.
     history : int32 array (B, C)
         Measurements of each branch by column, 1-based, 0: missed.
+    known : Priced
+        Of the same branches.
+    visits : int
+        Branches that may be looked at.
 
     Returns
     -------
-    bool array (B,) or None
+    chosen : bool array (B,)
         At most one branch of each tree, no measurement twice, and the largest sum of scores.
+    proved : bool
+        Whether it is; False where the visits did not suffice.
     """
-    chosen = np.zeros(len(tree), dtype=np.bool_)
-    if len(tree) and not _choose(tree, score, history, VISITS, chosen):
-        return None
-    return chosen
-
-
-@search_njit
-def _choose(tree: Any, score: Any, history: Any, visits: int, chosen: Any) -> bool:
-    """Fill in `chosen`; False when the visits are used up."""
+    chosen = np.zeros(score.size, np.bool_)
     good = np.flatnonzero(score > 0.0)
-    if good.size == 0:
-        return True
-    columns = history.shape[1]
-    first = np.zeros(columns + 1, np.int64)
-    for c in range(columns):
-        top = 0
-        for b in good:
-            top = max(top, history[b, c])
-        first[c + 1] = first[c] + top
-    # branches of each tree, the best first
-    num = 0
-    start = np.empty(good.size + 1, np.int64)
-    for k in range(good.size):
-        if k == 0 or tree[good[k]] != tree[good[k - 1]]:
-            start[num] = k
-            num += 1
-    start[num] = good.size
-    for t in range(num):
-        part = good[start[t] : start[t + 1]]
-        part[:] = part[np.argsort(-score[part], kind="mergesort")]
+    num = known.trees.size
+    # branches of each tree, the least loss first
+    good = good[np.argsort(known.loss[good], kind="mergesort")]
+    good = good[np.argsort(known.number[good], kind="mergesort")]
+    start = np.searchsorted(known.number[good], np.arange(num + 1))
     # trees that share a measurement are of one group
     parent = np.arange(num)
-    holder = np.full(first[columns], -1, np.int64)
-    for t in range(num):
-        for k in range(start[t], start[t + 1]):
-            for c in range(columns):
-                m = history[good[k], c]
-                if m > 0:
-                    at = first[c] + m - 1
-                    if holder[at] < 0:
-                        holder[at] = t
-                    else:
-                        a, b = _root(parent, holder[at]), _root(parent, t)
-                        if a < b:
-                            parent[b] = a
-                        else:
-                            parent[a] = b
+    holder = np.full(known.measurements.size, -1, np.int64)
+    for row in good:
+        for c in range(history.shape[1]):
+            if history[row, c] > 0:
+                at = known.first[c] + history[row, c] - 1
+                if holder[at] < 0:
+                    holder[at] = known.number[row]
+                else:
+                    a, b = _root(parent, holder[at]), _root(parent, known.number[row])
+                    parent[max(a, b)] = min(a, b)
     group = np.empty(num, np.int64)
     for t in range(num):
         group[t] = _root(parent, t)
-    used = np.zeros(first[columns], np.bool_)
-    left = visits
-    for head in range(num):
-        if group[head] != head:
-            continue
-        trees = np.flatnonzero(group == head)
-        left = _search(trees, good, start, score, history, first, used, left, chosen)
-        if left < 0:
-            return False
-    return True
+    used = np.zeros(known.measurements.size, np.bool_)
+    order = np.argsort(group, kind="mergesort")
+    begin = 0
+    while begin < num:
+        end = begin + 1
+        while end < num and group[order[end]] == group[order[begin]]:
+            end += 1
+        visits = _search(order[begin:end], good, start, history, known, used, visits, chosen)
+        begin = end
+    return chosen, visits >= 0
 
 
 @njit
@@ -123,61 +101,92 @@ def _mark(history: Any, first: Any, used: Any, row: int, value: bool) -> None:
             used[first[c] + m - 1] = value
 
 
+@njit
+def _left_over(trees: Any, taken: Any, good: Any, start: Any, history: Any, known: Any, used: Any) -> float:
+    """Prices of the group's measurements that a complete choice does not use."""
+    total = 0.0
+    for i in range(trees.size):
+        for k in range(start[trees[i]], start[trees[i] + 1]):
+            for c in range(history.shape[1]):
+                m = history[good[k], c]
+                if m > 0 and not used[known.first[c] + m - 1] and known.measurements[known.first[c] + m - 1] > 0.0:
+                    total += known.measurements[known.first[c] + m - 1]
+                    used[known.first[c] + m - 1] = True
+    for i in range(trees.size):
+        for k in range(start[trees[i]], start[trees[i] + 1]):
+            _mark(history, known.first, used, good[k], False)
+    for i in range(trees.size):
+        if taken[i] >= 0:
+            _mark(history, known.first, used, taken[i], True)
+    return total
+
+
 @search_njit
-def _search(
-    trees: Any, good: Any, start: Any, score: Any, history: Any, first: Any, used: Any, left: int, chosen: Any
-) -> int:
-    """Choose the branches of one group; what is left of the visits, -1 when they are used up."""
+def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: Any, left: int, chosen: Any) -> int:
+    """Choose the branches of one group; what is left of the visits, negative when they did not suffice."""
     depth = trees.size
-    top = np.empty(depth)
-    for i in range(depth):
-        top[i] = score[good[start[trees[i]]]]
-    # trees of large scores first: they leave the least to guess
-    trees = trees[np.argsort(-top, kind="mergesort")]
+    # trees of high prices first: without a branch of theirs little is left
+    trees = trees[np.argsort(-known.trees[trees], kind="mergesort")]
     place = np.empty(depth + 1, np.int64)
     taken = np.full(depth, -1, np.int64)
     best = np.full(depth, -1, np.int64)
-    most, value = 0.0, 0.0
+    lost = np.zeros(depth + 1)
+    least = np.inf
+    total = 0.0
+    for t in trees:
+        total += known.trees[t]
+    margin = 1e-12 * (total + 1.0)
     i = 0
     place[0] = start[trees[0]]
     while i >= 0:
         if i == depth:
-            if value > most:
-                most = value
+            total = lost[i]
+            if total < least:
+                total += _left_over(trees, taken, good, start, history, known, used)
+            if total < least - margin:
+                least = total
                 best[:] = taken
             i -= 1
             continue
         if taken[i] >= 0:
-            _mark(history, first, used, taken[i], False)
-            value -= score[taken[i]]
+            _mark(history, known.first, used, taken[i], False)
             taken[i] = -1
         end = start[trees[i] + 1]
         # the next branch that fits; after the last one, none
-        while place[i] < end and not _fits(history, first, used, good[place[i]]):
+        while place[i] < end and not _fits(history, known.first, used, good[place[i]]):
             place[i] += 1
             left -= 1
-        if place[i] > end:
+        # branches come by rising loss
+        if place[i] < end and lost[i] + known.loss[good[place[i]]] >= least - margin:
+            place[i] = end
+        if place[i] > end or (place[i] == end and lost[i] + known.trees[trees[i]] >= least - margin):
             i -= 1
             continue
         if place[i] < end:
             taken[i] = good[place[i]]
-            value += score[taken[i]]
-            _mark(history, first, used, taken[i], True)
+            lost[i + 1] = lost[i] + max(known.loss[taken[i]], 0.0)
+            _mark(history, known.first, used, taken[i], True)
+        else:
+            lost[i + 1] = lost[i] + known.trees[trees[i]]
         place[i] += 1
-        bound = value
+        bound = lost[i + 1]
         for j in range(i + 1, depth):
+            more = known.trees[trees[j]]
             for k in range(start[trees[j]], start[trees[j] + 1]):
                 left -= 1
-                if _fits(history, first, used, good[k]):
-                    bound += score[good[k]]
+                if _fits(history, known.first, used, good[k]):
+                    more = min(more, max(known.loss[good[k]], 0.0))
                     break
-        if left < 0:
-            return -1
-        if bound > most * (1.0 + 1e-12):
+            bound += more
+        if left < 0 and least < np.inf:
+            break
+        if bound < least - margin:
             i += 1
             if i < depth:
                 place[i] = start[trees[i]]
     for i in range(depth):
+        if taken[i] >= 0:
+            _mark(history, known.first, used, taken[i], False)
         if best[i] >= 0:
             chosen[best[i]] = True
     return left

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import njit, search_njit
 from assoc._types import Array
-from assoc.tracking.mht.losses import losses
+from assoc.tracking.mht.best_hypothesis import VISITS, choose
+from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
-from assoc.tracking.track_batch import BEST, BITS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
+from assoc.tracking.track_batch import BEST, BITS, EXISTS, HITS, ID, LAST, MASK, MISSED, SCORE, STARTED
 
 
 class Tables(NamedTuple):
@@ -36,18 +37,21 @@ class Hits(NamedTuple):
 
 
 class Roots(NamedTuple):
-    """New trees: ids, 0-based measurements, seconds, and the scores that they begin with, each (K,)."""
+    """New trees: ids (K,), 1-based measurements of the scan's sensors (K, S), seconds and scores to begin with (K,)."""
 
     ids: Array
-    measurement: Array
+    rows: Array
     when: Array
     score: Array
 
 
 def extend(
     tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
-) -> tuple[Array, Tables]:
+) -> tuple[Array, Tables, Array, bool]:
     """Next branches, cut to those that matter to good global hypotheses.
+
+    The branches of the best global hypothesis stay whatever prices say of them: these may be poor where many branches
+    of one tree are nearly alike.
 
     Parameters
     ----------
@@ -67,15 +71,17 @@ def extend(
     -------
     kept, tables
         Rows among branches missed, hits and roots, in this order; and what is known of them.
+    chosen, proved
+        Which of them are the best global hypothesis found, and whether none is better.
     """
-    kept, *rest = _extend(*tables, miss, *hits, *roots, column, scan, most, drop)
-    return kept, Tables(*rest)
+    kept, chosen, proved, *rest = _extend(*tables, miss, *hits, *roots, column, scan, most, drop)
+    return kept, Tables(*rest), chosen, bool(proved)
 
 
-@njit
+@search_njit
 def _extend(
     numbers: Any, counts: Any, history: Any, born: Any, miss: Any, branch: Any, measurement: Any, gain: Any,
-    when: Any, ids: Any, number: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
+    when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
 ) -> Any:  # fmt: skip
     old, hits = born.size, branch.size
     tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
@@ -92,18 +98,20 @@ def _extend(
         wide[old + i] = history[branch[i]]
         wide[old + i, column] = measurement[i] + 1
     for i in range(ids.size):
-        wide[old + hits + i, column] = number[i] + 1
-    kept = keep_best(tree, score, losses(tree, score, wide), most, drop)
+        wide[old + hits + i, : rows.shape[1]] = rows[i]
+    known = priced(tree, score, wide)
+    chosen, proved = choose(score, wide, known, VISITS)
+    kept = keep_best(tree, score, np.where(chosen, -1.0, known.loss), most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):
         row = kept[k]
         if row >= old + hits:
             i = row - old - hits
-            new_numbers[k, SCORE] = new_numbers[k, BEST] = first[i]
+            new_numbers[k, SCORE] = new_numbers[k, BEST] = new_numbers[k, EXISTS] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
             new_counts[k, ID] = ids[i]
-            new_history[k, column] = number[i] + 1
+            new_history[k, : rows.shape[1]] = rows[i]
             continue
         source = row if row < old else branch[row - old]
         new_numbers[k] = numbers[source]
@@ -111,11 +119,12 @@ def _extend(
         new_history[k] = history[source]
         new_born[k] = born[source]
         new_numbers[k, SCORE] = score[row]
+        new_numbers[k, EXISTS] += score[row] - numbers[source, SCORE]
         new_numbers[k, BEST] = max(numbers[source, BEST], score[row])
         if row >= old:
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
             new_history[k, column] = measurement[row - old] + 1
-    return kept, new_numbers, new_counts, new_history, new_born
+    return kept, chosen[kept], proved, new_numbers, new_counts, new_history, new_born
 
 
 @njit

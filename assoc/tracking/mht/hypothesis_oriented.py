@@ -27,7 +27,7 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
-from assoc.filters.batches import predict_each
+from assoc.filters.base import predict_each
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.scene.scan import Scan
@@ -149,14 +149,14 @@ class HypothesisOrientedMHT(Tracker):
         # no branch gains more than this
         most = np.full(len(batch), self.terms.miss[s])
         np.maximum.at(most, pairs.track, gain)
-        births = len(z) * max(self._birth[s], 0.0)
+        births = float(np.maximum(roots.score, 0.0).sum())
         children: list[tuple[float, int, int, Array]] = []
         number = 0
         for h in np.argsort(-self._weight, kind="stable").tolist():
             reachable = self._weight[h] + float(most[self._members[h]].sum()) + births
             if len(children) == self.max_hypotheses and reachable <= children[0][0]:
                 continue
-            for weight, rows in self._ranked(h, s, pairs, gain, numbers, len(z), offsets):
+            for weight, rows in self._ranked(h, s, pairs, gain, numbers, roots.score, len(z), offsets):
                 number += 1
                 entry = (weight, -number, h, rows)
                 if len(children) < self.max_hypotheses:
@@ -179,7 +179,15 @@ class HypothesisOrientedMHT(Tracker):
         return np.array([one[2] for one in children], dtype=np.int64)
 
     def _ranked(
-        self, h: int, s: int, pairs: TrackPairs, gain: Array, numbers: Array, count: int, offsets: tuple[int, int]
+        self,
+        h: int,
+        s: int,
+        pairs: TrackPairs,
+        gain: Array,
+        numbers: Array,
+        birth: Array,
+        count: int,
+        offsets: tuple[int, int],
     ) -> list[tuple[float, Array]]:
         """The m best children of a hypothesis: log-probabilities and rows of the next batch."""
         own = self._members[h]
@@ -190,7 +198,7 @@ class HypothesisOrientedMHT(Tracker):
         targets, new = len(own), len(numbers)
         rows = np.concatenate([place[pairs.track[mine]], np.arange(targets), targets + np.arange(new)]) + 1
         columns = np.concatenate([pairs.measurement[mine] + 1, np.zeros(targets, np.int64), numbers + 1])
-        costs = np.concatenate([-gain[mine], np.full(targets, -self.terms.miss[s]), np.full(new, -self._birth[s])])
+        costs = np.concatenate([-gain[mine], np.full(targets, -self.terms.miss[s]), -birth])
         meaning = np.concatenate([offsets[0] + mine, own, offsets[1] + np.arange(new)])
         if not len(rows):
             return [(float(self._weight[h]), own)]
@@ -203,12 +211,11 @@ class HypothesisOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array, Array]:
         numbers = np.arange(len(z))
-        states, fit, positions = self._singles(s, z)
+        states, fit, positions, score = self._singles(s, z)
         numbers = numbers[fit]
         when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[np.lexsort((*positions.T, when))] = self._new_ids(len(numbers))
-        score = np.full(len(numbers), self._birth[s])
         history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
         history[:, s] = numbers + 1
         return TrackBatch.new(predict_each(self.filter, states, time - when), ids, score, when), history, numbers

@@ -14,20 +14,43 @@ others need more, is known for what it is, and a tree keeps a branch that leaves
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._system.compiled import njit
-from assoc.packing.bounds.dual_ascent import SmoothPoint, hard_sweeps, smooth_passes
+from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.packing import PackingArrays, assembled
 
-# temperatures of the smoothed ascent, in nats: losses are needed to a fraction of the limits they are held against
-_HOTTEST, _LEVELS, _PASSES = 4.0, 5, 15
+# the smoothed ascent begins hot enough to move prices across the whole spread of scores, and is cooled until losses are
+# known to a fraction of the limits they are held against, in nats
+_COLDEST, _PASSES = 0.25, 15
+
+
+class Priced(NamedTuple):
+    """Branches, and what they cost by the prices of trees and measurements.
+
+    Attributes
+    ----------
+    number : int64 array (B,)
+        Tree of each branch, from 0.
+    first : int64 array (C + 1,)
+        Where the measurements of each column begin among all.
+    trees, measurements : arrays
+        What each is worth to the bound, 0 or more: the sum of all bounds the best global hypothesis from above.
+    loss : array (B,)
+        What the branch lacks, 0 or more up to rounding.
+    """
+
+    number: Any
+    first: Any
+    trees: Any
+    measurements: Any
+    loss: Any
 
 
 @njit
-def losses(tree: Any, score: Any, history: Any) -> Any:
+def priced(tree: Any, score: Any, history: Any) -> Any:
     """Bound from below what each branch costs the best global hypothesis that must contain it.
 
     Parameters
@@ -41,8 +64,7 @@ def losses(tree: Any, score: Any, history: Any) -> Any:
 
     Returns
     -------
-    array (B,)
-        Losses, 0 or more, up to rounding.
+    Priced
     """
     number, trees = _numbered(tree)
     columns = history.shape[1]
@@ -66,7 +88,7 @@ def losses(tree: Any, score: Any, history: Any) -> Any:
     involved = np.zeros(trees, np.bool_)
     for b in range(tree.size):
         if score[b] > 0.0:
-            price[number[b]] = min(price[number[b]], -score[b])
+            price[number[b]] = max(price[number[b]], score[b])
             for c in range(columns):
                 if history[b, c] > 0 and contested[first[c] + history[b, c] - 1]:
                     involved[number[b]] = True
@@ -74,11 +96,11 @@ def losses(tree: Any, score: Any, history: Any) -> Any:
         _price(number, score, history, first, contested, involved, price)
     loss = np.empty(tree.size)
     for b in range(tree.size):
-        loss[b] = -score[b] - price[number[b]]
+        loss[b] = price[number[b]] - score[b]
         for c in range(columns):
             if history[b, c] > 0:
-                loss[b] -= price[trees + first[c] + history[b, c] - 1]
-    return loss
+                loss[b] += price[trees + first[c] + history[b, c] - 1]
+    return Priced(number, first, price[:trees].copy(), price[trees:].copy(), loss)
 
 
 @njit
@@ -96,7 +118,7 @@ def _numbered(tree: Any) -> Any:
 
 @njit
 def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, involved: Any, price: Any) -> None:
-    """Fill in the prices (all <= 0, as costs) of the trees involved and of the contested measurements."""
+    """Fill in the prices of the trees involved and of the contested measurements."""
     trees, columns = involved.size, history.shape[1]
     wanted = np.zeros(score.size, np.bool_)
     count = 0
@@ -125,10 +147,10 @@ def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, in
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
     # trees come first in every component: they take what their best branches score, and the rest is differences
     hard_sweeps(packing, duals, reduced, 1)
-    temperature = np.full(col_start.size - 1, _HOTTEST)
-    for _ in range(_LEVELS):
+    temperature = np.maximum(START * spread(packing), 2.0 * _COLDEST)
+    while temperature.max() > _COLDEST:
         smooth_passes(packing, point, temperature, _PASSES, np.inf)
-        temperature *= 0.5
+        temperature = np.maximum(0.5 * temperature, 0.5 * _COLDEST)
     hard_sweeps(packing, duals, reduced, 2)
     for r in range(free.size):
-        price[row_origin[r]] = min(duals[r], 0.0)
+        price[row_origin[r]] = max(-duals[r], 0.0)

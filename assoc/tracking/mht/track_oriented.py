@@ -29,12 +29,14 @@ from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
-from assoc.tracking.mht.best_hypothesis import choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
 from assoc.tracking.mht.pruning import MOST_SCANS, decide, same_tree
 from assoc.tracking.track import Decision, Step
-from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
 from assoc.tracking.tracker import Tracker
+
+_MOST_CROSSINGS = 100
+"""The most trees that begin in a scan where several sensors together tell a position."""
 
 
 class TrackOrientedMHT(Tracker):
@@ -89,40 +91,48 @@ class TrackOrientedMHT(Tracker):
 
     def _step(self, scan: Scan) -> Step:
         time, measurements = scan.time, scan.measurements
-        if scan.at_once:
-            self._grow(time, measurements)
-        else:
-            self._grow_in_order(scan)
+        proved = self._grow(scan) if scan.at_once else self._grow_in_order(scan)
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
-        self._chosen = self._best_hypothesis()
+        if not proved or self.solver != "exact" or self.solver_parameters:
+            self._chosen = self._better(self._solved())
         self._confirm()
         now = self._decision(0, self._chosen)
         final, kept = self._prune() if len(self._window) == self.depth else ((), None)
         ended = self._delete_tracks(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
-    def _grow(self, time: float, measurements: tuple[Array, ...]) -> None:
-        """Grow every branch by the measurements in its gate and by misses, and start trees."""
-        count = len(self.sensors)
+    def _grow(self, scan: Scan) -> bool:
+        """Grow every branch by the measurements in its gate and by misses, start trees, and choose the best hypothesis.
+
+        Returns whether it is proved to be the best.
+        """
+        time, count = scan.time, len(self.sensors)
         batch = self._predicted(self._batch, self._elapsed(time))
         states, tables = batch.states, self._tables()
-        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
             pairs = track_pairs(self.filter, states, z, sensor, gate_of(sensor, self.gate_probability))
             gain = pairs.log_likelihood + self.terms.detection[s]
             begun, roots = self._roots(s, z, time)
             missed = np.full(len(states), self.terms.miss[s])
             when = np.full(len(gain), time)
-            kept, tables = self._extended(tables, missed, Hits(pairs.track, pairs.measurement, gain, when), roots, s)
+            hits = Hits(pairs.track, pairs.measurement, gain, when)
+            kept, tables, chosen, proved = self._extended(tables, missed, hits, roots, s)
             require_states(states, len(kept))
             states = concatenate([states, pairs.states, begun])[kept]
+        crossed = self._crossed_roots(scan, tables.history[chosen & (tables.counts[:, SURE] > 0), :count])
+        if crossed is not None:
+            nothing = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
+            kept, tables, chosen, proved = self._extended(tables, np.zeros(len(states)), nothing, crossed[1], 0)
+            states = concatenate([states, crossed[0]])[kept]
         count_scan(tables.counts, tables.history, count, np.ones(len(states), dtype=np.bool_))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
-        self._history, self._born = tables.history, tables.born
+        self._history, self._born, self._chosen = tables.history, tables.born, chosen
+        return proved
 
-    def _grow_in_order(self, scan: Scan) -> None:
+    def _grow_in_order(self, scan: Scan) -> bool:
         """`_grow` where measurements have times of their own: each branch is filtered in their order."""
         count, timed = len(self.sensors), self._timed(scan)
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         # the sensors that have been taken in: only they can have missed a branch
         past = np.zeros_like(looked)
         tables, gained = self._tables(), np.zeros(len(self._batch))
@@ -139,19 +149,23 @@ class TrackOrientedMHT(Tracker):
             ids = np.empty(len(own), dtype=np.int64)
             ids[np.lexsort((*timed.places.positions[s][own].T, since))] = self._new_ids(len(own))
             hits = Hits(grown.parent, grown.measurement, total - gained[grown.parent], grown.followed.when)
-            kept, tables = self._extended(tables, missed, hits, Roots(ids, own, since, score), s)
+            single = np.zeros((len(own), count), dtype=np.int32)
+            single[:, s] = own + 1
+            roots = Roots(ids, single, since, score)
+            kept, tables, chosen, proved = self._extended(tables, missed, hits, roots, s)
             gained = np.concatenate([gained + missed, total, score])[kept]
             anchor = np.concatenate([anchor, anchor[grown.parent], own_anchor])[kept]
             parent_row = np.concatenate([parent_row, parent_row[grown.parent], np.full(len(own), -1)])[kept]
             done.append(s)
         rows = tables.history[:, :count]
         followed = timed.follow(parent_row, rows)
-        states = timed.at(followed, np.arange(len(rows)), scan.time)
+        states = timed.at_end(followed, parent_row)
         new = np.flatnonzero(parent_row < 0)
         tables.numbers[new, STARTED] = followed.first[new]
         count_scan(tables.counts, tables.history, count, looked[anchor].any(axis=1))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
-        self._history, self._born = tables.history, tables.born
+        self._history, self._born, self._chosen = tables.history, tables.born, chosen
+        return proved
 
     def _tables(self) -> Tables:
         """The branches, with room for this scan in their histories."""
@@ -159,31 +173,54 @@ class TrackOrientedMHT(Tracker):
         history[:, count:] = self._history[:, : history.shape[1] - count]
         return Tables(self._batch.numbers, self._batch.counts, history, self._born)
 
-    def _extended(self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int) -> tuple[Array, Tables]:
-        kept, tables = extend(tables, missed, hits, roots, s, self._scan, self.max_branches, self.branch_drop)
-        if len(kept) > self.max_tuples:
+    def _extended(
+        self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int
+    ) -> tuple[Array, Tables, Array, bool]:
+        done = extend(tables, missed, hits, roots, s, self._scan, self.max_branches, self.branch_drop)
+        if len(done[0]) > self.max_tuples:
             raise LimitExceededError(
-                f"scan {self._scan}: {len(kept)} branches, more than max_tuples = {self.max_tuples}; "
+                f"scan {self._scan}: {len(done[0])} branches, more than max_tuples = {self.max_tuples}; "
                 "lower gate_probability, depth or max_branches, or raise max_tuples"
             )
-        return kept, tables
+        return done
 
     def _roots(self, s: int, z: Array, time: float) -> tuple[Any, Roots]:
         """New trees, one for each measurement that tells a position, and their states."""
-        states, fit, positions = self._singles(s, z)
+        states, fit, positions, score = self._singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
         ids = np.empty(len(numbers), dtype=np.int64)
         ids[np.lexsort(positions.T)] = self._new_ids(len(numbers))
-        return states, Roots(ids, numbers, np.full(len(numbers), time), np.full(len(numbers), self._birth[s]))
+        rows = np.zeros((len(numbers), len(self.sensors)), dtype=np.int32)
+        rows[:, s] = numbers + 1
+        return states, Roots(ids, rows, np.full(len(numbers), time), score)
 
-    def _best_hypothesis(self) -> Array:
-        """Branches of the best global hypothesis, as a mask."""
-        score, track_id = self._batch.score.copy(), self._batch.track_id.copy()
-        if self.solver == "exact" and not self.solver_parameters:
-            easy = choose(track_id, score, self._history)
-            if easy is not None:
-                return easy
+    def _crossed_roots(self, scan: Scan, taken: Array) -> tuple[Any, Roots] | None:
+        """New trees of what confirmed tracks (their measurements: (T, S)) leave of sensors that start none alone."""
+        free = []
+        for s, size in enumerate(scan.sizes.tolist()):
+            own = np.ones(size + 1, dtype=np.bool_)
+            own[taken[:, s]] = False
+            free.append(own[1:])
+        found = self._crossings(scan, free)
+        if found is None:
+            return None
+        several, scores = found
+        # by far the most are ghosts
+        best = np.argsort(-scores, kind="stable")[:_MOST_CROSSINGS]
+        best = best[np.lexsort(several.positions[best].T)]
+        states = self.initiation.start(self.filter, several.positions[best], several.covariances[best])
+        when = np.full(len(best), scan.time)
+        return states, Roots(self._new_ids(len(best)), several.rows[best], when, scores[best])
+
+    def _better(self, other: Array) -> Array:
+        """The better of the hypothesis that was found growing and another, as masks of branches."""
+        score = self._batch.score
+        return other if score[other].sum() >= score[self._chosen].sum() else self._chosen
+
+    def _solved(self) -> Array:
+        """Branches of the best global hypothesis by the tracker's solver, as a mask."""
+        score, track_id = self._batch.score, self._batch.track_id
         chosen = np.zeros(len(self._batch), dtype=np.bool_)
         # a branch of no positive score is better left to false alarms
         rows = np.flatnonzero(score > 0)

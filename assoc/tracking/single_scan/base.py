@@ -11,7 +11,6 @@ from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.costs.tracks.scores import log_birth
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.track import Decision, Step, decision
@@ -78,7 +77,7 @@ class SingleScanTracker(Tracker):
         gain = -score_costs(timed, followed, rows, self.terms, looked[track])
         when = np.where(rows.any(axis=1), followed.when, np.nan)
         at_all = np.asarray(looked[track].any(axis=1))
-        return ScanOutcome(timed.at(followed, track, scan.time), gain, rows, born, when, at_all)
+        return ScanOutcome(timed.at_end(followed, track), gain, rows, born, when, at_all)
 
     def _begin_timed(self, scan: Scan, timed: TimedScan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
@@ -88,8 +87,8 @@ class SingleScanTracker(Tracker):
         if not len(rows):
             return self._batch[:0], rows
         followed = timed.follow(np.full(len(rows), -1), rows)
-        states = timed.at(followed, np.arange(len(rows)), scan.time)
-        looked = timed.looked(scan.time)[timed.anchors(rows, followed.lead)]
+        states = timed.at_end(followed, np.full(len(rows), -1))
+        looked = timed.looked()[timed.anchors(rows, followed.lead)]
         score = -score_costs(timed, followed, rows, self.terms, looked)
         order = np.lexsort(states.mean[:, list(self.filter.motion.position)].T)
         batch = TrackBatch.new(states[order], self._new_ids(len(order)), score[order], followed.when[order])
@@ -103,12 +102,6 @@ class SingleScanTracker(Tracker):
             speed=self.initiation.speed,
         )  # fmt: skip
 
-    @property
-    def _volume(self) -> float:
-        """Of the region, m^3."""
-        region = self._place.region
-        return float(np.prod(region[:, 1] - region[:, 0]))
-
     def _begin(self, scan: Scan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
         tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
@@ -119,17 +112,9 @@ class SingleScanTracker(Tracker):
         order = order[np.lexsort(positions[order].T)]
         rows, positions, covariances = tuples[order], positions[order], covariances[order]
         states = self.initiation.start(self.filter, positions, covariances)
-        seen = rows > 0
-        several = log_birth(covariances, self._volume, self.initiation.birth_rate)
         costs = tuple_costs(self._place, scan, rows, speed=self.initiation.speed)
-        score = np.where(seen.sum(axis=1) == 1, self._single_scores(rows), several - costs)
+        score = self._new_scores(rows, costs, covariances)
         return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
-
-    def _single_scores(self, rows: Array) -> Array:
-        """Scores of new tracks of single measurements, (K, S), that all other sensors missed."""
-        seen = rows > 0
-        scores: Array = seen @ self.terms.birth + ~seen @ self.terms.miss
-        return scores
 
     def _decision(self, scan: Scan, batch: TrackBatch, rows: Array) -> Decision:
         assigned = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
-from assoc.costs.tracks.scores import doubted_gain, log_birth
+from assoc.costs.tracks.scores import doubted_gain
 from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
@@ -55,29 +55,30 @@ class MultiSensorTracker(SingleScanTracker):
         return ScanOutcome(tuples.states[kept], gain[kept], tuples.rows[kept], born)
 
     def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         tuples = grow_timed_tuples(timed, self.terms, looked, self.max_tuples)
         known = tuples.track >= 0
         value = -tuples.costs
         value[known] = doubted_gain(scores[tuples.track[known]], value[known])
         # where false alarms are rarer than new targets a single measurement is one, too
-        good = np.flatnonzero(known | (value > 0))
-        columns = np.column_stack([tuples.track + 1, tuples.rows])[good]
-        problem = AssignmentProblem(columns, -value[good], np.concatenate([[len(scores)], scan.sizes]))
+        # a track without measurements is missed, and has no part in the problem
+        wooed = np.append(np.bincount(tuples.track[known], minlength=len(scores)) > 1, False)
+        number = np.cumsum(wooed) * wooed
+        good = np.flatnonzero(np.where(known, wooed[tuples.track], value > 0))
+        columns = np.column_stack([number[tuples.track], tuples.rows])[good]
+        problem = AssignmentProblem(columns, -value[good], np.concatenate([[int(wooed.sum())], scan.sizes]))
         solution = self._assign(problem)
         mine = solution.tuples[solution.tuples[:, 0] > 0]
-        rows = mine[np.argsort(mine[:, 0]), 1:].astype(np.int32)
+        rows = np.zeros((len(scores), scan.sizes.size), dtype=np.int32)
+        rows[np.flatnonzero(wooed)[mine[:, 0] - 1]] = mine[:, 1:]
         return self._outcome(scan, timed, looked, rows, solution.tuples[solution.tuples[:, 0] == 0][:, 1:])
 
     def _new_targets(self, scan: Scan) -> tuple[Array, Array]:
         """Tuples without a track that are better than false alarms, and their costs with the birth density."""
         problem = self._problem(scan)
-        rows, costs = problem.tuples, np.array(problem.costs)
-        several = np.count_nonzero(rows, axis=1) > 1
+        if not problem.num_tuples:
+            return problem.tuples, problem.costs
         # where false alarms are rarer than new targets a single measurement is one, too
-        costs[~several] = -self._single_scores(rows[~several])
-        if several.any():
-            covariances = self._fused(scan, rows[several])[1]
-            costs[several] -= log_birth(covariances, self._volume, self.initiation.birth_rate)
-        good = costs < 0
-        return rows[good], costs[good]
+        scores = self._new_scores(problem.tuples, problem.costs, self._fused(scan, problem.tuples)[1])
+        good = scores > 0
+        return problem.tuples[good], -scores[good]

@@ -54,7 +54,7 @@ class StaticFusionTracker(SingleScanTracker):
         return ScanOutcome(after, gain[kept], rows, fused[free[1:]])
 
     def _associate_timed(self, scan: Scan, timed: TimedScan, scores: Array) -> ScanOutcome:
-        looked = timed.looked(scan.time)
+        looked = timed.looked()
         fused = np.asarray(self._assign(self._problem(scan)).tuples, dtype=np.int32)
         count = len(scores)
         track, which = [np.arange(count)], [np.full(count, -1)]

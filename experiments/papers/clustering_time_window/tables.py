@@ -7,7 +7,8 @@ FOLDER holds the tables as CSV files, named as t4_09_groundtruth_mode3_902.csv. 
 tracks hold without and with the window (tables 4.10 to 4.23). The recording is not public and the tables have no
 times: for our tracks of the same plots the times are chosen by us, a turn of 9.5 s for each plot, more where an
 aircraft has gone further than 220 m/s take it in that time. Into OUTPUT go our tables for the five aircraft, in the
-columns of the thesis, and a figure with its figures 4.1 to 4.15.
+columns of the thesis, and a figure with its figures 4.1 to 4.15. (Tables 4.25 and 4.26: 183 groups without window in
+1,130 s, 6.2 s on average, and 119 windows.)
 """
 
 from __future__ import annotations

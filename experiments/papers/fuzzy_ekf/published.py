@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from assoc._types import Array
+from assoc.errors import AssocWarning
 from assoc.filters import ConstantAcceleration, FuzzyAdaptiveEKF, FuzzyRules, FuzzyVariable, Gaussian, paper_rules
 from assoc.filters.base import Filter
 from assoc.sensors import Radar3D
@@ -79,11 +81,14 @@ def literal_errors(filter_: Filter[Any], batch: Batch) -> Array:
 
     The start is the first measurement, velocity and acceleration 0; the errors are those of `manoeuvres.errors`.
     """
-    radar = Radar3D(
-        position=np.zeros(3),
-        noise=np.full(3, math.sqrt(R0)),
-        field_of_view=[[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]],
-    )
+    with warnings.catch_warnings():
+        # an angle's noise of 1.7 rad is what the paper prints
+        warnings.simplefilter("ignore", AssocWarning)
+        radar = Radar3D(
+            position=np.zeros(3),
+            noise=np.full(3, math.sqrt(R0)),
+            field_of_view=[[0.0, 1e6], [-math.pi, math.pi], [-math.pi / 2, math.pi / 2]],
+        )
     seen, truth = batch.measured / np.array([KILOMETRE, 1.0, 1.0]), batch.truth / KILOMETRE
     r, a, e = seen[0].T
     mean = np.zeros((len(r), 9))

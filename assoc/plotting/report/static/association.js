@@ -125,7 +125,7 @@ const drawScans = () => {
     traces[0].name = 'cost';
     traces.push({ type: 'scatter', mode: 'markers', name: 'lower bound', x, y: valuesOf('bound'), marker: { symbol: 'x-thin', size: 8, line: { width: 1.5, color: COLOURS[5] } }, hoverinfo: 'skip' });
   }
-  const here = { type: 'line', x0: state.scan, x1: state.scan, yref: 'paper', y0: 0, y1: 1, line: { color: '#57606a', width: 1.5, dash: 'dot' } };
+  const here = { type: 'line', x0: state.scan, x1: state.scan, yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } };
   const layout = layoutOf(data.sources.length > 1 ? 'row' : 'scan', label, { hovermode: 'closest', shapes: [here], showlegend: name === 'cost' });
   if (data.sources.length === 1) {
     // scans keep their own numbers when only some of them were solved
@@ -161,7 +161,7 @@ const showScan = (index) => {
   markRow(scanTable, index);
   // the scene follows the slider at once, the histories when there is time
   window.clearTimeout(pending);
-  pending = window.setTimeout(() => { drawTrace(); drawScans(); }, 30);
+  pending = window.setTimeout(() => { drawTrace(); drawScans(); showAnts(index); }, 30);
 };
 
 const setSpace = (space) => {
@@ -181,6 +181,12 @@ try {
       if (valuesOf(name).some((value) => value !== null)) byId('measure').append(element('option', title, { value: name }));
     }
     choose = makeSlider(data.scans.length, scanLabel, showScan);
+    byId('legend').setAttribute('aria-pressed', String(!PHONE));
+    byId('legend').addEventListener('click', () => {
+      const button = byId('legend');
+      button.setAttribute('aria-pressed', String(button.getAttribute('aria-pressed') !== 'true'));
+      drawScene();
+    });
     byId('plan').addEventListener('click', () => setSpace(false));
     byId('space').addEventListener('click', () => setSpace(true));
     byId('nearer').addEventListener('click', () => {

@@ -2,7 +2,14 @@
 const data = JSON.parse(document.getElementById('data').textContent);
 const byId = (id) => document.getElementById(id);
 
-const COLOURS = ['#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000'];
+// What follows the reader's choice of a light or a dark page; a reload follows a change of mind.
+const DARK = window.matchMedia('(prefers-color-scheme: dark)').matches;
+const THEME = DARK
+  ? { ink: '#e6edf3', soft: '#a3adb8', line: '#8b949e', grid: '#30363d', faint: '#3d444d', paper: '#161b22' }
+  : { ink: '#000', soft: '#57606a', line: '#8c959f', grid: '#e5e8eb', faint: '#d3d7db', paper: '#fff' };
+const PHONE = window.innerWidth < 820;
+
+const COLOURS = [DARK ? '#3d9be0' : '#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', THEME.ink];
 const DASHES = ['solid', 'dash', 'dashdot', 'dot', 'longdash', 'longdashdot', '5px,1px'];
 const colourOf = (number) => COLOURS[number % COLOURS.length];
 const dashOf = (number) => DASHES[number % DASHES.length];
@@ -92,11 +99,12 @@ const onRow = (table, choose) => table.tBodies[0].addEventListener('click', (eve
   choose(Number(row.dataset.row));
 });
 
-// The slider with its buttons; choose(i) moves it from elsewhere.
-const makeSlider = (count, label, show) => {
-  const range = byId('slider');
-  const text = byId('slider-label');
-  const play = byId('play');
+// A slider with its buttons; choose(i) moves it from elsewhere, and may say that it has another number of places now.
+const makeSlider = (places, label, show, prefix = '') => {
+  let count = places;
+  const range = byId(`${prefix}slider`);
+  const text = byId(`${prefix}slider-label`);
+  const play = byId(`${prefix}play`);
   let timer = null;
   const choose = (wanted) => {
     const number = Math.min(Math.max(wanted, 0), count - 1);
@@ -113,19 +121,24 @@ const makeSlider = (count, label, show) => {
   };
   range.max = String(count - 1);
   range.addEventListener('input', () => { stop(); choose(Number(range.value)); });
-  byId('before').addEventListener('click', () => { stop(); choose(Number(range.value) - 1); });
-  byId('after').addEventListener('click', () => { stop(); choose(Number(range.value) + 1); });
+  byId(`${prefix}before`).addEventListener('click', () => { stop(); choose(Number(range.value) - 1); });
+  byId(`${prefix}after`).addEventListener('click', () => { stop(); choose(Number(range.value) + 1); });
   play.addEventListener('click', () => {
     if (timer !== null) { stop(); return; }
     play.textContent = 'Pause';
     play.setAttribute('aria-pressed', 'true');
     timer = window.setInterval(() => choose((Number(range.value) + 1) % count), 400);
   });
-  return (number) => { stop(); choose(number); };
+  return (number, now = count) => {
+    stop();
+    count = now;
+    range.max = String(count - 1);
+    choose(number);
+  };
 };
 
-const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13 };
-const AXIS = { zeroline: false, gridcolor: '#e5e8eb', linecolor: '#8c959f', ticks: 'outside', automargin: true, tickcolor: '#8c959f' };
+const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 13, color: THEME.ink };
+const AXIS = { zeroline: false, gridcolor: THEME.grid, linecolor: THEME.line, ticks: 'outside', automargin: true, tickcolor: THEME.line };
 // The data stay here: a chart has the buttons named below and no others, knows no server, and nothing opens a window.
 window.open = () => null;
 const configOf = (...buttons) => ({ responsive: true, displaylogo: false, plotlyServerURL: '', displayModeBar: window.innerWidth < 820 ? false : 'hover', modeBarButtons: [['toImage'], buttons] });
@@ -133,8 +146,8 @@ const CONFIG = configOf('zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2
 const SPACE_CONFIG = configOf('zoom3d', 'pan3d', 'orbitRotation', 'tableRotation', 'resetCameraDefault3d');
 const layoutOf = (x, y, more = {}) => ({
   font: FONT,
-  paper_bgcolor: '#fff',
-  plot_bgcolor: '#fff',
+  paper_bgcolor: THEME.paper,
+  plot_bgcolor: THEME.paper,
   margin: { l: 62, r: 14, t: 34, b: 48 },
   xaxis: { ...AXIS, title: { text: x } },
   yaxis: { ...AXIS, title: { text: y } },

@@ -85,7 +85,9 @@ const ellipse = (centre, [xx, xy, yy]) => {
 // All points of a source, for the unit and for axes that stay while the scans go by.
 const pointsOf = (number) => {
   const source = data.sources[number];
-  const points = source.sensors.map((sensor) => sensor.place);
+  // a crowd fills the view; its sensors are a double click away
+  const crowded = data.scans.some((scan) => scan.source === number && scan.targets > 40);
+  const points = crowded ? [] : source.sensors.map((sensor) => sensor.place);
   const far = [];
   for (const scan of data.scans) {
     if (scan.source !== number || !scan.view) continue;
@@ -149,15 +151,19 @@ const sceneTraces = (index, space, chosen) => {
   const view = scan.view;
   const symbols = space ? SYMBOLS_IN_SPACE : SYMBOLS;
   // many targets need smaller signs
-  const crowd = view.positions.length > 150 ? 0.45 : view.positions.length > 40 ? 0.65 : 1;
+  const many = view.positions.length;
+  const crowd = many > 150 ? 0.32 : many > 40 ? 0.6 : 1;
+  // where signs lie on one another, the denser place is the darker one
+  const opacity = many > 150 ? 0.65 : 1;
+  const stroke = many > 150 ? 1 : 2;
   const size = crowd * (space ? 0.55 : 1);
   const traces = [];
   const add = (name, points, more) => traces.push(series(name, points, unit, space, more));
   if (view.truth.length) {
-    add(`truth, last ${TRAIL} scans`, truthTrails(index), { mode: 'lines', line: { color: '#9aa0a6', width: space ? 3 : 1.5 }, hoverinfo: 'skip' });
+    add(`truth, last ${TRAIL} scans`, truthTrails(index), { mode: 'lines', line: { color: THEME.line, width: space ? 3 : 1.5 }, hoverinfo: 'skip' });
     add('truth', view.truth.map((one) => one.slice(1)), {
       mode: 'markers',
-      marker: space ? { symbol: 'cross', size: 4, color: '#000' } : { symbol: 'cross-thin', size: 15 * crowd, color: '#000', line: { width: 2, color: '#000' } },
+      marker: space ? { symbol: 'cross', size: 4, color: THEME.ink } : { symbol: 'cross-thin', size: 15 * crowd, color: THEME.ink, opacity, line: { width: stroke, color: THEME.ink } },
       hovertext: view.truth.map(([id, x, y, z]) => `truth, target id ${id}<br>x ${metres(x)}<br>y ${metres(y)}<br>z ${metres(z)}`), hoverinfo: 'text',
     });
   }
@@ -169,12 +175,12 @@ const sceneTraces = (index, space, chosen) => {
     if (sensor.ray) rays[target < 0 ? 'lost' : 'of'].push([[sensor.place[0], sensor.place[1], at[2]], at]);
     if (target >= 0) links.push([at, view.positions[target]]);
   }));
-  if (rays.lost.length) add('bearings of false alarms', strokes(rays.lost), { mode: 'lines', line: { color: '#d3d7db', width: 1, dash: 'dot' }, hoverinfo: 'skip' });
+  if (rays.lost.length) add('bearings of false alarms', strokes(rays.lost), { mode: 'lines', line: { color: THEME.faint, width: 1, dash: 'dot' }, hoverinfo: 'skip' });
   if (rays.of.length) add('bearings of targets', strokes(rays.of), { mode: 'lines', line: { color: '#56B4E9', width: 1 }, hoverinfo: 'skip' });
   if (!space) {
-    add('95 % ellipses', strokes(view.positions.map((p, t) => ellipse(p, view.ellipses[t]))), { mode: 'lines', line: { color: '#57606a', width: 1, dash: 'dot' }, hoverinfo: 'skip' });
+    add('95 % ellipses', strokes(view.positions.map((p, t) => ellipse(p, view.ellipses[t]))), { mode: 'lines', line: { color: THEME.soft, width: 1, dash: 'dot' }, hoverinfo: 'skip' });
   }
-  add('association', strokes(links), { mode: 'lines', line: { color: '#1b1f24', width: space ? 2 : 1 }, hoverinfo: 'skip' });
+  add('association', strokes(links), { mode: 'lines', line: { color: THEME.ink, width: space ? 2 : 1 }, hoverinfo: 'skip' });
   const lost = { at: [], text: [] };
   view.measured.forEach((measured, s) => {
     const kept = measured.at.map((_, i) => i).filter((i) => measured.target[i] >= 0);
@@ -185,23 +191,23 @@ const sceneTraces = (index, space, chosen) => {
     });
     add(plain(source.sensors[s].name), kept.map((i) => measured.at[i]), {
       mode: 'markers',
-      marker: { symbol: symbols[s % symbols.length], size: (15 - 2 * (s % 3)) * size, color: colourOf(s), line: { width: 2, color: colourOf(s) } },
+      marker: { symbol: symbols[s % symbols.length], size: (15 - 2 * (s % 3)) * size, color: colourOf(s), opacity, line: { width: stroke, color: colourOf(s) } },
       hovertext: kept.map((i) => measurementHover(source, scan, s, i)), hoverinfo: 'text',
       customdata: kept.map((i) => measured.target[i]),
     });
   });
   add('false alarms', lost.at, {
     mode: 'markers', hovertext: lost.text, hoverinfo: 'text',
-    marker: space ? { symbol: 'circle', size: 3, color: '#8c959f' } : { symbol: 'x-thin', size: 8 * Math.sqrt(crowd), color: '#6e7781', line: { width: 1.5, color: '#6e7781' } },
+    marker: space ? { symbol: 'circle', size: 3, color: THEME.line } : { symbol: 'x-thin', size: 8 * Math.sqrt(crowd), color: THEME.line, line: { width: 1.5, color: THEME.line } },
   });
   add('targets found', view.positions, {
-    mode: 'markers', marker: { symbol: 'circle', size: 6 * crowd * (space ? 0.7 : 1), color: '#000' },
+    mode: 'markers', marker: { symbol: 'circle', size: 6 * crowd * (space ? 0.7 : 1), color: THEME.ink },
     hovertext: view.positions.map((_, t) => targetHover(source, scan, t)), hoverinfo: 'text',
     customdata: view.positions.map((_, t) => t),
   });
   add('sensors', source.sensors.map((sensor) => sensor.place), {
-    mode: 'markers+text', text: source.sensors.map((sensor) => plain(sensor.name)), textposition: 'bottom center', textfont: { size: 11, color: '#57606a' },
-    marker: { symbol: space ? 'diamond' : 'triangle-up', size: 11 * size, color: '#57606a' }, hoverinfo: 'text', hovertext: source.sensors.map((sensor) => plain(sensor.name)),
+    mode: 'markers+text', text: source.sensors.map((sensor) => plain(sensor.name)), textposition: 'bottom center', textfont: { size: 11, color: THEME.soft },
+    marker: { symbol: space ? 'diamond' : 'triangle-up', size: 11 * size, color: THEME.soft }, hoverinfo: 'text', hovertext: source.sensors.map((sensor) => plain(sensor.name)),
   });
   if (chosen !== null && chosen < view.positions.length) {
     add('chosen', [view.positions[chosen]], {
@@ -222,6 +228,8 @@ const boxAround = (scan, target) => {
   return [0, 1].map((axis) => [centre[axis] - 1.3 * reach, centre[axis] + 1.3 * reach]);
 };
 
+const IN_SPACE = { gridcolor: THEME.grid, backgroundcolor: THEME.paper, color: THEME.ink, nticks: PHONE ? 4 : 7 };
+
 const sceneLayout = (number, space, zoom) => {
   const { unit, box } = frames[number];
   const scaled = (range) => range.map((value) => value * unit.factor);
@@ -231,19 +239,21 @@ const sceneLayout = (number, space, zoom) => {
     const ranges = zoom || box;
     Object.assign(layout.xaxis, { range: scaled(ranges[0]) });
     Object.assign(layout.yaxis, { range: scaled(ranges[1]), scaleanchor: 'x' });
-    layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: window.innerWidth < 820 ? -0.3 : -0.17, yanchor: 'top', font: { size: 12 } };
+    layout.showlegend = !byId('legend') || byId('legend').getAttribute('aria-pressed') === 'true';
+    layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: PHONE ? -0.3 : -0.17, yanchor: 'top', font: { size: 12 } };
     return layout;
   }
   const reach = box.map(([low, high]) => high - low);
   const widest = Math.max(reach[0], reach[1]);
   return {
-    font: FONT, paper_bgcolor: '#fff', margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: key,
+    font: PHONE ? { ...FONT, size: 11 } : FONT, paper_bgcolor: THEME.paper, margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: key,
+    showlegend: !byId('legend') || byId('legend').getAttribute('aria-pressed') === 'true',
     hoverlabel: { align: 'left', font: { size: 12 } },
     legend: { orientation: 'h', x: 0, xanchor: 'left', y: 0, yanchor: 'top', font: { size: 12 } },
     scene: {
-      xaxis: { title: { text: `x (${unit.name})` }, range: scaled(box[0]) },
-      yaxis: { title: { text: `y (${unit.name})` }, range: scaled(box[1]) },
-      zaxis: { title: { text: `z (${unit.name})` }, range: scaled(box[2]) },
+      xaxis: { ...IN_SPACE, title: { text: `x (${unit.name})` }, range: scaled(box[0]) },
+      yaxis: { ...IN_SPACE, title: { text: `y (${unit.name})` }, range: scaled(box[1]) },
+      zaxis: { ...IN_SPACE, title: { text: `z (${unit.name})` }, range: scaled(box[2]) },
       aspectmode: 'manual',
       // heights are stretched where they would be a line
       aspectratio: { x: (1.3 * reach[0]) / widest, y: (1.3 * reach[1]) / widest, z: Math.max(0.45, (1.3 * reach[2]) / widest) },

@@ -55,7 +55,7 @@ const drawCurves = () => {
     const coloured = i < MOST_COLOURED - 1;
     traces.push({
       type: 'scatter', mode: 'lines', name: plain(data.settings[i].title), x: curve[column][0], y: curve[column][1], showlegend: coloured || chosen,
-      line: { shape: 'hv', width: chosen ? 3 : coloured ? 2 : 1, color: chosen ? '#000' : coloured ? colourOf(i) : '#d3d7db', dash: coloured && !chosen ? dashOf(i) : 'solid' },
+      line: { shape: 'hv', width: chosen ? 3 : coloured ? 2 : 1, color: chosen ? THEME.ink : coloured ? colourOf(i) : THEME.faint, dash: coloured && !chosen ? dashOf(i) : 'solid' },
       hovertemplate: `${plain(data.settings[i].title)}<br>%{y:.4g}<extra></extra>`, legendrank: i,
     });
   });

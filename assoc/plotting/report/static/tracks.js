@@ -56,12 +56,12 @@ const drawTracks = () => {
   const since = data.instants[Math.max(0, now.index - TRAIL)];
   const traces = [];
   if (data.truth.length) {
-    traces.push({ ...linesOf(data.truth.map((one) => stretch(one, 0, one.t.length))), name: 'truth', line: { color: '#d3d7db', width: 6 } });
+    traces.push({ ...linesOf(data.truth.map((one) => stretch(one, 0, one.t.length))), name: 'truth', line: { color: THEME.faint, width: 6 } });
   }
   const scan = data.measured.find((one) => Math.abs(one.t - time) < 1e-6);
   if (data.measured.length) {
     const at = scan ? scan.at : [];
-    traces.push({ type: 'scatter', mode: 'markers', name: 'measurements', x: at.map((p) => p[0] * unit.factor), y: at.map((p) => p[1] * unit.factor), hoverinfo: 'skip', marker: { symbol: 'x-thin', size: 6, line: { width: 1, color: '#8c959f' } } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'measurements', x: at.map((p) => p[0] * unit.factor), y: at.map((p) => p[1] * unit.factor), hoverinfo: 'skip', marker: { symbol: 'x-thin', size: 6, line: { width: 1, color: THEME.line } } });
   }
   traces.push({ ...linesOf(data.tracks.map((one) => stretch(one, 0, one.t.length))), name: 'whole tracks', line: { color: '#7aa6c8', width: 1, dash: 'dot' } });
   COLOURS.forEach((colour, c) => {
@@ -75,17 +75,17 @@ const drawTracks = () => {
   }
   const here = data.truth.map((one) => [one, present(one, time)]).filter(([, i]) => i >= 0);
   if (data.truth.length) {
-    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target id ${one.id}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: 14, line: { width: 2, color: '#000' } } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target id ${one.id}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: 14, line: { width: 2, color: THEME.ink } } });
   }
   const live = data.tracks.map((one, number) => [one, present(one, time), number]).filter(([, i]) => i >= 0);
   const named = live.length <= 40;
   traces.push({
     type: 'scatter', mode: named ? 'markers+text' : 'markers', name: 'tracks', x: live.map(([one, i]) => one.x[i] * unit.factor), y: live.map(([one, i]) => one.y[i] * unit.factor),
     text: live.map(([one]) => String(one.id)), textposition: 'top right', textfont: { size: 11 }, customdata: live.map(([, , number]) => number),
-    hovertext: live.map(([one, i]) => trackHover(one, i)), hoverinfo: 'text', marker: { symbol: 'circle', size: 8, color: live.map(([, , number]) => colourOf(number)), line: { width: 1, color: '#fff' } },
+    hovertext: live.map(([one, i]) => trackHover(one, i)), hoverinfo: 'text', marker: { symbol: 'circle', size: 8, color: live.map(([, , number]) => colourOf(number)), line: { width: 1, color: THEME.paper } },
   });
   if (data.sensors.length) {
-    traces.push({ type: 'scatter', mode: 'markers', name: 'sensors', x: data.sensors.map((one) => one.place[0] * unit.factor), y: data.sensors.map((one) => one.place[1] * unit.factor), hovertext: data.sensors.map((one) => plain(one.name)), hoverinfo: 'text', marker: { symbol: 'triangle-up', size: 10, color: '#57606a' } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'sensors', x: data.sensors.map((one) => one.place[0] * unit.factor), y: data.sensors.map((one) => one.place[1] * unit.factor), hovertext: data.sensors.map((one) => plain(one.name)), hoverinfo: 'text', marker: { symbol: 'triangle-up', size: 10, color: THEME.soft } });
   }
   const layout = layoutOf(`x (${unit.name})`, `y (${unit.name})`, { hovermode: 'closest', uirevision: now.zoom ? JSON.stringify(now.zoom) : 'whole', margin: { l: 62, r: 10, t: 10, b: 46 } });
   const ranges = (now.zoom || near).map((range) => range.map((value) => value * unit.factor));
@@ -101,7 +101,7 @@ const drawTracks = () => {
   byId('detail').textContent = `${live.length} tracks${data.truth.length ? `, ${here.length} targets` : ''} at this time${now.track === null ? '' : `; chosen: track ${data.tracks[now.track].id}`}`;
 };
 
-const marker = () => ({ type: 'line', x0: data.instants[now.index], x1: data.instants[now.index], yref: 'paper', y0: 0, y1: 1, line: { color: '#57606a', width: 1.5, dash: 'dot' } });
+const marker = () => ({ type: 'line', x0: data.instants[now.index], x1: data.instants[now.index], yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } });
 
 const overTime = (id, curves, label) => {
   const layout = layoutOf('time (s)', label, { hovermode: 'closest', shapes: [marker()] });

@@ -10,7 +10,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it
 from assoc.recordings import Recording, Window
-from assoc.tracking.plot_windows import step_windows
+from assoc.tracking.plots.plot_windows import step_windows
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
@@ -75,7 +75,7 @@ def track_plots(
         known = (ids > 0) & np.isfinite(window.altitudes)
         altitudes.update(zip(ids[known].tolist(), window.altitudes[known].tolist(), strict=True))
         ends.append(float(step.time))
-        listed = (track for track in tracker.tracks if track.confirmed or not confirmed)
+        listed = (track for track in tracker.tracks if track.reported or not confirmed)
         table.add(listed, tracker.filter.motion.position, altitudes)
     tracks = np.concatenate(takers)
     aircraft = recording.aircraft

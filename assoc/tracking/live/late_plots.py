@@ -24,8 +24,8 @@ from assoc.tracking.tracker import Memory, Tracker
 HORIZON = 30.0
 """Seconds that a measurement may be late where nothing else is said."""
 
-# names of this many times the tracks that live are looked through for those that are gone
-_MANY = 10
+# when there are so many names, and then twice as many as are left, those of tracks that are gone are forgotten
+_MANY = 1_000
 
 
 @dataclass(eq=False)
@@ -49,22 +49,27 @@ class LatePlots:
         Of any kind, not begun or begun. It is this object's own from now on.
     horizon : float
         Seconds: a measurement that belongs to a scan which ended longer ago is refused, and counted.
+    first_id : int
+        Of new tracks.
 
     Attributes
     ----------
     late, refused : int
         Measurements so far that were late and taken in, or refused.
+    next_id : int
+        Of the next new track.
     """
 
-    def __init__(self, tracker: Tracker, horizon: float = HORIZON) -> None:
+    def __init__(self, tracker: Tracker, horizon: float = HORIZON, *, first_id: int = 1) -> None:
         if not isinstance(tracker, Tracker):
             raise InvalidInputError(f"tracker must be a tracker of assoc.tracking, got {type(tracker).__name__}")
         self.tracker, self.horizon = tracker, positive(horizon, "horizon")
         self.late = self.refused = 0
         self._kept: deque[_Kept] = deque()
         self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
-        self._next_name = max(self._names, default=0) + 1
+        self.next_id = max(first_id, max(self._names, default=0) + 1)
         self._decided: dict[int, Decision] = {}
+        self._many = _MANY
 
     @property
     def time(self) -> float | None:
@@ -74,7 +79,7 @@ class LatePlots:
     @property
     def tracks(self) -> list[Track]:
         """The tracks that live now, by their ids."""
-        named = [replace(track, track_id=self._name(track.track_id)) for track in self.tracker.tracks]
+        named = [track.named(self._name(track.track_id)) for track in self.tracker.tracks]
         return sorted(named, key=lambda track: track.track_id)
 
     @property
@@ -140,7 +145,7 @@ class LatePlots:
         on_time = [one >= now for one in stamps]
         if all(one.all() for one in on_time):
             return self._finish(self._advance(time, checked, list(stamps), sectors), [], 0)
-        start = tracker.remember(), list(self._kept), dict(self._names), dict(self._decided), self._next_name
+        start = tracker.remember(), list(self._kept), dict(self._names), dict(self._decided), self.next_id
         confirmed = {track.track_id for track in self.tracks if track.confirmed}
         try:
             moves, refused = self._insert(checked, stamps, on_time)
@@ -151,7 +156,7 @@ class LatePlots:
             step = self._advance(time, fresh, own, sectors)
         except BaseException:
             tracker.go_back(start[0])
-            self._kept, self._names, self._decided, self._next_name = deque(start[1]), *start[2:]
+            self._kept, self._names, self._decided, self.next_id = deque(start[1]), *start[2:]
             raise
         assigned = [np.zeros(len(z), dtype=np.int64) for z in checked]
         for s, one in enumerate(on_time):
@@ -244,9 +249,10 @@ class LatePlots:
             self._kept.popleft()
         open_scans = step.scan - len(self._kept)
         final = tuple(self._decided.pop(scan) for scan in sorted(self._decided) if scan <= open_scans)
-        if len(self._names) > _MANY * (1 + len(self.tracker.tracks)):
+        if len(self._names) > self._many:
             living = self.tracker.remember().track_ids | (self._kept[0].before.track_ids if self._kept else set())
             self._names = {inner: outer for inner, outer in self._names.items() if inner in living}
+            self._many = _MANY + 2 * len(self._names)
         return replace(step, final=final, late=count, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:
@@ -257,8 +263,8 @@ class LatePlots:
     def _name(self, inner: int) -> int:
         """The id by which a track is known outside."""
         if inner not in self._names:
-            self._names[inner] = self._next_name
-            self._next_name += 1
+            self._names[inner] = self.next_id
+            self.next_id += 1
         return self._names[inner]
 
     def _named(self, assigned: Sequence[Array]) -> tuple[Array, ...]:

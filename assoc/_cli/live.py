@@ -1,0 +1,193 @@
+"""Plots as lines from stdin, a UDP port on loopback or a scene, and tracks as lines while they change."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
+
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc.scene.scene import Scene
+    from assoc.tracking import Picture
+
+LONGEST = 10_000
+"""Characters of a line at the most."""
+# lines that may wait: stdin is not read on while they do, datagrams are lost and counted
+_WAITING = 100_000
+_DATAGRAM = 65_535
+_POLL = 0.2
+
+COLUMNS = (
+    "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "event", "score", "hits", "started", "last_detection",
+    "sigma_x", "sigma_y", "sigma_z",
+)  # fmt: skip
+"""What is written of tracks; an event is new, update or end."""
+
+
+class Plot(NamedTuple):
+    """A plot as a line says it."""
+
+    sensor: str
+    time: float
+    values: list[float]
+
+
+def parse_line(line: str, scene: Scene) -> Plot | None:
+    """Read a line of CSV or JSON; None for an empty line, a comment or the header.
+
+    CSV: sensor, time, then the components of the measurement. JSON: an object with sensor, time, and either values (an
+    array) or the components by their names. Metres, seconds, radians.
+
+    Raises
+    ------
+    InvalidInputError
+        It is neither.
+    """
+    text = line.strip()
+    if not text or text.startswith("#"):
+        return None
+    if len(text) > LONGEST:
+        raise InvalidInputError(f"a line of {len(text)} characters, expected at most {LONGEST}")
+    if text.startswith("{"):
+        return _from_json(text, scene)
+    parts = [one.strip() for one in text.split(",")]
+    if parts[0].lower() == "sensor":
+        return None
+    try:
+        time, *values = [float(one) for one in parts[1:]]
+    except ValueError:
+        raise InvalidInputError(f"expected sensor,time,values or a JSON object, got {text[:60]!r}") from None
+    return Plot(parts[0], time, values)
+
+
+def _from_json(text: str, scene: Scene) -> Plot:
+    try:
+        found: Any = json.loads(text)
+        sensor, time = str(found["sensor"]), float(found["time"])
+        values = found.get("values")
+        if values is None:
+            matching = [one for k, one in enumerate(scene.sensors, 1) if sensor in (one.name, str(k))]
+            # of an unknown sensor nothing is read: the tracker says that it does not know it
+            names = matching[0].components[: matching[0].dim] if matching else ()
+            values = [found[name] for name in names]
+        return Plot(sensor, time, [float(one) for one in values])
+    except (ValueError, TypeError, KeyError, RecursionError, AttributeError) as error:
+        what = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None
+
+
+class Lines:
+    """Lines that a thread reads, so that a signal can end the wait for them.
+
+    Parameters
+    ----------
+    port : int or None
+        UDP port on 127.0.0.1; None: stdin. Over UDP the line "end" ends the plots.
+    """
+
+    def __init__(self, port: int | None) -> None:
+        self.lost = 0
+        self._lines: queue.Queue[str | None] = queue.Queue(_WAITING)
+        self._socket = None
+        if port is not None:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            try:
+                self._socket.bind(("127.0.0.1", port))
+            except (OSError, OverflowError) as error:
+                self._socket.close()
+                raise InvalidInputError(f"--udp: port {port} cannot be used ({error})") from None
+        threading.Thread(target=self._read, name="plots", daemon=True).start()
+
+    @property
+    def port(self) -> int | None:
+        """The UDP port."""
+        return None if self._socket is None else int(self._socket.getsockname()[1])
+
+    def _read(self) -> None:
+        try:
+            if self._socket is None:
+                for raw in sys.stdin.buffer:
+                    self._lines.put(raw[: 2 * LONGEST].decode("utf-8", "replace"))
+            else:
+                self._receive(self._socket)
+        finally:
+            self._lines.put(None)
+
+    def _receive(self, port: socket.socket) -> None:
+        while True:
+            for line in port.recv(_DATAGRAM).decode("utf-8", "replace").splitlines():
+                if line.strip() == "end":
+                    return
+                try:
+                    self._lines.put_nowait(line)
+                except queue.Full:
+                    self.lost += 1
+
+    def __iter__(self) -> Iterator[str]:
+        while True:
+            try:
+                line = self._lines.get(timeout=_POLL)
+            except queue.Empty:
+                continue
+            if line is None:
+                return
+            yield line
+
+
+def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
+    """The plots of a scene by their times, so many times as quickly as they were made; 0: without waiting."""
+    plots = []
+    for k in range(scene.num_scans):
+        scan = scene.scan(k)
+        for s, (z, times) in enumerate(zip(scan.measurements, scan.own_times(), strict=True)):
+            rows = zip(times.tolist(), z.tolist(), strict=True)
+            plots += [Plot(str(s + 1), when, values) for when, values in rows]
+    plots.sort(key=lambda one: one.time)
+    begin, first = time.monotonic(), plots[0].time if plots else 0.0
+    for plot in plots:
+        ahead = begin + (plot.time - first) / speed - time.monotonic() if speed > 0 else 0.0
+        if ahead > 0:
+            time.sleep(ahead)
+        yield plot
+
+
+class TrackWriter:
+    """Writes tracks as they change, one line of CSV for each that is new, was detected, or has ended."""
+
+    def __init__(self, stream: IO[str], positions: Sequence[int]) -> None:
+        self._stream, self._positions = stream, list(positions)
+        self._known: dict[int, Any] = {}
+        self.rows = 0
+        stream.write(",".join(COLUMNS) + "\n")
+        stream.flush()
+
+    def write(self, picture: Picture) -> None:
+        """Write what has changed since the last picture."""
+        for track in picture.tracks:
+            before = self._known.get(track.track_id)
+            if before is None or track.last_detection > before.last_detection:
+                self._row("new" if before is None else "update", track, track.time)
+                self._known[track.track_id] = track
+        for number in picture.ended:
+            track = self._known.pop(number, None)
+            if track is not None:
+                self._row("end", track, picture.time)
+        self._stream.flush()
+
+    def _row(self, event: str, track: Any, when: float) -> None:
+        sigma = [0.0, 0.0, 0.0]
+        for axis, place in enumerate(self._positions):
+            sigma[axis] = math.sqrt(max(float(track.covariance[place, place]), 0.0))
+        numbers = [when, *track.position.tolist(), *track.velocity.tolist()]
+        rest = [track.score, track.hits, track.started, track.last_detection, *sigma]
+        row = [track.track_id, *(f"{one:.10g}" for one in numbers), event, *(f"{one:.10g}" for one in rest)]
+        self._stream.write(",".join(map(str, row)) + "\n")
+        self.rows += 1

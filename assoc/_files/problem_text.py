@@ -1,0 +1,83 @@
+"""Assignment problems as plain text: what `assoc.check` and other people's programs read (docs/proofs.md)."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._files.output import FilePath, write_text
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FIRST_LINE = "assoc-problem 1"
+_LARGEST = 2_000_000_000
+
+
+def write_problem_text(
+    path: FilePath, tuples: NDArray[np.int32], costs: NDArray[np.float64], sizes: NDArray[np.int32], dummy: bool
+) -> None:
+    """Write a problem; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    tuples : int array, shape (M, S)
+    costs : float array, shape (M,)
+        Written as the shortest decimals that are read back as the same numbers.
+    sizes : int array, shape (S,)
+    dummy : bool
+    """
+    lines = [FIRST_LINE, "sizes " + " ".join(map(str, sizes.tolist())), f"dummies {'yes' if dummy else 'no'}"]
+    lines.append(f"tuples {len(costs)}")
+    lines += [f"{cost!r} {' '.join(map(str, one))}" for cost, one in zip(costs.tolist(), tuples.tolist(), strict=True)]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_problem_text(path: FilePath) -> dict[str, Any]:
+    """Read what `write_problem_text` or another program wrote: tuples, costs, sizes, dummy.
+
+    Raises
+    ------
+    InvalidInputError
+        It is no such file.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            text = file.read(_LARGEST + 1)
+    except UnicodeDecodeError:
+        raise InvalidInputError(f"{path}: is no text, expected a problem in text form or an npz file") from None
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    if len(text) > _LARGEST:
+        raise InvalidInputError(f"{path}: is larger than 2 GB")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines or lines[0].split() != FIRST_LINE.split():
+        raise InvalidInputError(f"{path}: the first line must be {FIRST_LINE!r}")
+    head = dict(zip(("sizes", "dummies", "tuples"), (line.split() for line in lines[1:4]), strict=False))
+    if len(head) < 3 or any(words[0] != key for key, words in head.items()):
+        raise InvalidInputError(f"{path}: expected the lines 'sizes ...', 'dummies yes' or 'dummies no', 'tuples N'")
+    if head["dummies"][1:] not in (["yes"], ["no"]):
+        raise InvalidInputError(f"{path}: expected 'dummies yes' or 'dummies no', got {lines[2]:.40}")
+    try:
+        sizes = np.array(head["sizes"][1:], dtype=np.int64)
+        count = int(head["tuples"][1])
+    except (ValueError, OverflowError, IndexError):
+        raise InvalidInputError(f"{path}: sizes and the number of tuples must be whole numbers") from None
+    if count != len(lines) - 4:
+        raise InvalidInputError(f"{path}: announces {count} tuples and has {len(lines) - 4}")
+    table = np.zeros((0, 1 + sizes.size))
+    if count:
+        try:
+            table = np.loadtxt(io.StringIO("\n".join(lines[4:])), dtype=np.float64, comments=None, ndmin=2)
+        except ValueError as error:
+            raise InvalidInputError(f"{path}: tuples: {str(error).splitlines()[0]:.100}") from None
+    if table.shape[1] != 1 + sizes.size:
+        raise InvalidInputError(f"{path}: tuples: expected a cost and {sizes.size} indices in each line")
+    tuples = table[:, 1:].astype(np.int64)
+    if (tuples != table[:, 1:]).any():
+        raise InvalidInputError(f"{path}: tuples: indices must be whole numbers")
+    return {"tuples": tuples, "costs": table[:, 0], "sizes": sizes, "dummy": head["dummies"][1] == "yes"}

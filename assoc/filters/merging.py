@@ -1,0 +1,72 @@
+"""Several states of one target merged into one, with the same mean and covariance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.filters.imm import Mixture
+from assoc.filters.state import Gaussian, gaussian
+
+
+def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
+    """Match the moments of weighted mixtures.
+
+    Of states that are mixtures of models, models are merged each by itself: they stay what they are.
+
+    Parameters
+    ----------
+    states : Gaussian or Mixture
+        K of them.
+    target : int array (K,)
+        Whose they are, from 0; every target has one at least.
+    weights : array (K,)
+        0 or more; those of one target sum to 1.
+    count : int
+        Number of targets, B.
+
+    Returns
+    -------
+    Gaussian or Mixture
+        B of them.
+
+    Raises
+    ------
+    InvalidInputError
+        States of another kind.
+
+    References
+    ----------
+    Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 1.4.16.
+    """
+    if isinstance(states, Gaussian):
+        return gaussian(*_matched(states.mean, states.covariance, target, weights, count))
+    if not isinstance(states, Mixture):
+        raise InvalidInputError(
+            f"filter: states of the kind {type(states).__name__} cannot be merged; use a Kalman filter, extended or "
+            "unscented, or interacting multiple models"
+        )
+    modes = states.weights.shape[1]
+    each = weights[:, None] * states.weights
+    total = _sums(each, target, count)
+    # a model that nothing speaks for is merged all the same
+    share = np.where(total[target] > 0.0, each / np.maximum(total[target], 1e-300), weights[:, None])
+    parts = [_matched(states.means[:, j], states.covariances[:, j], target, share[:, j], count) for j in range(modes)]
+    means, covariances = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
+    return Mixture(means, covariances, total / total.sum(axis=1, keepdims=True))
+
+
+def _matched(mean: Array, covariance: Array, target: Array, weights: Array, count: int) -> tuple[Array, Array]:
+    whole = _sums(weights[:, None] * mean, target, count)
+    away = mean - whole[target]
+    spread = covariance + away[:, :, None] * away[:, None, :]
+    return whole, _sums(weights[:, None, None] * spread, target, count)
+
+
+def _sums(values: Array, target: Array, count: int) -> Array:
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, target, values)
+    return total

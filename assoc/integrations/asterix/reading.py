@@ -1,0 +1,240 @@
+"""Plots (category 048), what radars say of themselves (034) and ADS-B reports (021) as recordings."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
+from assoc.recordings.altitude import garbled_altitudes
+from assoc.recordings.columns import DAY, FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.recordings.recording import UNDECODED, Recording
+from assoc.scene.geodesy import east_north_up
+
+SECOND = 1.0 / 128.0
+"""Step of times of day."""
+RANGE_STEP, ANGLE_STEP = NAUTICAL_MILE / 256.0, 2.0 * math.pi / 65536.0
+"""Steps of measured positions in category 048."""
+LEVEL_STEP = 0.25 * FLIGHT_LEVEL
+_FINE, _COARSE = math.pi / 2**30, math.pi / 2**23
+_CATEGORIES = (21, 34, 48)
+
+Source = tuple[int, int]
+"""System area code and system identification code of a radar or ground station."""
+
+
+@dataclass(frozen=True)
+class RadarNote:
+    """What a radar said of itself (category 034).
+
+    Attributes
+    ----------
+    norths : array (n,)
+        When the antenna passed north, seconds of the recording.
+    rotation : float or None
+        Seconds for a turn, as it said last.
+    place : tuple of latitude, longitude, height, or None
+        Radians, metres above the ellipsoid.
+    """
+
+    norths: Array
+    rotation: float | None = None
+    place: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class AsterixContent:
+    """What a file holds.
+
+    Attributes
+    ----------
+    plots : dict of (SAC, SIC) to Recording
+        Of each radar; `Recording.addresses` are the aircraft's ICAO addresses.
+    adsb : dict of (SAC, SIC) to Recording
+        Reports of each ground station, as seen from `origin`.
+    radars : dict of (SAC, SIC) to RadarNote
+    origin : tuple of latitude, longitude, height, or None
+        From where ADS-B reports are seen.
+    notes : dict of str to int
+        What could not be read, and how much of it.
+    """
+
+    plots: Mapping[Source, Recording]
+    adsb: Mapping[Source, Recording]
+    radars: Mapping[Source, RadarNote]
+    origin: tuple[float, float, float] | None = None
+    notes: Mapping[str, int] = field(default_factory=dict)
+
+
+class SourceRows:
+    """Rows of one source, with times of day that run on over midnight."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[float, ...]] = []
+        self.day = self.latest = 0.0
+
+    def time(self, raw: int) -> float:
+        """Seconds of the recording at a time of day."""
+        running = raw * SECOND + self.day
+        if self.rows and running < self.latest - DAY / 2:
+            self.day += DAY
+            running += DAY
+        elif self.day and running > self.latest + DAY / 2:
+            # a late one, of before midnight
+            running -= DAY
+        self.latest = max(self.latest, running) if self.rows else running
+        return running
+
+    def columns(self) -> list[Array]:
+        """Columns in the order of the first, the time."""
+        table = np.array(self.rows, dtype=np.float64)
+        return list(table[np.argsort(table[:, 0], kind="stable")].T)
+
+
+def read_asterix(
+    path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None
+) -> AsterixContent:
+    """Read a file of ASTERIX data blocks, plain or in the UDP packets of a pcap.
+
+    Parameters
+    ----------
+    path : path-like
+    origin : tuple of latitude, longitude, height, optional
+        From where ADS-B reports are seen, radians and metres; by default the place of the first report, on the ground.
+
+    Returns
+    -------
+    AsterixContent
+        Times are seconds of the day, and run on over midnight. Identities are Mode 3/A codes (12 bits as a number,
+        0 not decoded). A file that is cut, or holds what cannot be decoded, gives what can be, and notes of the rest.
+
+    Raises
+    ------
+    InvalidInputError
+        The file cannot be read, or holds no plot and no report.
+    MissingExtraError
+        libasterix is not installed.
+    """
+    content = read_bytes(path)
+    notes: dict[str, int] = {}
+    plots: dict[Source, SourceRows] = {}
+    reports: dict[Source, SourceRows] = {}
+    radars: dict[Source, dict[str, Any]] = {}
+    clocks: dict[Source, SourceRows] = {}
+    for block in data_blocks(content, notes):
+        if block.category not in _CATEGORIES:
+            what = f"data blocks of category {block.category:03d}"
+            notes[what] = notes.get(what, 0) + 1
+            continue
+        for record in records(block, notes):
+            sac, sic = value(record, "010", "SAC"), value(record, "010", "SIC")
+            if sac is None or sic is None:
+                notes["records without a source"] = notes.get("records without a source", 0) + 1
+                continue
+            source = (sac, sic)
+            if block.category == 34:
+                radar, clock = radars.setdefault(source, {"norths": []}), clocks.setdefault(source, SourceRows())
+                _take_service(record, radar, clock)
+                continue
+            row, kept = (_plot, plots) if block.category == 48 else (_report, reports)
+            rows = kept.setdefault(source, SourceRows())
+            found = row(record, rows)
+            if found is None:
+                what = f"records of category {block.category:03d} without time or position"
+                notes[what] = notes.get(what, 0) + 1
+            else:
+                rows.rows.append(found)
+    if not any(rows.rows for rows in (*plots.values(), *reports.values())):
+        said = "; ".join(f"{count} {what}" for what, count in notes.items())
+        raise InvalidInputError(
+            f"{os.fspath(path)}: holds no ASTERIX plots (048) or reports (021){': ' + said if said else ''}"
+        )
+    name = os.path.basename(os.fspath(path))
+    seen_from = origin
+    if seen_from is None:
+        first = next((rows.rows[0] for rows in reports.values() if rows.rows), None)
+        seen_from = None if first is None else (first[1], first[2], 0.0)
+    return AsterixContent(
+        {source: _recording(rows, name, notes) for source, rows in plots.items() if rows.rows},
+        {source: _seen(rows, seen_from, name, notes) for source, rows in reports.items() if rows.rows and seen_from},
+        {source: RadarNote(np.sort(one.pop("norths")), **one) for source, one in radars.items()},
+        seen_from,
+        notes,
+    )
+
+
+def _plot(record: Any, rows: SourceRows) -> tuple[float, ...] | None:
+    """Time, range, azimuth, identity, altitude, whether it is garbled, address."""
+    time, rho, theta = value(record, "140"), value(record, "040", "RHO"), value(record, "040", "THETA")
+    if time is None or rho is None or theta is None:
+        return None
+    level = value(record, "090", "FL")
+    doubtful = bool(value(record, "090", "V") or value(record, "090", "G"))
+    altitude = math.nan if level is None else signed(level, 14) * LEVEL_STEP
+    return (
+        rows.time(time), rho * RANGE_STEP, math.pi / 2 - theta * ANGLE_STEP, _identity(record, "070"), altitude,
+        float(doubtful), float(value(record, "220") or 0),
+    )  # fmt: skip
+
+
+def _identity(record: Any, item: str) -> float:
+    code = value(record, item, "MODE3A")
+    if code is None:
+        code = value(record, item)
+    if code is None or value(record, item, "V") or value(record, item, "G"):
+        return float(UNDECODED)
+    return float(code & 0o7777)
+
+
+def _report(record: Any, rows: SourceRows) -> tuple[float, ...] | None:
+    """Time, latitude, longitude, identity, altitude, address of an ADS-B report."""
+    time = next((t for t in (value(record, item) for item in ("071", "073", "077")) if t is not None), None)
+    for item, bits, step in (("131", 32, _FINE), ("130", 24, _COARSE)):
+        lat, lon = value(record, item, "LAT"), value(record, item, "LON")
+        if time is not None and lat is not None and lon is not None:
+            level = value(record, "145")
+            altitude = math.nan if level is None else signed(level, 16) * LEVEL_STEP
+            place = (signed(lat, bits) * step, signed(lon, bits) * step)
+            code = value(record, "070")
+            return (rows.time(time), *place, float(code or 0), altitude, float(value(record, "080") or 0))
+    return None
+
+
+def _take_service(record: Any, radar: dict[str, Any], clock: SourceRows) -> None:
+    kind, time, turn = value(record, "000"), value(record, "030"), value(record, "041")
+    if kind == 1 and time is not None:
+        now = clock.time(time)
+        clock.rows.append((now,))
+        radar["norths"].append(now)
+    if turn:
+        radar["rotation"] = turn * SECOND
+    height, lat, lon = (value(record, "120", name) for name in ("HGT", "LAT", "LON"))
+    if height is not None and lat is not None and lon is not None:
+        radar["place"] = (signed(lat, 24) * _COARSE, signed(lon, 24) * _COARSE, float(signed(height, 16)))
+
+
+def _recording(rows: SourceRows, name: str, notes: Mapping[str, int]) -> Recording:
+    times, ranges, azimuths, identities, altitudes, doubtful, addresses = rows.columns()
+    known = identities.astype(np.int64)
+    return Recording(
+        times=times, ranges=ranges, azimuths=azimuths, identities=known, altitudes=altitudes,
+        garbled=(doubtful > 0) | garbled_altitudes(altitudes / FLIGHT_LEVEL, known, ()),
+        addresses=addresses.astype(np.int64), notes=dict(notes), name=name,
+    )  # fmt: skip
+
+
+def _seen(rows: SourceRows, origin: tuple[float, float, float], name: str, notes: Mapping[str, int]) -> Recording:
+    times, lat, lon, identities, altitudes, addresses = rows.columns()
+    place = east_north_up(lat, lon, np.nan_to_num(altitudes), origin)
+    return Recording(
+        times=times, ranges=np.linalg.norm(place, axis=1), azimuths=np.arctan2(place[:, 1], place[:, 0]),
+        identities=identities.astype(np.int64), altitudes=altitudes, addresses=addresses.astype(np.int64),
+        notes=dict(notes), name=name,
+    )  # fmt: skip

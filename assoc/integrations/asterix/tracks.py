@@ -1,0 +1,115 @@
+"""Tracks as ASTERIX, category 062: written from a table of tracks, and read back."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assoc._system.extras import check_extra
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
+from assoc.integrations.asterix.reading import Source, SourceRows
+from assoc.integrations.asterix.writing import check_source, time_of_day, write_blocks
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PLACE_STEP, SPEED_STEP, HEIGHT_STEP, CLIMB_STEP = 0.5, 0.25, 6.25 * 0.3048, 6.25 * 0.3048 / 60.0
+"""Steps of the category: metres, m/s, metres (6.25 ft), m/s (6.25 ft a minute)."""
+COLUMNS = ("track_id", "time", "x", "y", "z", "vx", "vy", "vz", "confirmed")
+_STEPS = {"x": (PLACE_STEP, 24), "y": (PLACE_STEP, 24), "z": (HEIGHT_STEP, 16)}
+_STEPS |= {"vx": (SPEED_STEP, 16), "vy": (SPEED_STEP, 16), "vz": (CLIMB_STEP, 16)}
+MOST_TRACKS = 65536
+
+
+def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Source = (0, 1)) -> None:
+    """Write a table of tracks as category 062: system positions (x, y), height, velocity, climb, number, status.
+
+    Parameters
+    ----------
+    path : path-like
+    tracks : DataFrame
+        Columns track_id, time, x, y, z, vx, vy, vz (tracks.csv, `assoc.tracking.TrackTable.to_frame`), and confirmed
+        where it is known. Track numbers have 16 bits: ids are taken modulo 65,536.
+    source : (int, int)
+        System area code and system identification code of the tracker.
+
+    Raises
+    ------
+    InvalidInputError
+        A column is missing, a value does not fit the category, or the file cannot be written.
+    MissingExtraError
+        libasterix is not installed.
+    """
+    check_extra("asterix", "asterix")
+    check_source(source)
+    for name in COLUMNS[:-1]:
+        if name not in tracks:
+            raise InvalidInputError(f"tracks: the column {name!r} is missing")
+    raw = {}
+    for name, (step, bits) in _STEPS.items():
+        values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
+        most = 1 << (bits - 1)
+        if len(values) and not ((values >= -most) & (values < most)).all():
+            expected = f"expected at most {most * step:g} in size"
+            raise InvalidInputError(f"tracks: {name} does not fit category 062, {expected}")
+        raw[name] = values.astype(np.int64) & ((1 << bits) - 1)
+    known = tracks["confirmed"].to_numpy() if "confirmed" in tracks else np.ones(len(tracks), dtype=bool)
+    contents: list[dict[str, Any]] = []
+    for k, (number, time) in enumerate(zip(tracks["track_id"].tolist(), tracks["time"].tolist(), strict=True)):
+        contents.append(
+            {
+                "010": (("SAC", source[0]), ("SIC", source[1])),
+                "070": time_of_day(time),
+                "040": int(number) % MOST_TRACKS,
+                "080": ((0, 0, 0, 0, ("CNF", 0 if known[k] else 1), None),),
+                "100": (("X", int(raw["x"][k])), ("Y", int(raw["y"][k]))),
+                "185": (("VX", int(raw["vx"][k])), ("VY", int(raw["vy"][k]))),
+                "130": int(raw["z"][k]),
+                "220": int(raw["vz"][k]),
+            }
+        )
+    write_blocks(path, 62, contents)
+
+
+def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
+    """Read tracks of category 062 that have a time, a number and a system position.
+
+    Returns
+    -------
+    DataFrame
+        Columns track_id, time, x, y, z, vx, vy, vz, confirmed; metres, m/s, seconds of the day that run on over
+        midnight; NaN where nothing was said.
+
+    Raises
+    ------
+    InvalidInputError
+        The file cannot be read, or holds no tracks.
+    """
+    import pandas as pd
+
+    notes: dict[str, int] = {}
+    clock, found = SourceRows(), []
+    for block in data_blocks(read_bytes(path), notes):
+        if block.category != 62:
+            continue
+        for record in records(block, notes):
+            time, number = value(record, "070"), value(record, "040")
+            x, y = value(record, "100", "X"), value(record, "100", "Y")
+            if time is None or number is None or x is None or y is None:
+                continue
+            parts = {"x": x, "y": y, "z": value(record, "130"), "vz": value(record, "220")}
+            parts |= {"vx": value(record, "185", "VX"), "vy": value(record, "185", "VY")}
+            now = clock.time(time)
+            clock.rows.append((now,))
+            said = {
+                name: np.nan if parts[name] is None else signed(int(parts[name] or 0), bits) * step
+                for name, (step, bits) in _STEPS.items()
+            }
+            found.append({"track_id": number, "time": now, **said, "confirmed": value(record, "080", "CNF") != 1})
+    if not found:
+        said_of = "; ".join(f"{count} {what}" for what, count in notes.items())
+        raise InvalidInputError(f"{os.fspath(path)}: holds no ASTERIX tracks (062){': ' + said_of if said_of else ''}")
+    return pd.DataFrame(found, columns=list(COLUMNS))

@@ -1,0 +1,126 @@
+"""The open nodes of a depth-first branch and bound.
+
+A node is a set of columns (a piece of the arena), for each row whether it may stay uncovered, and the basis and the
+multipliers from which its linear program starts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.packing import Packing
+from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.program import Allowed
+
+_DEPTH = 64
+
+
+class Stack(NamedTuple):
+    """The stack of open nodes as kernels take it; see `OpenNodes`."""
+
+    arena: NDArray[np.int32]
+    first: NDArray[np.int64]
+    size: NDArray[np.int64]
+    slack: NDArray[np.bool_]
+    bound: NDArray[np.float64]
+    variable: NDArray[np.int32]
+    duals: NDArray[np.float64]
+
+
+class OpenNodes:
+    """A stack of nodes in arrays that grow; at first the root alone.
+
+    Attributes
+    ----------
+    arrays : Stack
+        ``arena``: columns of all open nodes; ``first``, ``size``: node t has the columns
+        ``arena[first[t]:first[t] + size[t]]``; ``slack``, shape (depth, R): which of its rows may stay uncovered;
+        ``bound``: no solution of the node weighs less; ``variable``, ``duals``, shape (depth, rows of the program):
+        its basis and the multipliers of that.
+    count : int
+        Number of open nodes.
+    given_up : float
+        No solution of the nodes that were given up for want of memory weighs less; ``inf``: none was.
+    """
+
+    def __init__(self, packing: Packing, duals: Floats) -> None:
+        num, rows = packing.num_columns, packing.num_rows
+        self.arrays = Stack(
+            arena=np.empty(max(8 * num, 1024), dtype=np.int32),
+            first=np.zeros(_DEPTH, dtype=np.int64),
+            size=np.zeros(_DEPTH, dtype=np.int64),
+            slack=np.zeros((_DEPTH, rows), dtype=np.bool_),
+            bound=np.full(_DEPTH, -np.inf),
+            variable=np.zeros((_DEPTH, rows), dtype=np.int32),
+            duals=np.zeros((_DEPTH, rows)),
+        )
+        self.arrays.arena[:num] = np.arange(num)
+        self.arrays.size[0] = num
+        self.arrays.slack[0] = packing.slack
+        # anchors alone
+        self.arrays.variable[0] = num + rows + np.arange(rows)
+        self.arrays.duals[0] = duals
+        self.count = 1
+        self.given_up = math.inf
+
+    @property
+    def least_bound(self) -> float:
+        """No solution of any node that is open or was given up weighs less; ``inf`` where there is none."""
+        return min(self.given_up, float(self.arrays.bound[: self.count].min()) if self.count else math.inf)
+
+    def give_up(self) -> None:
+        """Give up the deepest node, and keep its bound."""
+        self.count -= 1
+        self.given_up = min(self.given_up, float(self.arrays.bound[self.count]))
+
+    def grow(self, memory_allows: Callable[[float], bool]) -> None:
+        """Double the room; where there is no memory for that, give up the deepest node.
+
+        The search is depth first: its nodes are few, but on problems of a million columns each is large, and it may
+        go down for hours. Without the deepest node it goes on, beside and above that, in the memory that it has.
+        """
+        grown = sum(array.nbytes for array in self.arrays)
+        # the old arrays beside the new ones
+        if not memory_allows(3.0 * grown):
+            self.give_up()
+            return
+        self.arrays = Stack(*(np.concatenate([array, np.zeros_like(array)]) for array in self.arrays))
+
+
+@njit
+def has_room(stack: Stack, top: int) -> bool:
+    """Whether there is room for two children in the place of the node at ``top``."""
+    return top + 2 < stack.first.size and stack.first[top] + 2 * stack.size[top] <= stack.arena.size
+
+
+@njit
+def take_node(stack: Stack, top: int, node: Allowed) -> int:
+    """Make the node at ``top`` the one at work; how many columns it has."""
+    num = stack.size[top]
+    node.active[:num] = stack.arena[stack.first[top] : stack.first[top] + num]
+    node.slack[:] = stack.slack[top]
+    node.columns[:] = False
+    for j in node.active[:num]:
+        node.columns[j] = True
+    return num
+
+
+@njit
+def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float) -> None:
+    """Put a node on top of those below ``top``; its columns follow theirs."""
+    place = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0
+    num = node.active.size
+    stack.first[top] = place
+    stack.size[top] = num
+    stack.arena[place : place + num] = node.active
+    stack.slack[top] = node.slack
+    stack.bound[top] = lower
+    stack.variable[top] = basis.variable
+    stack.duals[top] = basis.duals

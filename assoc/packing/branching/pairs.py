@@ -1,0 +1,241 @@
+"""Which pair of measurements to branch on: tried on both sides by some steps of the simplex method.
+
+Branching asks of two measurements of different sensors whether they have the same source (the rule of Ryan and
+Foster for set partitioning). *Together* drops the columns with only one of them and makes both a duty, *apart* those
+with both: a mask on the columns, no new row. In the LP's solution the answer is in doubt where the columns with both
+add up to something between 0 and 1. Pairs with the greatest doubt are tried (strong branching); what was gained is
+kept for each pair, so that pairs that were tried often enough elsewhere in the tree are judged by that (pseudo-costs).
+
+References
+----------
+D. M. Ryan and B. A. Foster, "An integer programming approach to scheduling", in Computer Scheduling of Public
+Transport (1981), 269-280.
+T. Achterberg, T. Koch, A. Martin, "Branching rules revisited", Operations Research Letters 33 (2005), 42-54.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import is_over
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.simplex.basis import Basis, copy_basis, new_basis
+from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, restart, solve_dual
+from assoc.packing.simplex.program import Allowed, Program, certified, make_feasible
+
+# pairs tried at a node at the most, and in a row without a better one; steps of the simplex method for each side
+_CANDIDATES = 16
+_IN_VAIN = 5
+_EXCHANGES = 50
+# trials of a pair after which what they gained is believed
+_RELIABLE = 2
+# an LP value this near to a whole number is one
+WHOLE = 1e-6
+# what `decide` says in place of a pair: one side holds nothing better, so that the other one is what is left
+NEITHER, TOGETHER, APART = -1, -2, -3
+
+
+class Trials(NamedTuple):
+    """What trials of pairs need and what they have gained.
+
+    Attributes
+    ----------
+    mass : float array, shape (R, R)
+        Room: how much the columns with both rows add up to; 0 between calls.
+    gain, tried : float32 array, shape (2, R, R), and uint8 array of the same shape
+        Mean gain of the bound for each unit of the LP's values that a side forbids; side 0: apart, 1: together.
+    pairs, values : int32 array, shape (K, 2), float array, shape (K,)
+        The pairs in doubt, the most doubtful first, and their mass.
+    basis : Basis
+        Of the side that is tried.
+    side : Allowed
+        What that side allows; its ``active`` is room.
+    duals : float array, shape (R,)
+        Its multipliers.
+    """
+
+    mass: NDArray[np.float64]
+    gain: NDArray[np.float32]
+    tried: NDArray[np.uint8]
+    pairs: NDArray[np.int32]
+    values: Floats
+    basis: Basis
+    side: Allowed
+    duals: Floats
+
+
+@njit
+def new_trials(program: Program) -> Trials:
+    """Room for trials; nothing is known of any pair."""
+    num, size = program.weights.size, program.sides.size
+    return Trials(
+        np.zeros((size, size)), np.zeros((2, size, size), np.float32), np.zeros((2, size, size), np.uint8),
+        np.zeros((_CANDIDATES, 2), np.int32), np.zeros(_CANDIDATES), new_basis(program),
+        Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(size, np.bool_)), np.empty(size),
+    )  # fmt: skip
+
+
+@njit
+def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
+    """Whether column j is no longer allowed where two rows are together (no column may have only one) or apart."""
+    uses = 0
+    for s in range(cols.shape[1]):
+        if cols[j, s] == one or cols[j, s] == two:
+            uses += 1
+    return uses == 1 if joined else uses == 2
+
+
+@njit
+def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
+    """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
+    side.columns[:] = False
+    side.slack[:] = allowed.slack
+    one, two = pair
+    if joined:
+        side.slack[one] = False
+        side.slack[two] = False
+    count = 0
+    for j in allowed.active:
+        if not is_dropped(cols, j, one, two, joined):
+            side.active[count] = j
+            side.columns[j] = True
+            count += 1
+    return count
+
+
+@njit
+def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
+    """Find the pairs of rows whose answer is most in doubt in the LP's solution; how many there are."""
+    mass, pairs, values = trials.mass, trials.pairs, trials.values
+    num, num_sensors = cols.shape
+    count = 0
+    for clear in range(2):
+        for i in range(basis.variable.size):
+            j = basis.variable[i]
+            if j >= num or not WHOLE < basis.values[i] < 1.0 - WHOLE:
+                continue
+            for s in range(num_sensors):
+                for t in range(s + 1, num_sensors):
+                    one, two = cols[j, s], cols[j, t]
+                    if one < 0 or two < 0:
+                        continue
+                    if one > two:
+                        one, two = two, one
+                    if not clear:
+                        mass[one, two] += basis.values[i]
+                        continue
+                    value = mass[one, two]
+                    # each pair once
+                    mass[one, two] = 0.0
+                    if not WHOLE < value < 1.0 - WHOLE:
+                        continue
+                    doubt = value * (1.0 - value)
+                    place = count
+                    if count < values.size:
+                        count += 1
+                    elif doubt <= values[count - 1] * (1.0 - values[count - 1]):
+                        continue
+                    else:
+                        place = count - 1
+                    while place > 0 and values[place - 1] * (1.0 - values[place - 1]) < doubt:
+                        values[place] = values[place - 1]
+                        pairs[place] = pairs[place - 1]
+                        place -= 1
+                    values[place] = value
+                    pairs[place, 0], pairs[place, 1] = one, two
+    return count
+
+
+@njit
+def _try(
+    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, which: Any, effort: Effort
+) -> Any:
+    """Try one side of a pair; how it ended, and the bound that the multipliers give (to rounding)."""
+    pair, joined = which
+    copy_basis(basis, trials.basis)
+    count = answer(cols, allowed, pair, joined, trials.side)
+    side = Allowed(trials.side.active[:count], trials.side.columns, trials.side.slack)
+    restart(program, side, trials.basis)
+    status, _ = solve_dual(program, side, trials.basis, effort)
+    if status == CUT or status == INFEASIBLE:
+        # to be believed it must hold
+        trials.duals[:] = trials.basis.duals
+        make_feasible(program, side, trials.duals)
+        return status, certified(program, side, trials.duals)
+    bound = 0.0
+    for r in range(program.sides.size):
+        bound += program.sides[r] * trials.basis.duals[r]
+    return status, bound
+
+
+@njit
+def decide(
+    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
+) -> Any:
+    """Choose one of the doubtful pairs; it and what is to be done with it.
+
+    Returns
+    -------
+    int, int
+        The place of the pair, and `NEITHER` (branch), or `TOGETHER` or `APART`: the only side with anything better.
+    """
+    bound = 0.0
+    for r in range(program.sides.size):
+        bound += program.sides[r] * basis.duals[r]
+    gap = effort.cutoff - bound
+    pick, best, in_vain = 0, -1.0, 0
+    gains = np.empty(2)
+    trial = Effort(effort.cutoff, _EXCHANGES, effort.deadline)
+    for i in range(count):
+        if in_vain >= _IN_VAIN or (i > 0 and is_over(effort.deadline)):
+            break
+        one, two = trials.pairs[i]
+        value = trials.values[i]
+        for joined in range(2):
+            share = 1.0 - value if joined else value
+            known = trials.tried[joined, one, two]
+            if known >= _RELIABLE:
+                gains[joined] = trials.gain[joined, one, two] * share
+                continue
+            status, reached = _try(program, cols, allowed, basis, trials, ((one, two), joined == 1), trial)
+            if reached >= effort.cutoff:
+                return i, APART if joined else TOGETHER
+            gain = max(reached - bound, 0.0)
+            gains[joined] = gain
+            mean = trials.gain[joined, one, two]
+            trials.gain[joined, one, two] = mean + (gain / share - mean) / (known + 1.0)
+            trials.tried[joined, one, two] = known + 1
+        score = min(max(gains[0], 1e-4 * gap), gap) * min(max(gains[1], 1e-4 * gap), gap)
+        if score > best:
+            pick, best, in_vain = i, score, 0
+        else:
+            in_vain += 1
+    return pick, NEITHER
+
+
+@njit
+def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
+    """Return two rows that one column has together and another one not; -1, -1: there are none.
+
+    Columns that share a row are then the same: the lightest of each kind can be taken.
+    """
+    counts[:] = 0
+    for j in allowed.active:
+        for s in range(cols.shape[1]):
+            if cols[j, s] >= 0:
+                counts[cols[j, s]] += 1
+    for j in allowed.active:
+        for s in range(cols.shape[1]):
+            for t in range(s + 1, cols.shape[1]):
+                one, two = cols[j, s], cols[j, t]
+                if one >= 0 and two >= 0 and (counts[one] > 1 or counts[two] > 1):
+                    both = 0
+                    for i in allowed.active:
+                        both += is_dropped(cols, i, one, two, False)
+                    if both < counts[one] or both < counts[two]:
+                        return int(one), int(two)
+    return -1, -1

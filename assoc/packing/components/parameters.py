@@ -1,0 +1,44 @@
+"""Parameters that all searches by components have. Imports nothing slow: ``--help`` reads it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from assoc._parameters import Parameters
+
+REFINEMENTS = ("none", "local", "full")
+
+
+@dataclass(frozen=True)
+class SearchParameters(Parameters):
+    """How long `search_components` searches, and how much it does besides the metaheuristic.
+
+    Attributes
+    ----------
+    iterations : int
+        Iterations (cycles, generations) on one component at the most.
+    patience : int
+        A component is left after so many iterations without improvement.
+    refinement : str
+        What improves the metaheuristic's covers. "none": nothing, the metaheuristic is alone; "local": insertion with
+        ejection, and matching halves of all tuples anew; "full": exact sub-steps and large neighbourhoods, too.
+    clusters : int
+        With refinement "full": exact sub-steps on each new cover, and for every 30 measurements on the best cover after
+        each iteration.
+    workers : int
+        Searches at a time on each component, on threads, which exchange their best covers after every iteration. The
+        result depends on the seed and on their number.
+    """
+
+    iterations: int = field(default=1000, metadata={"help": "iterations on one component at the most"})
+    patience: int = field(default=150, metadata={"help": "iterations without improvement before a component is left"})
+    refinement: str = field(
+        default="full", metadata={"help": "what improves covers: none, local search, or full (exact sub-steps, too)"}
+    )
+    clusters: int = field(default=10, metadata={"help": "exact sub-steps on each new cover (refinement full)"})
+    workers: int = field(default=1, metadata={"help": "searches at a time, on threads, that exchange their best"})
+
+    def __post_init__(self) -> None:
+        self._whole("iterations", "patience", "clusters")
+        self._whole("workers", most=1000)
+        self._require(self.refinement in REFINEMENTS, "refinement", ", ".join(REFINEMENTS))

@@ -1,0 +1,87 @@
+"""Several searchers on copies of one component, each on a thread of its own: they exchange their best covers.
+
+In every round each member does one iteration, and what it found is refined; then all take over the best cover of the
+round. Members have random generators of their own and wait for one another, so that the result is a matter of the seed
+and of their number, and not of which was quicker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from assoc.packing.components.component import Component
+from assoc.packing.run import Run
+
+
+class Searcher(Protocol):
+    """A metaheuristic at work on one component."""
+
+    def iterate(self, component: Component, rng: np.random.Generator) -> None:
+        """Do one iteration and ``offer`` what it finds to the component."""
+
+
+Make = Callable[[Component, np.random.Generator], Searcher]
+
+
+class Team:
+    """One searcher, or several, on one component.
+
+    Parameters
+    ----------
+    make : callable
+        Makes a searcher.
+    component : Component
+        Gets the best cover of all.
+    run : Run
+    clusters : int
+        As in `SearchParameters`.
+    workers : int
+    pool : ThreadPoolExecutor, optional
+        With as many threads; none for a single worker.
+    """
+
+    def __init__(
+        self,
+        make: Make,
+        component: Component,
+        run: Run,
+        clusters: int,
+        workers: int,
+        pool: ThreadPoolExecutor | None,
+    ) -> None:
+        self._component, self._clusters, self._pool = component, clusters, pool
+        if pool is None:
+            self._members = [(component, make(component, run.rng), run)]
+            return
+        self._members = []
+        for number, rng in enumerate(run.rng.spawn(workers)):
+            own = replace(component, worker=number, _searches={}, _diver=None)
+            # a run of its own: the same clock, another generator
+            aside = Run(rng, time_limit=run.time_limit, started=run.started)
+            self._members.append((own, make(own, rng), aside))
+
+    def iterate(self) -> None:
+        """One iteration of every member, and what it found refined; the best goes to the component and to all."""
+        if self._pool is None:
+            self._step(0)
+            return
+        whole = self._component
+        for own, _, _ in self._members:
+            own.iterations, own.stalled = whole.iterations, whole.stalled
+        list(self._pool.map(self._step, range(len(self._members))))
+        for own, _, _ in self._members:
+            if own.best is not None:
+                whole.offer(own.best, own.weight)
+        for own, _, _ in self._members:
+            if whole.best is not None:
+                own.offer(whole.best, whole.weight)
+
+    def _step(self, number: int) -> None:
+        component, searcher, run = self._members[number]
+        searcher.iterate(component, run.rng)
+        component.refine(run, self._clusters)

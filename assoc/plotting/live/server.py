@@ -1,0 +1,194 @@
+"""The page's server: the standard library's, on 127.0.0.1 only; pictures are pushed as server-sent events.
+
+Nothing leaves the machine: requests that were addressed to another host are refused (a page of another site whose name
+points here), and the page may load nothing from elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+from assoc.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from assoc.tracking import Picture
+
+_FOLDER = Path(__file__).parent
+_FILES = {
+    "/": ("page.html", "text/html"),
+    "/live.js": ("live.js", "text/javascript"),
+    "/live.css": ("live.css", "text/css"),
+}
+_POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
+# pictures that may wait for a browser that is too slow; then it misses some
+_WAITING = 50
+_BEAT = 10.0
+# digits: centimetres
+_DIGITS = 2
+
+
+class LivePage:
+    """A page that shows the picture moving.
+
+    Parameters
+    ----------
+    scene : Scene
+        Sensors and region.
+    port : int
+        On 127.0.0.1; 0: any that is free.
+    title : str
+
+    Raises
+    ------
+    InvalidInputError
+        The port cannot be used.
+    """
+
+    def __init__(self, scene: Scene, port: int = 0, title: str = "") -> None:
+        first = {
+            "title": title,
+            "region": scene.region.tolist(),
+            "sensors": [[one.name or str(s), *one.position[:2].tolist()] for s, one in enumerate(scene.sensors, 1)],
+        }
+        self._first = _event("scene", first)
+        self._last: str | None = None
+        self._readers: set[queue.Queue[str | None]] = set()
+        self._lock = threading.Lock()
+        self._closed = False
+        page = self
+
+        class Handler(_Handler):
+            """Requests of this page."""
+
+            owner = page
+
+        try:
+            self._server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        except (OSError, OverflowError) as error:
+            raise InvalidInputError(f"--page: port {port} cannot be used ({error})") from None
+        self._server.daemon_threads = True
+        threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
+
+    @property
+    def address(self) -> str:
+        """Where a browser finds it."""
+        return f"http://127.0.0.1:{self._server.server_address[1]}/"
+
+    def show(self, picture: Picture) -> None:
+        """Push a picture to all browsers that look."""
+        tracks = [
+            [one.track_id, *np.round(one.position, _DIGITS).tolist(), *np.round(one.velocity[:2], _DIGITS).tolist()]
+            for one in picture.tracks
+        ]
+        plots = np.round(picture.plots[:, :2], _DIGITS).tolist()
+        content = {"time": picture.time, "tracks": tracks, "plots": plots, "sensors": picture.sensors.tolist()}
+        self._push(_event("picture", content | {"ended": picture.ended}))
+
+    def _push(self, event: str) -> None:
+        with self._lock:
+            self._last = event
+            readers = list(self._readers)
+        for one in readers:
+            try:
+                one.put_nowait(event)
+            except queue.Full:
+                # the newest picture is worth more than the oldest
+                one.get_nowait()
+                one.put_nowait(event)
+
+    def close(self) -> None:
+        """Tell the browsers that no more comes, and stop; a second time does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self._push(_event("end", {}))
+        with self._lock:
+            readers = list(self._readers)
+        for one in readers:
+            one.put(None)
+        self._server.shutdown()
+        self._server.server_close()
+
+    def join_reader(self) -> queue.Queue[str | None]:
+        """Return a queue of events for one more browser, what it missed first."""
+        mine: queue.Queue[str | None] = queue.Queue(_WAITING)
+        mine.put(self._first)
+        with self._lock:
+            if self._last is not None:
+                mine.put(self._last)
+            self._readers.add(mine)
+        return mine
+
+    def leave_reader(self, mine: queue.Queue[str | None]) -> None:
+        """Forget a browser that has gone."""
+        with self._lock:
+            self._readers.discard(mine)
+
+
+def _event(name: str, content: Any) -> str:
+    return f"event: {name}\ndata: {json.dumps(content)}\n\n"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    owner: ClassVar[LivePage]
+    protocol_version = "HTTP/1.1"
+
+    def do_GET(self) -> None:
+        """Answer with the page, one of its files, or the events."""
+        host = (self.headers.get("Host") or "").rsplit(":", 1)[0]
+        if host not in ("127.0.0.1", "localhost"):
+            self.send_error(403, "this page is for this machine only")
+        elif self.path in _FILES:
+            name, kind = _FILES[self.path]
+            self._answer(kind, (_FOLDER / name).read_bytes())
+        elif self.path == "/events":
+            self._events()
+        else:
+            self.send_error(404)
+
+    def _answer(self, kind: str, content: bytes) -> None:
+        self.send_response(200)
+        self._headers(f"{kind}; charset=utf-8")
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
+    def _headers(self, kind: str) -> None:
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Security-Policy", _POLICY)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cache-Control", "no-store")
+
+    def _events(self) -> None:
+        self.send_response(200)
+        self._headers("text/event-stream")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        mine = self.owner.join_reader()
+        try:
+            while True:
+                try:
+                    event = mine.get(timeout=_BEAT)
+                except queue.Empty:
+                    # finds out that the browser has gone
+                    event = ": still here\n\n"
+                if event is None:
+                    return
+                self.wfile.write(event.encode())
+                self.wfile.flush()
+        except OSError:
+            return
+        finally:
+            self.owner.leave_reader(mine)
+            self.close_connection = True
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        """Say nothing: the terminal is the tracker's."""

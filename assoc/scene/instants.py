@@ -1,0 +1,49 @@
+"""Dates and times of day as seconds."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any
+
+import numpy as np
+
+from assoc.errors import InvalidInputError
+
+
+def as_seconds(times: Any, what: str) -> Any:
+    """Turn dates into seconds since 1970-01-01 UTC, and durations into seconds; all else is returned as it is.
+
+    Taken are arrays of numpy's datetime64 and timedelta64, Python's datetimes and timedeltas, and what pandas makes
+    of them. A date without a time zone is one of UTC.
+
+    Raises
+    ------
+    InvalidInputError
+        A date is missing (NaT), or dates are mixed with numbers; the message names `what`.
+    """
+    array = np.asarray(times)
+    if array.dtype == object and array.size:
+        first = array.flat[0]
+        if not isinstance(first, (datetime.datetime, datetime.timedelta, np.datetime64, np.timedelta64)):
+            return times
+        try:
+            array = np.array([_plain(one) for one in array.flat]).reshape(array.shape)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"{what} must be all dates or all seconds, got both") from error
+    if array.dtype.kind not in "mM":
+        return times
+    if np.isnat(array).any():
+        raise InvalidInputError(f"{what} must be complete, got a date that is missing (NaT)")
+    unit = np.datetime64(0, "s") if array.dtype.kind == "M" else np.timedelta64(0, "s")
+    whole = array.astype("datetime64[us]" if array.dtype.kind == "M" else "timedelta64[us]") - unit
+    return whole.astype(np.int64) / 1e6
+
+
+def _plain(one: Any) -> np.datetime64 | np.timedelta64:
+    if isinstance(one, datetime.datetime):
+        return np.datetime64(one if one.tzinfo is None else one.astimezone(datetime.UTC).replace(tzinfo=None), "us")
+    if isinstance(one, datetime.timedelta):
+        return np.timedelta64(one, "us")
+    if isinstance(one, (np.datetime64, np.timedelta64)):
+        return one
+    raise TypeError(type(one).__name__)

@@ -1,0 +1,127 @@
+"""Where targets are between their reports: cubic curves that agree with places, and with velocities where known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.scene.geodesy import east_north_up
+from assoc.simulation.cleaning import Reports
+
+_SECOND = 1.0
+_STRANGE = 60.0
+
+
+def frame_velocities(reports: Reports, places: Array, origin: tuple[float, float, float]) -> Array:
+    """Velocities in a scene's frame from those east, north and up at each target, (n, 3), m/s; NaN where not known.
+
+    Parameters
+    ----------
+    reports : Reports
+    places : array (n, 3)
+        Where they are in the frame, metres.
+    origin : tuple of latitude, longitude, height
+        Where the frame's plane touches the ellipsoid.
+    """
+    velocity = np.full((len(reports), 3), np.nan)
+    known = ~np.isnan(reports.velocity).any(axis=1)
+    lat, lon, height = reports.latitude[known], reports.longitude[known], reports.height[known]
+    east, north, up = (_SECOND * reports.velocity[known]).T
+    # a second later, by the radii of curvature that the frame's own formula gives
+    tiny = 1e-6
+    metres_north = np.linalg.norm(east_north_up(lat + tiny, lon, height, origin) - places[known], axis=1) / tiny
+    metres_east = np.linalg.norm(east_north_up(lat, lon + tiny, height, origin) - places[known], axis=1) / tiny
+    later = east_north_up(lat + north / metres_north, lon + east / np.maximum(metres_east, 1.0), height + up, origin)
+    velocity[known] = (later - places[known]) / _SECOND
+    return velocity
+
+
+def resample(
+    reports: Reports, places: Array, times: Array, max_gap: float, velocities: Array | None = None
+) -> tuple[list[Array], list[Array]]:
+    """Positions of the targets at given times, on curves through neighbouring reports.
+
+    Between two reports a target is on the cubic curve that has their places and velocities (Hermite's). A velocity that
+    is not known, or does not fit the places, is that of the parabola through the reports beside it; where these too are
+    missing, or the curve would leave the straight line by more than a fourth of its length, the target flies straight.
+
+    Parameters
+    ----------
+    reports : Reports
+    places : array (n, 3)
+        Where they are in the scene's frame, metres.
+    times : array (K,)
+        Seconds.
+    max_gap : float
+        Between reports further apart than this (s) a target is absent.
+    velocities : array (n, 3), optional
+        In the scene's frame, m/s, NaN where not known.
+
+    Returns
+    -------
+    ids, positions : lists over times of arrays (T_k,) and (T_k, 3)
+    """
+    ids: list[list[int]] = [[] for _ in times]
+    positions: list[list[Array]] = [[] for _ in times]
+    bounds = np.flatnonzero(np.diff(reports.target)) + 1
+    for rows in np.split(np.arange(len(reports)), bounds):
+        own, target = reports.time[rows], int(reports.target[rows[0]])
+        flown = None if velocities is None else velocities[rows]
+        after = np.clip(np.searchsorted(own, times), 0, len(own) - 1)
+        before = np.where(own[after] == times, after, np.maximum(after - 1, 0))
+        gap = own[after] - own[before]
+        present = np.flatnonzero((times >= own[0]) & (times <= own[-1]) & (gap <= max_gap))
+        found = along(own, places[rows], times[present], max_gap, flown)
+        for k, place in zip(present.tolist(), found, strict=True):
+            ids[k].append(target)
+            positions[k].append(place)
+    return (
+        [np.array(one, dtype=np.int64) for one in ids],
+        [np.array(one, dtype=np.float64).reshape(-1, 3) for one in positions],
+    )
+
+
+def along(own: Array, places: Array, times: Array, max_gap: float, velocities: Array | None = None) -> Array:
+    """Positions of one target at times (k,) within its own; see `resample`."""
+    slopes = _slopes(own, places, max_gap, velocities)
+    j = np.clip(np.searchsorted(own, times), 0, len(own) - 1)
+    i = np.where(own[j] == times, j, np.maximum(j - 1, 0))
+    gap = own[j] - own[i]
+    share = np.divide(times - own[i], gap, out=np.zeros(len(times)), where=gap > 0)
+    return _on_curve(places[i], places[j], slopes[i], slopes[j], gap, share)
+
+
+def _slopes(time: Array, place: Array, max_gap: float, told: Array | None) -> Array:
+    """Velocities at the reports of one target, (n, 3)."""
+    count = len(time)
+    if count < 2:
+        return np.zeros((count, 3))
+    step = np.diff(time)
+    rate = np.diff(place, axis=0) / step[:, None]
+    near = step <= max_gap
+    slope = np.zeros((count, 3))
+    slope[:-1], slope[-1] = rate, rate[-1]
+    slope[1:][~np.append(near[1:], False)] = rate[~np.append(near[1:], False)]
+    inner = near[:-1] & near[1:]
+    share = (step[:-1] / (step[:-1] + step[1:]))[inner, None]
+    # the parabola through three reports: the nearer rate counts more
+    slope[1:-1][inner] = (1.0 - share) * rate[:-1][inner] + share * rate[1:][inner]
+    if told is not None:
+        fits = ~np.isnan(told).any(axis=1) & (np.linalg.norm(np.nan_to_num(told) - slope, axis=1) < _STRANGE)
+        slope[fits] = told[fits]
+    return slope
+
+
+def _on_curve(start: Array, end: Array, v: Array, w: Array, gap: Array, share: Array) -> Array:
+    """Points of cubic curves at shares of their way; straight where the curve would bulge too far."""
+    t = share[:, None]
+    chord = end - start
+    straight = start + t * chord
+    # deviation from the chord by the velocities' deviation from the mean velocity
+    a, b = gap[:, None] * v - chord, gap[:, None] * w - chord
+    bulge = t * (1.0 - t) * ((1.0 - t) * a - t * b)
+    length = np.linalg.norm(chord, axis=1)
+    bent = np.maximum(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)) > length
+    bulge[bent] = 0.0
+    found: Array = straight + bulge
+    return found

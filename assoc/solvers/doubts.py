@@ -1,0 +1,30 @@
+"""What is legal in a problem and almost surely a mistake: costs that are no likelihood ratios."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assoc.problem import AssignmentProblem
+
+# a few measurements may well be false alarms, all of them: two sensors must have this many
+_ENOUGH = 3
+
+
+def doubts_about_costs(problem: AssignmentProblem) -> tuple[str, ...]:
+    """Return a line where no cost speaks for a target, as with distances or likelihoods in the place of costs."""
+    several = np.count_nonzero(problem.tuples, axis=1) > 1
+    if not problem.dummy or not several.any() or np.count_nonzero(problem.sizes >= _ENOUGH) < 2:
+        return ()
+    singletons = problem.tuples[~several]
+    sensor = singletons.argmax(axis=1)
+    alone = np.full((problem.num_sensors, int(problem.sizes.max()) + 1), np.inf)
+    alone[:, 0] = 0.0
+    # one that is listed twice counts with its smaller cost
+    np.minimum.at(alone, (sensor, singletons.max(axis=1)), problem.costs[~several])
+    together = alone[np.arange(problem.num_sensors), problem.tuples[several]].sum(axis=1)
+    if (problem.costs[several] < together).any():
+        return ()
+    return (
+        f"none of the {np.count_nonzero(several)} tuples costs less than its measurements as false alarms, so that "
+        "no target can be found: expected negative log likelihood ratios, below 0 for what is likely one target",
+    )

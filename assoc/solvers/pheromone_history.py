@@ -1,0 +1,153 @@
+"""The pheromone of the ant colony cycle by cycle, for those who want to see it at work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system import memory
+from assoc._types import Floats
+from assoc.packing.packing import Packing
+from assoc.packing.prepare import prepare
+from assoc.packing.run import Callback
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+from assoc.solvers.aco.cycle import Cycle
+from assoc.solvers.aco.paper import nodes_of
+from assoc.solvers.assign import assign
+
+
+@dataclass(frozen=True, eq=False)
+class PheromoneHistory:
+    """What the ants left on the nodes, and how they saw them.
+
+    Attributes
+    ----------
+    cycles : int array (K,)
+        Numbers of the cycles, from 1. Mode mmas counts the cycles of each component: a component that was done earlier
+        keeps its last values.
+    pheromone, visibility, probability : arrays (K, N)
+        tau_j, eta_j and p_j of eq. 8 after each cycle (`Cycle`). NaN where no ant has walked: mode mmas leaves a
+        component that its bound proves at once.
+    tuples : int32 array (N, S)
+        The tuple that a node is; false alarms are the tuples with one measurement. What cannot be chosen or left
+        is no node: tuples dearer than their false alarms, and measurements that no tuple holds.
+    costs : array (N,)
+        Their costs, counted from the false alarms.
+    chosen : bool array (N,)
+        Whether the node is in the best solution found.
+    solution : Solution
+        What ``assign`` returns.
+    """
+
+    cycles: NDArray[np.int64]
+    pheromone: Floats
+    visibility: Floats
+    probability: Floats
+    tuples: NDArray[np.int32]
+    costs: Floats
+    chosen: NDArray[np.bool_]
+    solution: Solution
+
+    def top(self, nodes: int) -> PheromoneHistory:
+        """Return the history of so many nodes: what was chosen, then what has the most pheromone in the end."""
+        last = self.pheromone[-1] if len(self.pheromone) else np.zeros(len(self.tuples))
+        kept = np.lexsort((-np.nan_to_num(last), ~self.chosen))[:nodes]
+        return PheromoneHistory(
+            self.cycles,
+            self.pheromone[:, kept],
+            self.visibility[:, kept],
+            self.probability[:, kept],
+            self.tuples[kept],
+            self.costs[kept],
+            self.chosen[kept],
+            self.solution,
+        )
+
+
+def pheromone(
+    problem: AssignmentProblem,
+    *,
+    seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    time_limit: float | None = None,
+    callback: Callback | None = None,
+    watch: Callable[[Cycle], object] | None = None,
+    **parameters: Any,
+) -> PheromoneHistory:
+    """Run the ant colony and keep the pheromone, visibility and probability of every tuple after every cycle.
+
+    Parameters
+    ----------
+    problem : AssignmentProblem
+    seed, time_limit, callback, watch
+        As in ``assoc.assign``; the search is that of ``assign(problem, "aco", ...)``. With several ``workers`` the
+        first one's colony is shown.
+    **parameters
+        Of ``aco``, ``mode`` among them.
+
+    Returns
+    -------
+    PheromoneHistory
+
+    Raises
+    ------
+    InvalidInputError
+        A parameter is unknown or out of range.
+    InfeasibleError
+        The problem (without dummies) has no solution.
+    LimitExceededError
+        The cycles take more memory than there is.
+    """
+    kept: list[Cycle] = []
+
+    def keep(cycle: Cycle) -> None:
+        kept.append(cycle)
+        # once as a list and once as arrays
+        needed = 48.0 * cycle.number * cycle.pheromone.size
+        memory.require(needed, f"{cycle.number} cycles on {cycle.pheromone.size} nodes", "take fewer iterations")
+        if watch is not None:
+            watch(cycle)
+
+    solution = assign(
+        problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters
+    )
+    packing = prepare(problem).packing
+    rows, costs = nodes_of(packing)
+    tuples = _tuples(problem, packing.row_origin, rows)
+    chosen = {tuple(row) for row in solution.tuples.tolist()}
+    cycles = 1 + np.arange(max((one.number for one in kept), default=0))
+    states = _by_cycle(kept, packing, len(cycles))
+    best = np.array([tuple(row) in chosen for row in tuples.tolist()], dtype=np.bool_)
+    return PheromoneHistory(cycles, states[0], states[1], states[2], tuples, costs, best, solution)
+
+
+def _by_cycle(kept: list[Cycle], packing: Packing, count: int) -> Floats:
+    """Pheromone, visibility and probability of all nodes after each cycle, shape (3, K, N)."""
+    alone = np.full(packing.num_rows, -1, dtype=np.int64)
+    free = np.flatnonzero(packing.slack)
+    alone[free] = packing.num_columns + np.arange(free.size)
+    num = packing.num_columns + free.size
+    states = np.full((3, count, num), np.nan)
+    for one in kept:
+        nodes = np.concatenate([one.columns, alone[one.rows]])
+        states[:, one.number - 1, nodes] = np.stack([one.pheromone, one.visibility, one.probability])
+    for k in range(1, count):
+        # what had no cycle of this number is as it was
+        states[:, k] = np.where(np.isnan(states[:, k]), states[:, k - 1], states[:, k])
+    return states
+
+
+def _tuples(problem: AssignmentProblem, origin: NDArray[Any], rows: NDArray[np.int32]) -> NDArray[np.int32]:
+    """From rows (measurements counted through, -1: none) to one index for each sensor."""
+    starts = np.cumsum(problem.sizes) - problem.sizes
+    node, place = np.nonzero(rows >= 0)
+    through = np.asarray(origin)[rows[node, place]]
+    sensor = np.searchsorted(starts, through, side="right") - 1
+    # sensors without measurements start where the next one does
+    result = np.zeros((len(rows), problem.num_sensors), dtype=np.int32)
+    result[node, sensor] = through - starts[sensor] + 1
+    return result

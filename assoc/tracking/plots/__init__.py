@@ -1,0 +1,1 @@
+"""Radar plots in windows of time, instead of scans."""

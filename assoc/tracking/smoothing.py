@@ -1,0 +1,114 @@
+"""Finished tracks smoothed: each position by all measurements of its track, those before it and those after it.
+
+A tracker that decides for good which measurement is whose leaves a filter's problem. Each track is filtered again,
+from its first detection to its last, and the recursion of Rauch, Tung and Striebel runs back over it. The IMM's
+mixtures are smoothed by their moments (`assoc.filters.FixedLagSmoother`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.positions import positions_and_covariances
+from assoc.errors import InvalidInputError
+from assoc.filters.smoother import FixedLagSmoother, Window
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
+from assoc.tracking.initiation import velocity_components
+from assoc.tracking.track import Decision, Track
+from assoc.tracking.track_table import TrackTable
+from assoc.tracking.tracker import Tracker
+
+
+def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> TrackTable:
+    """Smooth the confirmed tracks of a scene.
+
+    Parameters
+    ----------
+    tracker : Tracker
+        Its filter and its way to begin tracks are used; it is not changed.
+    scene : Scene
+    decisions : sequence of Decision
+        The final decisions of all scans, see `assoc.tracking.track_scene`.
+
+    Returns
+    -------
+    TrackTable
+        One row for each track and scan, from its first detection to its last, also where scans in between missed it.
+        Its existence is 1; it has no score (NaN).
+
+    Raises
+    ------
+    InvalidInputError
+        Measurements have times of their own, or the tracker corrects biases of sensors.
+    """
+    if tracker.registration is not None:
+        raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
+    if not all(scene.scan(one.scan).at_once for one in decisions):
+        raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
+    ordered = sorted(decisions, key=lambda one: one.scan)
+    sure = {i for one in ordered for ids, known in zip(one.assigned, one.confirmed, strict=True) for i in ids[known]}
+    rows: dict[int, dict[int, Array]] = {int(i): {} for i in sorted(sure) if i > 0}
+    for one in ordered:
+        for s, ids in enumerate(one.assigned):
+            for m in np.flatnonzero(np.isin(ids, list(rows))).tolist():
+                own = rows[int(ids[m])].setdefault(one.scan, np.zeros(len(one.assigned), dtype=np.int32))
+                own[s] = m + 1
+    table = TrackTable(scene.origin)
+    for track_id, found in rows.items():
+        table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position)
+    return table
+
+
+def _track(tracker: Tracker, scene: Scene, track_id: int, found: dict[int, Array]) -> list[Track]:
+    """One track smoothed, by its measurements of each scan."""
+    filter, first, last = tracker.filter, min(found), max(found)
+    smoother = FixedLagSmoother(filter, max(last - first, 1))
+    window, times, hits = None, [], []
+    for k in range(first, last + 1):
+        scan = scene.scan(k)
+        if window is None:
+            window = _begun(tracker, smoother, scene, scan, found[k])
+        else:
+            window = smoother.predict(window, scan.time - times[-1])
+            for s, m in enumerate(found.get(k, np.zeros(len(scene.sensors), dtype=np.int32)).tolist()):
+                if m:
+                    window, _ = smoother.update(window, scan.measurements[s][m - 1 : m], scene.sensors[s])
+        times.append(scan.time)
+        hits.append(k in found)
+    assert window is not None
+    states = window.smoothed()
+    position, velocity = list(filter.motion.position), velocity_components(filter.motion)
+    tracks = []
+    for k, (time, state) in enumerate(zip(times, states, strict=True)):
+        place, speed = np.zeros(3), np.zeros(3)
+        place[: len(position)], speed[: len(velocity)] = state.mean[0, position], state.mean[0, velocity]
+        seen = int(np.count_nonzero(hits[: k + 1]))
+        detected = times[max(i for i in range(k + 1) if hits[i])]
+        tracks.append(
+            Track(
+                track_id,
+                time,
+                state.mean[0],
+                state.covariance[0],
+                place,
+                speed,
+                True,
+                np.nan,
+                seen,
+                times[0],
+                detected,
+                1.0,
+            )  # fmt: skip
+        )
+    return tracks
+
+
+def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:
+    """The window at a track's first detection, which tells the position; a later one will tell the velocity."""
+    positions, covariances = positions_and_covariances(scene, scan, rows[None])
+    return Window(tracker.initiation.start(smoother.filter, positions, covariances))

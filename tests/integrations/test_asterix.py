@@ -1,0 +1,245 @@
+"""ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
+
+from __future__ import annotations
+
+import math
+import struct
+import subprocess
+import sys
+import tarfile
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("asterix", reason="libasterix is not installed: pip install 'assoc[asterix]'")
+
+from assoc import track
+from assoc.errors import InvalidInputError
+from assoc.integrations.asterix import read_asterix, read_tracks, write_plots, write_tracks
+from assoc.integrations.asterix.blocks import edition
+from assoc.recordings import Recording
+from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
+from assoc.simulation import simulate_recording
+
+
+@pytest.fixture(scope="module")
+def plots():
+    made = simulate_recording("rotating-radar", 1, duration=120.0).recording
+    addresses = np.where(made.identities > 0, 0x3C0000 + made.identities, 0)
+    return Recording(
+        made.times + 36_000.0, made.ranges, made.azimuths, made.identities, made.altitudes, made.garbled,
+        addresses=addresses, name="plots",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def file(plots, tmp_path):
+    write_plots(tmp_path / "plots.ast", plots, (25, 201))
+    return tmp_path / "plots.ast"
+
+
+def test_plots_there_and_back(plots, file, tmp_path):
+    content = read_asterix(file)
+    assert list(content.plots) == [(25, 201)] and not content.notes
+    back = content.plots[25, 201]
+    np.testing.assert_allclose(back.times, plots.times, atol=0.5 / 128 + 1e-9)
+    np.testing.assert_allclose(back.ranges, plots.ranges, atol=0.5 * NAUTICAL_MILE / 256 + 1e-6)
+    turned = np.abs(np.angle(np.exp(1j * (back.azimuths - plots.azimuths))))
+    assert turned.max() <= math.pi / 65536 + 1e-12
+    np.testing.assert_array_equal(back.identities, plots.identities)
+    np.testing.assert_array_equal(back.addresses, plots.addresses)
+    np.testing.assert_allclose(back.altitudes, plots.altitudes, atol=FLIGHT_LEVEL / 8 + 1e-6, equal_nan=True)
+    # what was read is on the category's steps: from here on round trips are exact
+    write_plots(tmp_path / "again.ast", back, (25, 201))
+    again = read_asterix(tmp_path / "again.ast").plots[25, 201]
+    for name in ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "addresses"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
+
+
+def test_a_plot_that_others_encoded(tmp_path):
+    """Bytes by hand, from the specification: 10 nmi, 45 degrees, 7777 octal, FL 350, address 3C4591, at 100.5 s."""
+    (tmp_path / "one.ast").write_bytes(bytes.fromhex("300015dd8001020032400a0020000fff05783c4591"))
+    one = read_asterix(tmp_path / "one.ast").plots[1, 2]
+    assert one.times.tolist() == [100.5] and one.ranges.tolist() == [18520.0]
+    assert one.azimuths[0] == pytest.approx(math.pi / 4) and one.identities.tolist() == [0o7777]
+    assert one.altitudes[0] == pytest.approx(350 * FLIGHT_LEVEL) and one.addresses.tolist() == [0x3C4591]
+
+
+def test_what_radars_say_of_themselves_and_midnight(tmp_path):
+    kind = edition(34)
+    who = {"010": (("SAC", 1), ("SIC", 2))}
+    day = 86400 * 128
+    records = [
+        who | {"000": 1, "030": time % day, "041": 512,
+               "120": (("HGT", 250), ("LAT", 0x200000), ("LON", (1 << 24) - 0x100000))}
+        for time in (day - 512, day, day + 512)
+    ]  # fmt: skip
+    block = kind.create([kind.cv_record.create(one) for one in records]).unparse().to_bytes()
+    late = Recording([86_399.0, 86_401.0, 86_403.0], [1e4] * 3, [0.1] * 3)
+    write_plots(tmp_path / "plots.ast", late, (1, 2))
+    (tmp_path / "both.ast").write_bytes(block + (tmp_path / "plots.ast").read_bytes())
+    content = read_asterix(tmp_path / "both.ast")
+    radar = content.radars[1, 2]
+    assert radar.norths.tolist() == [86_396.0, 86_400.0, 86_404.0] and radar.rotation == 4.0
+    assert radar.place == pytest.approx((math.radians(45.0), math.radians(-22.5), 250.0))
+    assert content.plots[1, 2].times.tolist() == [86_399.0, 86_401.0, 86_403.0]
+
+
+def test_adsb_as_seen_from_a_place(tmp_path):
+    kind = edition(21)
+    fine = 2**30 / 180.0
+    record = kind.cv_record.create(
+        {
+            "010": (("SAC", 9), ("SIC", 8)), "071": 100 * 128, "080": 0xABCDEF, "145": 4 * 100,
+            "131": (("LAT", round(50.1 * fine)), ("LON", round(8.0 * fine))), "070": 0o1234,
+        }
+    )  # fmt: skip
+    (tmp_path / "adsb.ast").write_bytes(kind.create([record]).unparse().to_bytes())
+    seen = read_asterix(tmp_path / "adsb.ast", origin=(math.radians(50.0), math.radians(8.0), 0.0)).adsb[9, 8]
+    # 0.1 degrees north: 11.12 km, and FL 100 up
+    assert seen.ranges[0] == pytest.approx(math.hypot(11_123.0, 3_048.0), rel=2e-3)
+    assert seen.azimuths[0] == pytest.approx(math.pi / 2, abs=1e-6)
+    assert seen.addresses.tolist() == [0xABCDEF] and seen.identities.tolist() == [0o1234]
+    assert seen.altitudes[0] == pytest.approx(3_048.0)
+
+
+def test_tracks_there_and_back(tmp_path):
+    rng = np.random.default_rng(0)
+    count = 250
+    values = rng.normal(0, 1, (count, 6)) * [5e4, 5e4, 3e3, 200, 200, 10]
+    frame = pd.DataFrame(values, columns=[*"xyz", "vx", "vy", "vz"])
+    frame.insert(0, "track_id", np.arange(count) + 1)
+    frame.insert(1, "time", np.sort(rng.uniform(0, 3600, count)))
+    frame["confirmed"] = rng.random(count) < 0.8
+    write_tracks(tmp_path / "tracks.ast", frame, (7, 7))
+    back = read_tracks(tmp_path / "tracks.ast")
+    assert back["track_id"].tolist() == frame["track_id"].tolist()
+    assert back["confirmed"].tolist() == frame["confirmed"].tolist()
+    steps = {"time": 1 / 128, "x": 0.5, "y": 0.5, "z": 1.905, "vx": 0.25, "vy": 0.25, "vz": 0.03175}
+    for name, step in steps.items():
+        np.testing.assert_allclose(back[name], frame[name], atol=step / 2 + 1e-9)
+    write_tracks(tmp_path / "again.ast", back, (7, 7))
+    assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
+    with pytest.raises(InvalidInputError, match="x does not fit"):
+        write_tracks(tmp_path / "far.ast", frame.assign(x=1e7))
+    with pytest.raises(InvalidInputError, match="'vz' is missing"):
+        write_tracks(tmp_path / "far.ast", frame.drop(columns="vz"))
+    assert not (tmp_path / "far.ast").exists()
+
+
+def test_a_file_cut_in_the_middle_gives_what_is_whole(plots, file, tmp_path):
+    whole = file.read_bytes()
+    (tmp_path / "cut.ast").write_bytes(whole[: len(whole) - 7])
+    content = read_asterix(tmp_path / "cut.ast")
+    (kept,) = content.plots.values()
+    assert 0 < len(kept) < len(plots) and content.notes["bytes that are no whole data block"] > 0
+    assert "no whole data block" in kept.summary()
+
+
+def test_a_block_that_cannot_be_decoded_is_passed_over(plots, file, tmp_path):
+    bad = b"\x30\x00\x08\xff\xff\xff\xff\x01"
+    unknown = b"\x05\x00\x04\x00"
+    (tmp_path / "mixed.ast").write_bytes(bad + unknown + file.read_bytes())
+    content = read_asterix(tmp_path / "mixed.ast")
+    assert len(content.plots[25, 201]) == len(plots)
+    assert content.notes == {"data blocks of category 048 that cannot be decoded": 1, "data blocks of category 005": 1}
+
+
+def test_hostile_files(file, tmp_path):
+    rng = np.random.default_rng(5)
+    whole = bytearray(file.read_bytes()[:2000])
+    for name, content in {
+        "empty": b"",
+        "text": b"time,range,bearing\n1,2,3\n",
+        "zeros": bytes(100),
+        "pcap": b"\xd4\xc3\xb2\xa1" + bytes(10),
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InvalidInputError, match="holds no ASTERIX") as caught:
+            read_asterix(tmp_path / name)
+        assert "\n" not in str(caught.value)
+        with pytest.raises(InvalidInputError, match="holds no ASTERIX tracks"):
+            read_tracks(tmp_path / name)
+    for k in range(60):
+        spoiled = bytearray(whole)
+        for at in rng.integers(0, len(spoiled), 12):
+            spoiled[at] = rng.integers(256)
+        (tmp_path / f"{k}.ast").write_bytes(spoiled[: int(rng.integers(1, len(spoiled)))])
+        try:
+            read_asterix(tmp_path / f"{k}.ast")
+        except InvalidInputError as error:
+            assert "\n" not in str(error)
+    with pytest.raises(InvalidInputError, match="cannot be read"):
+        read_asterix(tmp_path / "none.ast")
+
+
+def packet(payload, port=8600):
+    udp = struct.pack(">HHHH", port, port, 8 + len(payload), 0) + payload
+    ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, 20 + len(udp), 0, 0, 1, 17, 0, bytes(4), bytes(4)) + udp
+    return bytes(12) + b"\x08\x00" + ip
+
+
+def test_blocks_in_the_packets_of_a_pcap(plots, file, tmp_path):
+    whole, at = file.read_bytes(), 0
+    frames = [bytes(12) + b"\x08\x06" + bytes(28)]
+    while at < len(whole):
+        length = int.from_bytes(whole[at + 1 : at + 3], "big")
+        # some bytes of padding follow, as in short Ethernet frames
+        frames.append(packet(whole[at : at + length]) + bytes(4))
+        at += length
+    for order in "<>":
+        head = struct.pack(f"{order}IHHIIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+        body = b"".join(struct.pack(f"{order}IIII", 0, 0, len(one), len(one)) + one for one in frames)
+        (tmp_path / "plots.pcap").write_bytes(head + body)
+        content = read_asterix(tmp_path / "plots.pcap")
+        assert len(content.plots[25, 201]) == len(plots) and content.notes == {"packets that are not UDP": 1}
+
+
+def test_bad_arguments(plots, tmp_path):
+    with pytest.raises(InvalidInputError, match="source"):
+        write_plots(tmp_path / "x.ast", plots, (1, 256))
+    far = Recording([0.0], [1e6], [0.0])
+    with pytest.raises(InvalidInputError, match="256 nmi"):
+        write_plots(tmp_path / "x.ast", far)
+    assert not (tmp_path / "x.ast").exists()
+
+
+@pytest.mark.slow
+def test_a_recording_of_real_radars(tmp_path):
+    """The sample of another decoder (GPL: fetched here, never shipped): 126 plots of 7 radars."""
+    words = ["pip", "download", "--quiet", "--no-deps", "--no-binary", ":all:", "-d", str(tmp_path), "asterix_decoder"]
+    try:
+        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, timeout=120)
+    except subprocess.TimeoutExpired:
+        pytest.skip("the sample cannot be reached")
+    archives = list(tmp_path.glob("asterix_decoder-*.tar.gz"))
+    if done.returncode or not archives:
+        pytest.skip("the sample cannot be reached")
+    with tarfile.open(archives[0]) as archive:
+        member = next(one for one in archive if one.name.endswith("/asterix/sample_data/cat_034_048.pcap"))
+        (tmp_path / "sample.pcap").write_bytes(archive.extractfile(member).read())
+    found = read_asterix(tmp_path / "sample.pcap")
+    assert sum(len(one) for one in found.plots.values()) == 126 and len(found.plots) == 7
+    assert found.radars[25, 12].rotation == pytest.approx(4.945, abs=0.001)
+    latitude, longitude, height = found.radars[25, 12].place
+    assert math.degrees(latitude) == pytest.approx(43.571, abs=0.001) and height == 780.0
+    assert math.degrees(longitude) == pytest.approx(16.406, abs=0.001)
+
+
+def test_the_program_takes_them(file, plots, tmp_path, capsys):
+    words = ["-o", str(tmp_path / "tracks.csv"), "--window", "ctw-time", "--rotation", "9.5"]
+    assert track.main([str(file), *words, "--range-noise", "500", "--bearing-noise", "0.1"]) == 0
+    assert f"{len(plots)} plots over" in capsys.readouterr().out
+    write_plots(tmp_path / "other.ast", plots, (25, 202))
+    (tmp_path / "two.ast").write_bytes(file.read_bytes() + (tmp_path / "other.ast").read_bytes())
+    assert track.main([str(tmp_path / "two.ast"), *words]) == 2
+    assert "--radar: the file holds plots of 25/201, 25/202; name one" in capsys.readouterr().err
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "25/202", "--range-noise", "500",
+                       "--bearing-noise", "0.1"]) == 0  # fmt: skip
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "1/1"]) == 2
+    assert track.main([str(tmp_path / "two.ast"), *words, "--radar", "one"]) == 2
+    (tmp_path / "cut.ast").write_bytes(file.read_bytes()[:40])
+    capsys.readouterr()
+    assert track.main([str(tmp_path / "cut.ast"), *words]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1

@@ -1,0 +1,112 @@
+"""Put in one fault after the other, in a copy of the project, and see whether its tests fail: ``make mutants``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from tests.mutations.faults import FAULTS, Fault
+
+_ROOT = Path(__file__).parents[2]
+# what tests of one fault may take; a fault may also show by never ending
+_LIMIT = 300.0
+
+
+class _Copy:
+    """A copy of the project in which faults are put in and taken out."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        for name in ("assoc", "experiments", "tests"):
+            shutil.copytree(_ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(_ROOT / "pyproject.toml", folder)
+        # interpreted: compiling each fault would take longer than its tests
+        self._environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
+        self._environment["PYTHONDONTWRITEBYTECODE"] = "1"
+
+    def passes(self, tests: Sequence[str]) -> tuple[bool, str]:
+        """Whether these test files pass, and pytest's last line."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
+        try:
+            done = subprocess.run(
+                command, cwd=self.folder, env=self._environment, capture_output=True, text=True, timeout=_LIMIT
+            )
+        except subprocess.TimeoutExpired:
+            return False, "it did not end"
+        lines = done.stdout.strip().splitlines()
+        failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
+        if done.returncode not in (0, 1):
+            raise RuntimeError(f"pytest could not run {' '.join(tests)}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+        return done.returncode == 0, (failed or lines or [""])[-1].split(" - ")[0]
+
+    def try_fault(self, fault: Fault) -> tuple[bool, str]:
+        """Whether the tests notice a fault, and which."""
+        path = self.folder / fault.file
+        text = path.read_text(encoding="utf-8")
+        path.write_text(put_in(fault, text), encoding="utf-8")
+        try:
+            passed, said = self.passes([fault.test])
+        finally:
+            path.write_text(text, encoding="utf-8")
+        return not passed, said
+
+
+def put_in(fault: Fault, text: str) -> str:
+    """Return the text of a file with the fault.
+
+    Raises
+    ------
+    ValueError
+        The old text is not in the file exactly once.
+    """
+    count = text.count(fault.old)
+    if count != 1:
+        raise ValueError(f"{fault.file}: {fault.what}: the text is there {count} times, not once: {fault.old!r}")
+    return text.replace(fault.old, fault.new)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Try the faults; returns 0 when all were noticed."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutations", description=__doc__)
+    parser.add_argument("--only", default="", metavar="TEXT", help="faults whose words or files contain this")
+    parser.add_argument("--processes", type=int, default=2, metavar="N", help="faults at a time (default 2)")
+    parsed = parser.parse_args(arguments)
+    chosen = [fault for fault in FAULTS if parsed.only in fault.what or parsed.only in fault.file]
+    for fault in chosen:
+        put_in(fault, (_ROOT / fault.file).read_text(encoding="utf-8"))
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="assoc-mutants-") as folder:
+        copies = [_Copy(Path(folder) / str(number)) for number in range(max(parsed.processes, 1))]
+        tests = sorted({fault.test for fault in chosen})
+        passed, said = copies[0].passes(tests)
+        if not passed:
+            print(f"without any fault the tests fail: {said}", file=sys.stderr)
+            return 1
+        missed = 0
+        with ThreadPoolExecutor(len(copies)) as pool:
+            free = list(copies)
+
+            def one(fault: Fault) -> tuple[bool, str]:
+                copy = free.pop()
+                try:
+                    return copy.try_fault(fault)
+                finally:
+                    free.append(copy)
+
+            for fault, (noticed, said) in zip(chosen, pool.map(one, chosen), strict=True):
+                missed += not noticed
+                print(f"{'caught' if noticed else 'MISSED'}  {fault.what}\n        {said}", flush=True)
+    print(f"{len(chosen) - missed} of {len(chosen)} caught in {time.monotonic() - started:.0f} s")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,139 @@
+"""What all metaheuristics share: limits, what is kept, and how much is refined."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.packing.components.parameters import SearchParameters
+from assoc.packing.components.search import search_components
+from assoc.packing.components.team import Team
+from assoc.packing.prepare import prepare
+from assoc.packing.run import Run
+from assoc.simulation import simulate
+from experiments.common.oracles import gated_problem
+from tests.solvers.pieces import component, problems
+
+PROBLEM = gated_problem(np.random.default_rng(12), (8, 8, 7), 0.5, "mixed")
+
+
+class Idle:
+    """A searcher that offers nothing."""
+
+    def __init__(self):
+        self.count = 0
+
+    def iterate(self, component, rng):
+        self.count += 1
+
+
+def run_idle(**limits):
+    """Iterations of a searcher that offers nothing, what ended them, and the weight found."""
+    idle = Idle()
+    packing = prepare(PROBLEM).packing
+    run = Run(0)
+    outcome = search_components(lambda *_: idle, packing, run, SearchParameters(**limits))
+    return idle.count, run.stopped_by, float(packing.weights[outcome.columns].sum())
+
+
+def test_patience_and_iterations_end_the_search():
+    assert run_idle(refinement="none", patience=7)[:2] == (7, "")
+    assert run_idle(refinement="none", iterations=5)[:2] == (5, "iterations")
+    assert run_idle(refinement="none", iterations=30, patience=30)[:2] == (30, "")
+
+
+def test_the_best_cover_is_refined_by_refinement_full_alone():
+    """A searcher that does nothing finds nothing, unless exact sub-steps do."""
+    alone = run_idle(refinement="none", patience=20)[2]
+    local = run_idle(refinement="local", patience=20)[2]
+    full = run_idle(refinement="full", patience=20)[2]
+    assert alone - 1.0 > local > full + 1.0
+
+
+def test_what_is_worse_or_incomplete_is_not_kept():
+    one = component(problems()["axial"], "full")
+    empty = np.full(one.packing.num_rows, -1, dtype=np.int32)
+    assert not one.offer(empty, -1e9) and one.best is None
+    one.offer_greedy()
+    best, weight = one.best.copy(), one.weight
+    assert not one.offer(best, weight + 1.0)
+    assert one.weight == weight
+
+
+@pytest.mark.parametrize("name", ["mixed", "four"])
+def test_how_much_new_covers_are_improved(name):
+    """none: not at all; local: halves are matched anew; full: exact sub-steps, too."""
+    weights = {}
+    for refinement in ("none", "local", "full"):
+        one = component(problems()[name], refinement)
+        rng = np.random.default_rng(0)
+        found = []
+        for _ in range(8):
+            owner = one.random_cover(1e-3, rng)
+            before = one.weight_of(owner)
+            after = one.improve(owner, rng, 5)
+            assert after == pytest.approx(one.weight_of(owner), abs=1e-9) and after <= before + 1e-9
+            assert refinement != "none" or after == before
+            found.append((before, after))
+        weights[refinement] = np.mean(found, axis=0)
+    # the cover itself is improved by insertion unless refinement is none
+    assert weights["none"][0] > weights["local"][0] + 1.0
+    assert weights["local"][1] > weights["full"][1] + 1e-6
+
+
+class Lucky:
+    """A searcher that offers a cover that is given, once."""
+
+    def __init__(self, cover, worker):
+        self.cover, self.worker = cover, worker
+        self.seen, self.draws = [], []
+
+    def iterate(self, component, rng):
+        self.seen.append((component.worker, component.weight, component.iterations, component.stalled))
+        self.draws.append(rng.random())
+        if component.worker == self.worker and len(self.seen) == 3:
+            component.offer(self.cover, component.weight_of(self.cover))
+
+
+@pytest.mark.parametrize("lucky", [0, 2])
+def test_workers_exchange_their_best(lucky):
+    one = component(PROBLEM, "none")
+    one.offer_greedy()
+    before = one.weight
+    found = min((one.random_cover(1.0, np.random.default_rng(seed)) for seed in range(40)), key=one.weight_of)
+    after = one.weight_of(found)
+    assert after < before - 1e-6
+    members = []
+
+    def make(part, rng):
+        members.append(Lucky(found, lucky))
+        return members[-1]
+
+    with ThreadPoolExecutor(3) as pool:
+        team = Team(make, one, Run(4), 10, 3, pool)
+        for _ in range(5):
+            team.iterate()
+            one.iterations += 1
+    assert one.weight == pytest.approx(after) and one.best.tolist() == found.tolist()
+    assert [worker for member in members for worker, *_ in member.seen] == [0] * 5 + [1] * 5 + [2] * 5
+    for member in members:
+        # the cover of the third round is everyone's in the fourth
+        assert [weight for _, weight, *_ in member.seen] == pytest.approx([before] * 3 + [after] * 2)
+        assert [number for _, _, number, _ in member.seen] == [0, 1, 2, 3, 4]
+    assert len({draw for member in members for draw in member.draws}) == 15
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_the_same_seed_and_workers_give_the_same_search(solver):
+    """To the last bit, whichever thread was quicker."""
+    found = []
+    problem = assoc.build_problem(simulate("bearing-only", seed=4, targets=20, scans=1), 0)
+    for workers in (1, 2, 2, 3):
+        solution = assoc.assign(problem, solver, seed=3, workers=workers, refinement="none", iterations=4)
+        found.append([(point.iteration, point.cost) for point in solution.trace])
+        assert solution.cost == pytest.approx(problem.costs[solution.indices].sum())
+    assert found[1] == found[2]
+    assert len({str(one) for one in found}) > 1

@@ -1,0 +1,112 @@
+"""The live page in a real browser: the picture moves, and nothing but this machine is asked."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import time
+
+import numpy as np
+import pytest
+
+from assoc._cli.live import replayed
+from assoc.errors import InvalidInputError
+from assoc.plotting.live import LivePage
+from assoc.simulation import simulate
+from assoc.tracking import TRACKERS, LiveTracker
+from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return simulate("rotating-radars", 6, aircraft=8, duration=30.0, false_alarms=3.0)
+
+
+@pytest.fixture(scope="module")
+def film(scene):
+    """Pictures of half a minute."""
+    tracker = LiveTracker(scene, lambda: TRACKERS["nearest-neighbour"].for_scene(scene), turns=[4, 5, 5.5])
+    return [picture for plot in replayed(scene, 0.0) for picture in tracker.take(*plot)]
+
+
+def wait_for(browser, script, seconds=60.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if browser.execute_script(script):
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"{script} did not come true: {browser.execute_script('return state.textContent')}")
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_the_picture_moves(browser, scene, film, pictures, size, dark):
+    page = LivePage(scene, 0, "<b>Radars</b>")
+    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    feature = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": feature})
+    try:
+        browser.get_log("browser")
+        browser.get(page.address)
+        wait_for(browser, "return scene !== null")
+        shots = []
+        for part in (film[:12], film[12:]):
+            for one in part:
+                page.show(one)
+            wait_for(browser, f"return time === {part[-1].time} && !pending")
+            name = f"live-{'dark' if dark else 'light'}-{size[0]}-{len(shots)}.png"
+            shots.append(screenshot(browser, pictures / name))
+        from PIL import Image
+
+        first, second = (np.asarray(Image.open(io.BytesIO(one)).convert("RGB")).astype(int) for one in shots)
+        assert first.shape == second.shape and (np.abs(first - second).sum(axis=2) > 60).sum() > 200
+        assert f"{len(film[-1].tracks)} tracks" in browser.execute_script("return state.textContent")
+        # a title is text, whatever it says
+        assert browser.execute_script("return document.querySelector('h1').textContent") == "<b>Radars</b>"
+        assert browser.execute_script("return document.querySelector('h1 b')") is None
+        scale = browser.execute_script("return view.scale")
+        browser.execute_script("map.dispatchEvent(new WheelEvent('wheel', {deltaY: -500, cancelable: true}))")
+        assert browser.execute_script("return view.scale") > scale
+        browser.execute_script("document.getElementById('fit').click()")
+        wait_for(browser, f"return !pending && view && Math.abs(view.scale - {scale}) < 1e-9")
+        for name in ("labels", "plots"):
+            browser.execute_script(f"document.getElementById('{name}').click()")
+            assert browser.execute_script(f"return show.{name}") is False
+        assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
+        asked = browser.execute_script("return performance.getEntriesByType('resource').map((one) => one.name)")
+        assert asked and all(one.startswith((page.address, "data:")) for one in asked)
+        page.close()
+        wait_for(browser, "return ended")
+        assert browser.execute_script("return state.textContent").startswith("ended")
+        assert complaints(browser) == []
+    finally:
+        page.close()
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_only_this_machine_is_served(scene):
+    page = LivePage(scene)
+    port = int(page.address.rsplit(":", 1)[1].strip("/"))
+    try:
+        for path, host, status in [
+            ("/", "127.0.0.1", 200),
+            ("/live.js", f"localhost:{port}", 200),
+            ("/", "evil.example", 403),
+            ("/events", "evil.example", 403),
+            ("/../server.py", "127.0.0.1", 404),
+            ("/server.py", "127.0.0.1", 404),
+        ]:
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+            connection.putrequest("GET", path, skip_host=True)
+            connection.putheader("Host", host)
+            connection.endheaders()
+            answer = connection.getresponse()
+            assert answer.status == status, (path, host)
+            if status == 200:
+                assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+            connection.close()
+        with pytest.raises(InvalidInputError, match=f"--page: port {port} cannot be used"):
+            LivePage(scene, port)
+    finally:
+        page.close()

@@ -1,0 +1,125 @@
+"""`python -m assoc.track --live` as a program: lines from stdin, a UDP port, a scene; what is wrong is one line."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+from assoc._cli.live import parse_line, replayed
+from assoc.errors import InvalidInputError
+from assoc.scene import Scene
+from assoc.simulation import simulate
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("live") / "radars.npz"
+    simulate("rotating-radars", 5, aircraft=3, duration=20.0, false_alarms=1.0).save(path)
+    return path
+
+
+def words(scene_file, *more):
+    own = ["-W", "error", "-m", "assoc.track", scene_file, "--live", "--turns", "4,5,5.5", *more]
+    return [sys.executable, *map(str, own)]
+
+
+def as_lines(scene, style):
+    for k, plot in enumerate(replayed(scene, 0.0)):
+        if style == "csv" or k % 2:
+            yield ",".join([plot.sensor, repr(plot.time), *map(repr, plot.values)])
+        elif k % 4:
+            yield json.dumps({"sensor": int(plot.sensor), "time": plot.time, "values": plot.values})
+        else:
+            parts = zip(("range", "azimuth", "elevation"), plot.values, strict=True)
+            yield json.dumps({"sensor": scene.sensors[int(plot.sensor) - 1].name, "time": plot.time, **dict(parts)})
+
+
+def check(text):
+    """A table of three aircraft; its rows by track."""
+    table = pd.read_csv(io.StringIO(text))
+    assert list(table.columns[:9]) == ["track_id", "time", "x", "y", "z", "vx", "vy", "vz", "event"]
+    long = [own for _, own in table.groupby("track_id") if len(own) > 4]
+    assert len(long) == 3
+    for own in long:
+        assert own.event.tolist()[0] == "new" and set(own.event.tolist()[1:]) <= {"update"}
+        assert own.time.is_monotonic_increasing
+    return table
+
+
+def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
+    scene = Scene.load(scene_file)
+    bad = ["what is this", "nobody,3.0,1,2,3", '{"sensor": "radar 1", "time": 4.0}', "radar 1,4.0,1", "x" * 20_000]
+    text = "\n".join(
+        ["sensor,time,range,azimuth,elevation", "# a comment", "", *bad, *as_lines(scene, "both"), "\x00\xff"]
+    )
+    done = subprocess.run(words(scene_file), input=text, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    check(done.stdout)
+    told = done.stderr.strip().splitlines()
+    assert all(line.startswith("assoc.track: ") for line in told)
+    assert sum("line left out" in line for line in told) == 1
+    assert sum("the unknown sensor" in line for line in told) == 1
+    assert re.search(r"\d+ plots in \d+ steps; a step takes .* ms, p99 .* ms; .*lines not understood", told[-1])
+    # the same from the scene itself, into a file
+    out = scene_file.parent / "tracks.csv"
+    again = subprocess.run(words(scene_file, "--replay", 0, "-o", out), capture_output=True, text=True, timeout=300)
+    assert again.returncode == 0 and again.stdout == ""
+    assert out.read_text() == done.stdout
+
+
+def test_datagrams_on_loopback_until_a_signal(scene_file):
+    scene = Scene.load(scene_file)
+    program = subprocess.Popen(words(scene_file, "--udp", 0), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        port = int(re.search(r"udp 127\.0\.0\.1:(\d+)", program.stderr.readline()).group(1))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            lines = list(as_lines(scene, "csv"))
+            for k in range(0, len(lines), 20):
+                out.sendto("\n".join(lines[k : k + 20]).encode(), ("127.0.0.1", port))
+        # the first rows come while the program runs
+        assert program.stdout.readline().startswith("track_id,time")
+        assert ",new," in program.stdout.readline()
+        program.send_signal(signal.SIGINT)
+        rest, told = program.communicate(timeout=60)
+    finally:
+        program.kill()
+    assert program.returncode == 130
+    assert "p99" in told and "interrupted" in told and "Traceback" not in told
+    assert rest == "" or rest.endswith("\n")
+
+
+def test_bad_options(run, scene_file, tmp_path):
+    for more, line in [
+        (["--live", "--udp", "99999"], "--udp: port 99999 cannot be used"),
+        (["--live", "--turns", "4,5"], "turns: expected one for each of 3 sensors"),
+        (["--live", "--udp", "0", "--replay", "1"], "--udp and --replay: expected one of them"),
+        (["--live", "--replay", "-1"], "--replay: expected a number >= 0"),
+        (["--live", "--window", "ctw"], "--window: is not for --live"),
+        (["--page", "0", "-o", tmp_path / "x.csv"], "--page: is only for --live"),
+        ([], "the following arguments are required: -o/--output"),
+    ]:
+        done = run("assoc.track", scene_file, *more)
+        assert done.returncode == 2 and line in done.stderr and len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "radar 1", "a,b,c", "1,2,3,x", "{", "[1]", '{"sensor": 1}', '{"sensor": 1, "time": "x", "values": []}',
+        "{" * 9_000, '{"sensor": 1, "time": 1, "values": 3}', '{"sensor": 1, "time": 1, "values": ["a"]}',
+    ],
+)  # fmt: skip
+def test_lines_that_are_none_are_refused_in_one_line(scene_file, line):
+    scene = Scene.load(scene_file)
+    with pytest.raises(InvalidInputError) as caught:
+        parse_line(line, scene)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300

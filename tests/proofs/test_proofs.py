@@ -1,0 +1,277 @@
+"""Proofs: what is written proves the optimum, the checker accepts it, and refuses what was spoiled."""
+
+from __future__ import annotations
+
+import copy
+import json
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc import check
+from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.packing.prepare import prepare
+from assoc.packing.simplex.linear_program import LinearProgram
+from assoc.proofs import write_proof
+from assoc.proofs.write import exact_problem
+from assoc.simulation import simulate
+from tests.reliability.problems import exact_optimum
+
+ALONE = Path(check.__file__)
+
+
+def random_problem(rng: np.random.Generator) -> assoc.AssignmentProblem:
+    """A small problem with fractional linear programs now and then."""
+    sizes = rng.integers(2, 5, size=rng.integers(2, 5))
+    tuples = np.stack(np.meshgrid(*(np.arange(n + 1) for n in sizes), indexing="ij"), -1).reshape(-1, sizes.size)
+    tuples = tuples[np.count_nonzero(tuples, axis=1) > 1]
+    tuples = tuples[rng.random(len(tuples)) < 0.6]
+    costs = rng.normal(-2.0, 3.0, len(tuples)) if rng.random() < 0.5 else rng.integers(-3, 1, len(tuples)).astype(float)
+    return assoc.AssignmentProblem(tuples, costs, sizes)
+
+
+def odd_cycle() -> assoc.AssignmentProblem:
+    """The smallest problem that its linear program leaves open."""
+    return assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [-3.0, -3.0, -2.5], [1, 1, 1])
+
+
+def run_alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """The checker as others use it: the file alone, without the package, isolated from it."""
+    command = [sys.executable, "-I", "-S", str(ALONE), *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=60)
+
+
+@pytest.mark.parametrize("dummy", [True, False])
+def test_what_is_proved_is_the_optimum(tmp_path, dummy):
+    rng = np.random.default_rng(1)
+    trees = 0
+    for number in range(25):
+        if dummy:
+            problem = random_problem(rng)
+        else:
+            sizes = (4, 4, 4) if number % 2 else (3, 4, 5)
+            problem = assoc.AssignmentProblem.from_dense(rng.integers(0, 5, sizes).astype(float), dummy=False)
+        solution = assoc.assign(problem)
+        bound = write_proof(tmp_path / "proof.json", problem, solution)
+        assert bound == pytest.approx(float(exact_optimum(problem)), abs=1e-7)
+        assert bound <= solution.cost + 1e-12
+        trees += len(json.loads((tmp_path / "proof.json").read_text())["trees"])
+    assert trees > 3
+
+
+def test_any_solver_s_answer_gets_a_proof_of_its_gap(tmp_path):
+    problem = odd_cycle()
+    greedy = assoc.assign(problem, "greedy")
+    worse = assoc.assign(assoc.AssignmentProblem([[1, 0, 1]], [-2.5], [1, 1, 1]))
+    assert write_proof(tmp_path / "proof.json", problem, greedy) == pytest.approx(-3.0, abs=1e-9)
+    content = json.loads((tmp_path / "proof.json").read_text())
+    content["tuples"], content["cost"] = worse.tuples.tolist(), "-2.5"
+    lines = check.check(exact_problem(problem), json.dumps(content))
+    assert lines[0] == "feasible, cost -2.500000000" and "gap 0.5" in lines[1]
+
+
+def test_too_few_nodes_leave_a_gap(tmp_path):
+    problem = odd_cycle()
+    bound = write_proof(tmp_path / "proof.json", problem, assoc.assign(problem), nodes=1)
+    assert bound == pytest.approx(-4.25, abs=1e-6)  # the bound of the linear program
+
+
+def test_the_file_alone_checks_what_the_package_writes(tmp_path):
+    scene = simulate("bearing-only", seed=0, targets=8, scans=1)
+    problem = assoc.build_problem(scene, scene.scan(0))
+    problem.save(tmp_path / "problem.txt")
+    solution = assoc.assign(problem, proof=tmp_path / "proof.json")
+    assert solution.status == "optimal"
+    done = run_alone(tmp_path, "problem.txt", "proof.json")
+    assert (done.returncode, done.stderr) == (0, "")
+    first, second = done.stdout.splitlines()
+    assert first.startswith("feasible, cost -108.4") and second.startswith("proved: no solution costs less than -108.4")
+    text = "assoc-solution 1\n" + "\n".join(" ".join(map(str, one)) for one in solution.tuples.tolist()) + "\n"
+    (tmp_path / "solution.txt").write_text(text)
+    assert run_alone(tmp_path, "problem.txt", "solution.txt").stdout.startswith("feasible, cost -108.4")
+    (tmp_path / "solution.txt").write_text(text.replace("assoc-solution 1\n", "assoc-solution 1\ncost -200\n"))
+    done = run_alone(tmp_path, "problem.txt", "solution.txt")
+    assert done.returncode == 1 and "refused: the solution costs -108.4" in done.stderr
+
+
+def test_text_form_keeps_every_cost(tmp_path):
+    problem = random_problem(np.random.default_rng(3))
+    problem.save(tmp_path / "problem.txt")
+    again = assoc.AssignmentProblem.load(tmp_path / "problem.txt")
+    np.testing.assert_array_equal(again.tuples, problem.tuples)
+    np.testing.assert_array_equal(again.costs, problem.costs)
+    np.testing.assert_array_equal(again.sizes, problem.sizes)
+    assert again.dummy is problem.dummy
+    assert check.read_problem(str(tmp_path / "problem.txt")).digest == exact_problem(problem).digest
+
+
+def test_the_bound_is_that_of_fractions():
+    """The checker's leaf in other words: multipliers made feasible with fractions give the same bound."""
+    problem = odd_cycle()
+    packing = prepare(problem).packing
+    u = LinearProgram(packing).solve().duals.tolist()
+    exact = exact_problem(problem)
+    ((rows, columns),) = check.components(exact)
+    values = {row: check.number(repr(one)) for row, one in zip(rows, u, strict=True)}
+    total = {row: Fraction(one) for row, one in zip(rows, map(repr, u), strict=True)}
+    for cost, own in columns:
+        lack = Fraction(cost, 10**60) - sum(total[row] for row in own)
+        total[own[0]] += min(lack, Fraction(0))
+    assert Fraction(check.leaf_bound(columns, rows, exact.needed, values) or 0, 10**60) == sum(total.values())
+
+
+@pytest.fixture(scope="module")
+def valid(tmp_path_factory):
+    """A proof with a tree, beside components that need none."""
+    tuples = [[1, 1, 0], [0, 1, 1], [1, 0, 1], [2, 2, 2], [2, 0, 2], [3, 3, 0]]
+    problem = assoc.AssignmentProblem(tuples, [-3.25, -3.5, -2.75, -8.0, -1.0, -0.5], [3, 3, 3])
+    path = tmp_path_factory.mktemp("proof") / "proof.json"
+    assert write_proof(path, problem, assoc.assign(problem)) == pytest.approx(-12.0)
+    return exact_problem(problem), json.loads(path.read_text())
+
+
+def replaced(*keys: object, by: object):
+
+    def change(proof):
+        *path, last = keys
+        for key in path:
+            proof = proof[key]
+        proof[last] = by
+
+    return change
+
+
+def raised(*keys: object, by: float):
+
+    def change(proof):
+        *path, last = keys
+        for key in path:
+            proof = proof[key]
+        proof[last] = proof[last] + by
+
+    return change
+
+
+def removed(*keys: object):
+
+    def change(proof):
+        *path, last = keys
+        for key in path:
+            proof = proof[key]
+        del proof[last]
+
+    return change
+
+
+TREE = ("trees", 0, "nodes")
+SPOILED = {
+    "another problem": (replaced("problem", by="0" * 64), "for another problem"),
+    "no problem": (removed("problem"), "for another problem"),
+    "a multiplier too low": (raised("multipliers", 0, 1, by=-1.0), "gives the bound"),
+    "a multiplier of a lonely row": (raised("multipliers", 2, 2, by=-1e-9), "gives the bound"),
+    "a multiplier missing": (removed("multipliers", 1, 0), "expected a list of 3"),
+    "a sensor missing": (removed("multipliers", 1), "expected a list of 3"),
+    "a multiplier that is no number": (replaced("multipliers", 0, 0, by="x"), "expected a decimal number"),
+    "a multiplier of infinity": (replaced("multipliers", 0, 0, by=float("inf")), "expected a decimal number"),
+    "a multiplier that is nothing": (replaced("multipliers", 0, 0, by=None), "expected a decimal number"),
+    "a huge exponent": (replaced("multipliers", 0, 0, by="1e99999999"), "expected a decimal number"),
+    "a leaf's multiplier too low": (raised(*TREE, 1, "multipliers", 0, by=-1.0), "gives the bound"),
+    "a leaf without multipliers": (removed(*TREE, 1, "multipliers"), "must have a multiplier"),
+    "a leaf with too few": (removed(*TREE, 1, "multipliers", 0), "must have a multiplier"),
+    "a branch left out": (removed(*TREE, 2), "lacks node"),
+    "the tree left out": (removed("trees", 0), "gives the bound"),
+    "the tree empty": (replaced(*TREE, by=[]), "lacks node"),
+    "a child that is its own parent": (replaced(*TREE, 0, "children", by=[0, 1]), "come after it"),
+    "one child for both answers": (replaced(*TREE, 0, "children", by=[1, 1]), "gives the bound"),
+    "the answers exchanged": (replaced(*TREE, 0, "children", by=[2, 1]), "gives the bound"),
+    "one child": (replaced(*TREE, 0, "children", by=[1]), "expected a list of 2"),
+    "a pair of one row": (replaced(*TREE, 0, "pair", by=[[1, 1], [1, 1]]), "must name two rows"),
+    "a pair elsewhere": (replaced(*TREE, 0, "pair", by=[[1, 1], [2, 2]]), "must name two rows"),
+    "a row that is not there": (replaced("trees", 0, "rows", by=[[1, 1], [2, 1], [3, 9]]), "not those of a component"),
+    "a tree of fewer rows": (removed("trees", 0, "rows", 0), "not those of a component"),
+    "a wrong cost": (replaced("cost", by="-12.5"), "the solution costs"),
+    "a bound above what is proved": (replaced("bound", by="-11.9"), "gives the bound"),
+    "a tuple twice": (lambda proof: proof["tuples"].append(proof["tuples"][0]), "twice"),
+    "a tuple left out": (removed("tuples", 0), "does not use measurement"),
+    "a tuple of another problem": (replaced("tuples", 0, by=[3, 3, 3]), "not in the problem"),
+    "a tuple that is no list": (replaced("tuples", 0, by=7), "expected a list"),
+    "another format": (replaced("format", by="proof"), "expected the format"),
+    "a later version": (replaced("version", by=2), "expected the format"),
+}
+
+
+@pytest.mark.parametrize("how", SPOILED)
+def test_spoiled_proofs_are_refused(valid, how):
+    problem, proof = valid
+    assert "proved" in check.check(problem, json.dumps(proof))[1]
+    spoiled = copy.deepcopy(proof)
+    change, reason = SPOILED[how]
+    change(spoiled)
+    with pytest.raises((check.RefusedError, ValueError), match=reason):
+        check.check(problem, json.dumps(spoiled))
+
+
+def test_no_multipliers_prove_more_than_the_optimum(valid):
+    problem, proof = valid
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        other = copy.deepcopy(proof)
+        for values in (*other["multipliers"], *(node.get("multipliers", []) for node in other["trees"][0]["nodes"])):
+            values[:] = [value + rng.normal(0.0, rng.choice([1e-9, 1.0, 100.0])) for value in values]
+        other.pop("bound")
+        text = json.loads(json.dumps(other), parse_float=str, parse_int=str)
+        assert check.proved(problem, text) <= check.number("-12")
+
+
+def test_a_proof_for_a_problem_with_another_cost_is_refused(valid):
+    problem, proof = valid
+    costs = {one: cost + (one == (2, 2, 2)) for one, cost in problem.costs.items()}
+    with pytest.raises(check.RefusedError, match="another problem"):
+        check.check(check.Problem(problem.sizes, problem.dummies, costs), json.dumps(proof | {"cost": None}))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "first lines"),
+        ("assoc-problem 1\nsizes 1 1\n", "first lines"),
+        ("assoc-problem 1\nsizes 1 -1\ndummies yes\ntuples 0\n", "whole number"),
+        ("assoc-problem 1\nsizes 1 1\ndummies maybe\ntuples 0\n", "dummies yes"),
+        ("assoc-problem 1\nsizes 1 1\ndummies yes\ntuples 2\n-1 1 1\n", "number of tuples"),
+        ("assoc-problem 1\nsizes 1 1\ndummies yes\ntuples 1\n-1 1 1\n", "tuple of its own"),
+        ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\n-1 1 2\n", "no tuple of these sizes"),
+        ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\n1e400 1 1\n", ""),
+        ("assoc-problem 1\nsizes 1 1\ndummies no\ntuples 1\nnan 1 1\n", "decimal number"),
+        ("assoc-problem 1\nsizes 999999999\ndummies yes\ntuples 0\n", "measurements"),
+    ],
+)
+def test_problems_that_cannot_be_read(tmp_path, text, reason):
+    (tmp_path / "p.txt").write_text(text)
+    (tmp_path / "s.txt").write_text("assoc-solution 1\n1 1\n")
+    done = run_alone(tmp_path, "p.txt", "s.txt")
+    assert done.stderr.count("\n") <= 1 and "Traceback" not in done.stderr
+    if reason:
+        assert done.returncode == 2 and done.stderr.startswith("p.txt: ") and reason in done.stderr
+        # singletons that are not listed the package fills in itself
+        if "tuple of its own" not in reason:
+            with pytest.raises((InvalidInputError, LimitExceededError)):
+                assoc.AssignmentProblem.load(tmp_path / "p.txt")
+
+
+def test_bad_arguments(tmp_path):
+    problem = odd_cycle()
+    other = assoc.assign(random_problem(np.random.default_rng(1)))
+    with pytest.raises(InvalidInputError, match="solution: does not belong to the problem"):
+        write_proof(tmp_path / "proof.json", problem, other)
+    with pytest.raises(InvalidInputError, match="problem: expected an AssignmentProblem"):
+        write_proof(tmp_path / "proof.json", other, other)
+    with pytest.raises(InvalidInputError, match="does not exist"):
+        assoc.assign(problem, proof=tmp_path / "nowhere" / "proof.json")
+    assert not list(tmp_path.iterdir())
+    assert run_alone(tmp_path, "--help").returncode == 0
+    assert run_alone(tmp_path, "one").returncode == 2

@@ -1,0 +1,202 @@
+"""Warnings: each for its mistake, and none on sound input."""
+
+from __future__ import annotations
+
+import datetime
+import re
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import assoc
+from assoc.errors import AssocWarning, InvalidInputError
+from assoc.plotting.report import write_association_report
+from assoc.recordings import clustering_time_window, radar_of
+from assoc.scene import Scene
+from assoc.sensors import BearingSensor, PositionSensor, Radar3D
+from assoc.simulation import names, recording_names, simulate, simulate_recording
+from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
+from assoc.tracking.plots.plot_windows import step_windows
+
+FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(
+    f"{t},{who},{47.0 + 0.02 * k + 0.001 * t},{8.0 + 0.03 * k},{9000 + 300 * k}\n"
+    for k, who in enumerate(("a", "b", "c", "d"))
+    for t in range(0, 200, 5)
+)
+
+SCENARIOS = [
+    ("three-radar", {"scans": 20}),
+    ("three-radar", {"scans": 300, "range_rate_noise": 2.0}),
+    ("crowd", {"scans": 3}),
+    ("crowd", {"scans": 3, "sensor": "radar"}),
+    ("bearing-only", {"scans": 4}),
+    ("dubins-uav", {"targets": 3}),
+    ("rotating-radars", {}),
+    ("from-tracks", {"scans": 8}),
+]
+
+
+def test_the_list_of_scenarios_is_whole():
+    assert {name for name, _ in SCENARIOS} == {*names()}
+    assert recording_names() == ["rotating-radar"]
+
+
+@pytest.mark.parametrize(("name", "values"), SCENARIOS, ids=lambda one: one if isinstance(one, str) else "")
+@pytest.mark.parametrize("seed", range(4))
+def test_no_warning_on_any_scenario(name, values, seed, tmp_path):
+    if name == "from-tracks":
+        (tmp_path / "flights.csv").write_text(FLIGHTS)
+        values = {**values, "file": str(tmp_path / "flights.csv")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene = simulate(name, seed, **values)
+        scene.save(tmp_path / "scene.npz")
+        again = Scene.load(tmp_path / "scene.npz")
+        assert again.warnings == ()
+        if seed == 0:
+            assoc.associate(again)
+            tracker = MultiSensorTracker(again.sensors, region=again.region)
+            track_scene(tracker, again, scans=range(min(again.num_scans, 8)))
+
+
+def test_no_warning_on_a_scenarios_plots():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        recording = simulate_recording("rotating-radar", 1).recording
+        tracker = TrackOrientedMHT([radar_of(recording)])
+        for _ in step_windows(tracker, clustering_time_window(recording)[:5]):
+            pass
+
+
+def test_no_warning_at_the_edges_of_what_is_sound():
+    rng = np.random.default_rng(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # azimuths counted from 0 to 2 pi, a bad but real direction finder, a field of view up to the zenith
+        bearing = BearingSensor(position=[0, 0, 0], noise=[0.2], field_of_view=[[0, 2 * np.pi]])
+        radar = Radar3D(position=[0, 0, 0], noise=[50, 0.01, 0.01], field_of_view=[[0, 1e5], [-1, 1], [0, np.pi / 2]])
+        plane = PositionSensor(position=[0, 0, 0], noise=[30, 30, 30], field_of_view=[[-1e4, 1e4]] * 3)
+        for seed in range(200):
+            rng = np.random.default_rng(seed)
+            # one target that stands still, at the edge of each field of view; heights that are all 0
+            n = 12
+            z = rng.normal(size=(n, 3))
+            bearings = np.mod(0.2 * z[:, :1], 2 * np.pi)
+            ranges, flat = [5e4, 0.0, 0.7] + z * [50, 0.01, 0.01], z * [30, 30, 0]
+            scans = [[bearings[[k]], ranges[[k]], flat[[k]]] for k in range(n)]
+            Scene([bearing, radar, plane], np.arange(n), scans)
+        # a problem without a target in it
+        assoc.assign(assoc.AssignmentProblem([[1, 1], [1, 2], [2, 1]], [3.0, 2.0, 1.0], [2, 2]))
+
+
+def changed(scene, factors):
+    """The scene with measurements times factors."""
+    return Scene(scene.sensors, scene.times, [[z * factors for z in scan] for scan in scene.measurements], scene.region)
+
+
+DEGREES = np.array([1.0, 180 / np.pi, 180 / np.pi])
+
+
+@pytest.mark.parametrize(
+    ("factors", "message"),
+    [
+        (DEGREES, r"Radar3D 'radar 1': azimuths from .* degrees\? radians are expected"),
+        ([1.0, 1.0, 180 / np.pi], "elevations from .* beyond pi/2: degrees"),
+        ([0.001, 1.0, 1.0], "100 % of its ranges .* lie outside of its field of view .*: another unit"),
+        ([1 / 0.3048, 1.0, 1.0], "ranges .* lie outside"),
+    ],
+)
+def test_measurements_in_other_units(factors, message):
+    with pytest.warns(AssocWarning) as caught:
+        scene = changed(simulate("three-radar", scans=6), factors)
+    assert re.search(message, "\n".join(str(one.message) for one in caught))
+    # of each radar one line for each component, and the line of this file that is to blame
+    assert len(caught) == len(scene.warnings) == (6 if factors is DEGREES else 3)
+    assert {one.filename for one in caught} == {__file__}
+
+
+def test_positions_in_degrees_or_kilometres():
+    rng = np.random.default_rng(1)
+    sensor = PositionSensor(position=[0, 0, 0], noise=[50, 50], field_of_view=[[-1e5, 1e5]] * 2)
+    places = rng.uniform([7, 46], [9, 48], size=(10, 4, 2))
+    with pytest.warns(AssocWarning) as caught:
+        Scene([sensor], np.arange(10), [[one] for one in places])
+    expected = r"PositionSensor \(sensor 0\): its x \(.* m\) all lie closer together than their noise \(50 m\)"
+    assert len(caught) == 2 and re.match(expected, str(caught[0].message))
+
+
+def test_sensors_in_degrees():
+    with pytest.warns(AssocWarning, match="noise of azimuth is 5 rad: degrees"):
+        BearingSensor(position=[0, 0, 0], noise=[5.0])
+    view = [[0, 1e5], [-1, 1], [0, 60]]
+    with pytest.warns(AssocWarning, match="field_of_view of elevation is 0 to 60 rad"):
+        Radar3D(position=[0, 0, 0], noise=[50, 0.01, 0.01], field_of_view=view)
+
+
+def test_costs_of_which_none_is_negative():
+    costs = np.random.default_rng(2).uniform(0, 9, size=27)
+    problem = assoc.AssignmentProblem(np.argwhere(np.ones((3, 3, 3))) + 1, costs, [3, 3, 3])
+    with pytest.warns(AssocWarning, match="none of the 27 tuples costs less .* negative log likelihood ratios"):
+        found = assoc.assign(problem)
+    assert found.status == "optimal" and (np.count_nonzero(found.tuples, axis=1) == 1).all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assoc.assign(assoc.AssignmentProblem(problem.tuples[:27], np.append(costs[:-1], -1.0), [3, 3, 3]))
+
+
+def test_dates_become_seconds():
+    scene = simulate("three-radar", scans=3)
+    start = datetime.datetime(2024, 1, 1, tzinfo=datetime.UTC)
+    wanted = start.timestamp() + np.array([0.0, 1.5, 3.0])
+    dates = [start + datetime.timedelta(seconds=s) for s in (0, 1.5, 3)]
+    plain = [one.replace(tzinfo=None) for one in dates]
+    as_days = np.array(plain, "datetime64[ms]")
+    zone = datetime.timezone(datetime.timedelta(hours=5))
+    for times in (dates, plain, as_days, list(as_days), pd.DatetimeIndex(plain), pd.Series(plain),
+                  pd.DatetimeIndex(dates), [one.astimezone(zone) for one in dates]):  # fmt: skip
+        np.testing.assert_allclose(Scene(scene.sensors, times, scene.measurements).times, wanted, rtol=0, atol=1e-5)
+    apart = [one - dates[0] for one in dates]
+    np.testing.assert_allclose(Scene(scene.sensors, apart, scene.measurements).times, [0, 1.5, 3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ([datetime.datetime(2024, 1, 1), 1.0, 2.0], "times must be all dates or all seconds, got both"),
+        (np.array(["2024-01-01", "NaT", "2024-01-02"], "datetime64[s]"), "times must be complete"),
+        (["2024-01-01", "2024-01-02", "2024-01-03"], "times must be numbers"),
+    ],
+)
+def test_dates_that_are_refused(times, message):
+    scene = simulate("three-radar", scans=3)
+    with pytest.raises(InvalidInputError, match=message):
+        Scene(scene.sensors, times, scene.measurements)
+
+
+def test_dates_elsewhere_are_refused():
+    with pytest.raises(InvalidInputError, match=r"position must be numbers, got datetime64\[s\]"):
+        BearingSensor(position=np.zeros(3, "datetime64[s]"), noise=[0.1])
+
+
+def test_programs_say_it_in_a_line(tmp_path):
+    with pytest.warns(AssocWarning):
+        changed(simulate("three-radar", scans=6), [0.001, 1.0, 1.0]).save(tmp_path / "km.npz")
+    for program in (["solve", "km.npz", "--jobs", "2", "--report", "a.html"],
+                    ["track", "km.npz", "-o", "tracks.csv", "--report", "b.html"]):  # fmt: skip
+        command = [sys.executable, "-W", "error", "-m", f"assoc.{program[0]}", *program[1:]]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+        lines = done.stderr.splitlines()
+        assert done.returncode == 0 and len(lines) == 3
+        assert all(one.startswith(f"assoc.{program[0]}: warning: Radar3D 'radar ") for one in lines)
+    for page in ("a.html", "b.html"):
+        text = (tmp_path / page).read_text()
+        assert "<b>3 warnings</b>" in text and text.count("lie outside of its field of view") == 3
+    # a sound one says nothing of warnings
+    simulate("three-radar", scans=2).save(tmp_path / "sound.npz")
+    sound = Scene.load(tmp_path / "sound.npz")
+    write_association_report(tmp_path / "c.html", assoc.associate(sound), sound)
+    assert "warned" not in (tmp_path / "c.html").read_text().split("</style>")[1].split("<script")[0]

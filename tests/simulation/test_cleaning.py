@@ -1,0 +1,186 @@
+"""Reports cleaned and resampled: spoiled flights against the flights that they were."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assoc.scene.geodesy import east_north_up
+from assoc.simulation import simulate
+from assoc.simulation.cleaning import Reports, clean
+from assoc.simulation.interpolation import frame_velocities, resample
+
+ORIGIN = (0.8, 0.1, 0.0)
+NONE = np.full((1, 3), np.nan)
+
+
+def flight(target=0, count=30, start=0.0, height=9000.0, climb=0.0):
+    """Northeast at some 230 m/s, a report every 10 s."""
+    time = start + 10.0 * np.arange(count)
+    away = 2.5e-5 * (time - start)
+    velocity = np.broadcast_to([np.nan, np.nan, np.nan], (count, 3))
+    return Reports(
+        time, np.full(count, target), 0.8 + away, 0.1 + away, height + climb * (time - start), np.array(velocity)
+    )
+
+
+def joined(*parts):
+    return Reports(*(np.concatenate([getattr(one, name) for one in parts]) for name in vars(parts[0])))
+
+
+def unknown(reports):
+    return np.full(len(reports), np.nan)
+
+
+def test_clean_reports_stay():
+    reports = joined(flight(), flight(1, climb=20.0), flight(3, 2))
+    kept, found = clean(reports, unknown(reports))
+    assert (found.repeated, found.places, found.altitudes) == (0, 0, 0) and found.notes() == {}
+    for name in vars(reports):
+        np.testing.assert_array_equal(getattr(kept, name), getattr(reports, name))
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_positions_repeated_after_the_last_one_heard(told):
+    """An aircraft vanishes after 20 reports; the network goes on with the last one for 10 more."""
+    whole = flight()
+    stale = np.minimum(np.arange(30), 19)
+    rows = whole.rows(stale)
+    seen = replace(rows, time=whole.time)
+    updated = whole.time[stale] if told else unknown(seen)
+    kept, found = clean(seen, updated)
+    assert found.repeated == 10 and len(kept) == 20 and list(found.notes().values()) == [10]
+    np.testing.assert_array_equal(kept.time, whole.time[:20])
+
+
+def test_positions_have_the_time_when_they_were_heard():
+    reports = flight()
+    kept, _ = clean(reports, reports.time - 3.0)
+    np.testing.assert_allclose(kept.time, reports.time - 3.0)
+    # a time after the row's own is none
+    kept, _ = clean(reports, reports.time + 5.0)
+    np.testing.assert_array_equal(kept.time, reports.time)
+
+
+def test_what_stands_still_may_repeat_its_place():
+    reports = flight().rows(np.zeros(30, dtype=int))
+    parked = replace(reports, time=10.0 * np.arange(30))
+    kept, found = clean(parked, unknown(parked))
+    assert found.repeated == 0 and len(kept) == 30
+    told = replace(parked, velocity=np.broadcast_to([200.0, 0.0, 0.0], (30, 3)))
+    assert clean(told, unknown(told))[1].repeated == 29
+
+
+def test_altitudes_are_mended_and_climbs_are_not():
+    plain = joined(flight(climb=15.0), flight(2, climb=-20.0))
+    heights = plain.height.copy()
+    wrong = [0, 5, 6, 29, 30, 44]
+    heights[wrong] = [0.0, 0.0, -300.0, 25_000.0, 0.0, 12_800.0]
+    kept, found = clean(replace(plain, height=heights), unknown(plain))
+    assert found.altitudes == 6
+    inner = [5, 6, 44]
+    np.testing.assert_allclose(kept.height[inner], plain.height[inner], atol=1.0)
+    # at the ends there is nothing to draw a line to: the next height
+    np.testing.assert_allclose(kept.height, plain.height, atol=201.0)
+    good = np.setdiff1d(np.arange(60), wrong)
+    np.testing.assert_array_equal(kept.height[good], plain.height[good])
+
+
+def test_places_far_off_are_left_out():
+    plain = flight()
+    latitude = plain.latitude.copy()
+    latitude[12] += 0.02
+    kept, found = clean(replace(plain, latitude=latitude), unknown(plain))
+    assert found.places == 1 and 12 * 10.0 not in kept.time and len(kept) == 29
+
+
+def test_few_reports():
+    for count in (1, 2, 3):
+        reports = flight(count=count)
+        assert len(clean(reports, unknown(reports))[0]) == count
+
+
+def turning(times):
+    """A turn of 3 degrees a second at 200 m/s: places and velocities in the plane."""
+    rate, speed = np.radians(3.0), 200.0
+    angle = rate * times
+    place = speed / rate * np.stack([np.sin(angle), 1 - np.cos(angle), np.zeros(len(times))], axis=1)
+    return place, speed * np.stack([np.cos(angle), np.sin(angle), np.zeros(len(times))], axis=1)
+
+
+def reports_at(times):
+    nothing = np.zeros(len(times))
+    return Reports(times, np.zeros(len(times), dtype=int), nothing, nothing, nothing, np.full((len(times), 3), np.nan))
+
+
+def errors(velocities):
+    own, wanted = np.arange(0.0, 61.0, 10.0), np.arange(10.0, 50.1, 1.0)
+    place, velocity = turning(own)
+    _, found = resample(reports_at(own), place, wanted, 60.0, velocity if velocities else None)
+    truth, _ = turning(wanted)
+    return np.linalg.norm(np.concatenate(found) - truth, axis=1)
+
+
+def test_curves_follow_turns():
+    """Chords are off by up to v w dt^2 / 8 = 131 m; a cubic with velocities by (w dt)^4 r / 384 = 0.75 m."""
+    assert errors(velocities=True).max() < 1.5
+    assert errors(velocities=False).max() < 25.0
+
+
+def test_places_of_reports_are_kept_and_straight_flight_is_straight():
+    own = np.array([0.0, 7.0, 19.0, 30.0])
+    place = own[:, None] * np.array([100.0, -50.0, 5.0])
+    ids, found = resample(reports_at(own), place, np.array([0.0, 3.0, 7.0, 18.0, 30.0, 31.0]), 60.0)
+    np.testing.assert_allclose(np.concatenate(found), np.array([[0], [3], [7], [18], [30]]) * [100.0, -50.0, 5.0])
+    assert [len(one) for one in ids] == [1, 1, 1, 1, 1, 0]
+
+
+def test_velocities_that_cannot_be_right_are_not_used():
+    own = np.arange(0.0, 41.0, 10.0)
+    place = own[:, None] * np.array([200.0, 0.0, 0.0])
+    wrong = np.tile([-200.0, 300.0, 0.0], (5, 1))
+    _, found = resample(reports_at(own), place, np.array([5.0, 15.0]), 60.0, wrong)
+    np.testing.assert_allclose(np.concatenate(found), [[1000.0, 0, 0], [3000.0, 0, 0]], atol=1e-9)
+
+
+def test_gaps_are_kept():
+    own = np.array([0.0, 10.0, 200.0, 210.0])
+    place = own[:, None] * np.array([100.0, 0.0, 0.0])
+    ids, _ = resample(reports_at(own), place, np.array([5.0, 100.0, 205.0]), 60.0)
+    assert [len(one) for one in ids] == [1, 0, 1]
+
+
+def test_velocities_in_the_frame():
+    """East, north, up far from the origin, against differences of places a second apart along a great circle."""
+    lat, lon = np.array([0.8, 0.83, 0.78]), np.array([0.1, 0.16, 0.05])
+    reports = Reports(np.zeros(3), np.arange(3), lat, lon, np.full(3, 9e3), np.tile([120.0, 180.0, -7.0], (3, 1)))
+    places = east_north_up(lat, lon, reports.height, ORIGIN)
+    found = frame_velocities(reports, places, ORIGIN)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.linalg.norm([120.0, 180.0, -7.0]), rtol=1e-4)
+    np.testing.assert_allclose(found[0], [120.0, 180.0, -7.0], atol=0.05)
+    # elsewhere the plane of the horizon is another: up there is not up here
+    assert abs(found[1, 2] + 7.0) > 1.0
+    hidden = replace(reports, velocity=np.concatenate([NONE, reports.velocity[1:]]))
+    assert np.isnan(frame_velocities(hidden, places, ORIGIN)[0]).all()
+
+
+def test_a_file_of_opensky(tmp_path):
+    """One aircraft that vanishes after 100 s and is repeated for 100 s more, with an altitude of 0 in between."""
+    rows = ["time,icao24,lat,lon,velocity,heading,vertrate,geoaltitude,lastposupdate"]
+    for k in range(21):
+        n = min(k, 10)
+        height = 0 if k == 5 else 9000
+        rows.append(f"{1000 + 10 * k},aa,{50 + 0.02 * n},8.0,222.5,0,0,{height},{1000 + 10 * n - 0.5}")
+    path = tmp_path / "states.csv"
+    path.write_text("\n".join(rows) + "\n")
+    scene = simulate("from-tracks", file=str(path), interval=10.0)
+    assert [len(one) for one in scene.truth.target_ids] == [1] * 10 + [0] * 11
+    assert scene.notes["rows left out, repeating an older position"] == 10
+    assert scene.notes["altitudes mended, far from those before and after"] == 1
+    heights = np.array([one[0, 2] for one in scene.truth.positions[:10]])
+    assert np.ptp(heights) < 60.0
+    raw = simulate("from-tracks", file=str(path), interval=10.0, clean=False)
+    assert [len(one) for one in raw.truth.target_ids] == [1] * 21
+    assert raw.truth.positions[5][0, 2] < 100.0 and not any("repeating" in what for what in raw.notes)

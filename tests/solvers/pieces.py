@@ -1,0 +1,115 @@
+"""Problems and components on which metaheuristics are compared with plain references, step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import assoc
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.components.splitting import split_components
+from assoc.packing.prepare import prepare
+from assoc.simulation import simulate
+from experiments.common.instances.synthetic import axial_random
+from experiments.common.oracles import gated_problem
+
+
+def problems():
+    """Problems of several kinds that no bound closes: ghosts, dense ones with ties and signs, an axial one."""
+    rng = np.random.default_rng(5)
+    return {
+        "ghosts": assoc.build_problem(simulate("bearing-only", seed=1, targets=5, scans=1), 0),
+        "mixed": gated_problem(rng, (5, 6, 4), 0.4, "mixed"),
+        "ties": gated_problem(rng, (6, 5, 5), 0.3, "ties"),
+        "four": gated_problem(rng, (4, 4, 4, 3), 0.2, "mixed"),
+        "axial": axial_random(5, 3),
+    }
+
+
+def open_problem():
+    """Return a problem whose gap no bound closes at once, and which greedy does not solve."""
+    return gated_problem(np.random.default_rng(3), (8, 8, 7), 0.3, "mixed")
+
+
+def component(problem, refinement="none"):
+    """Return the largest component of a problem, with multipliers that leave its gap open."""
+    packing = prepare(problem).packing
+    duals = dual_bound(packing)
+    # looser multipliers: what is reduced to nothing shows no difference between one choice and another
+    duals = np.where(packing.slack, np.minimum(1.02 * duals - 0.05, 0.0), duals - 0.05)
+    parts = split_components(packing, duals, np.arange(packing.num_columns))
+    one = max(parts, key=lambda part: part.packing.num_columns)
+    one.refinement = refinement
+    return one
+
+
+def rows_of(packing, j):
+    """Rows of column j."""
+    return [int(r) for r in packing.cols[j] if r >= 0]
+
+
+def columns_of(owner):
+    """Chosen columns of a cover."""
+    return sorted({int(j) for j in owner if j >= 0})
+
+
+def cover_of(packing, columns):
+    """Owner of each row."""
+    owner = np.full(packing.num_rows, -1, dtype=np.int32)
+    for j in columns:
+        assert (owner[rows_of(packing, j)] < 0).all()
+        owner[rows_of(packing, j)] = j
+    return owner
+
+
+def weight(packing, columns):
+    """Weight of a choice of columns, as searches see it: what must be covered is covered at any price."""
+    price = 0.0
+    if packing.is_axial:
+        price = 2.0 * np.abs(packing.weights).max() * packing.cols.shape[1] + 1.0
+    duty = [sum(not packing.slack[r] for r in rows_of(packing, j)) for j in columns]
+    return float(sum(packing.weights[j] for j in columns) - price * sum(duty))
+
+
+def temperature(one, best):
+    """Scale of the reduced costs that matter, from the least weight known (``inf``: none)."""
+    widest = max(0.02 * np.ptp(one.packing.weights), 1e-12)
+    if best == np.inf:
+        return widest
+    return min(max((best - one.bound) / 4.0, 1e-9 * max(1.0, abs(one.bound))), widest)
+
+
+def is_complete(packing, columns):
+    """Whether all rows that must be covered are."""
+    return {r for j in columns for r in rows_of(packing, j)} >= set(np.flatnonzero(~packing.slack))
+
+
+def reference_walk(one, tau, slack_tau, alpha, beta, scale, ants, rng):
+    """Covers of all ants, drawn by eq. 8 with eta_j = exp(-2^k rc_j / T); the columns of each."""
+    packing = one.packing
+    order = list(range(packing.num_rows))
+    covers = []
+    for ant in range(ants):
+        strictness = beta * 2.0 ** (ant % 10) / scale
+        power = strictness * one.reduced
+        value = np.where(power < 40.0, tau**alpha * np.exp(-power), 0.0)
+        stay = np.where(packing.slack, slack_tau**alpha * np.exp(strictness * np.minimum(one.duals, 0.0)), 0.0)
+        for i in range(len(order) - 1, 0, -1):
+            k = int(rng.integers(0, i + 1))
+            order[i], order[k] = order[k], order[i]
+        taken, chosen = set(), []
+        for r in order:
+            if r in taken:
+                continue
+            allowed = [j for j in range(packing.num_columns) if r in rows_of(packing, j)]
+            allowed = [j for j in allowed if not taken & set(rows_of(packing, j))]
+            chances = np.array([stay[r], *value[allowed]])
+            draw = rng.random()
+            if chances.sum() > 0.0:
+                place = int(np.searchsorted(np.cumsum(chances / chances.sum()), draw, side="right")) - 1
+            else:
+                place = 0 if allowed else -1
+            if place >= 0:
+                chosen.append(allowed[place])
+                taken |= set(rows_of(packing, allowed[place]))
+        covers.append(sorted(chosen))
+    return covers

@@ -1,0 +1,171 @@
+"""Mode mmas against a plain max-min ant system, cycle by cycle, same random numbers; pheromone by tuple."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.packing.neighbourhoods.random_cover import Trail, walk
+from assoc.solvers.aco.max_min import Colony
+from assoc.solvers.aco.parameters import AcoParameters
+from tests.solvers.pieces import (
+    columns_of,
+    component,
+    is_complete,
+    open_problem,
+    problems,
+    reference_walk,
+    temperature,
+    weight,
+)
+
+PROBLEMS = problems()
+RENEWAL = 15
+
+
+@pytest.mark.parametrize("alpha, beta", [(1.0, 1.0), (2.0, 0.5), (0.0, 3.0), (1.5, 0.0)])
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_walks(name, alpha, beta):
+    """The best of 12 ants, on a trail of random pheromone."""
+    one = component(PROBLEMS[name])
+    rng = np.random.default_rng(3)
+    for seed in range(3):
+        tau, slack_tau = rng.uniform(0.1, 1.0, one.packing.num_columns), rng.uniform(0.1, 1.0, one.packing.num_rows)
+        scale = temperature(one, np.inf) * (0.3, 1.0, 10.0)[seed]
+        trail = Trail(tau, slack_tau, alpha, beta, scale)
+        owner, least = walk(one.arrays, one.prices, trail, 12, False, np.random.default_rng(seed), np.inf)
+        covers = reference_walk(one, tau, slack_tau, alpha, beta, scale, 12, np.random.default_rng(seed))
+        best = min(covers, key=lambda columns: weight(one.packing, columns))
+        assert columns_of(owner) == best
+        assert least == pytest.approx(weight(one.packing, best), rel=1e-12)
+
+
+def reference_colony(one, parameters, cycles, rng):
+    """A max-min ant system without any local search; yields both pheromones and the best columns after each cycle."""
+    packing, p = one.packing, parameters
+    lowest = 1.0 / (2.0 * max(np.count_nonzero(packing.cols >= 0) / packing.num_rows, 1.0))
+    tau, slack_tau = np.ones(packing.num_columns), np.ones(packing.num_rows)
+    best, least = None, np.inf
+    recent, recent_least = None, np.inf
+    stalled = 0
+    for cycle in range(cycles):
+        covers = reference_walk(one, tau, slack_tau, p.alpha, p.beta, temperature(one, least), p.ants, rng)
+        columns = min(covers, key=lambda found: weight(packing, found))
+        cost = packing.weights[columns].sum()
+        better = is_complete(packing, columns) and cost < least - one.tolerance
+        if better:
+            best, least = columns, cost
+        if is_complete(packing, columns) and cost < recent_least:
+            recent, recent_least = columns, cost
+        elite = recent if recent is not None and cycle % 3 == 2 else columns
+        tau, slack_tau = p.rho * tau, p.rho * slack_tau
+        tau[elite] += 1.0 - p.rho
+        covered = packing.cols[elite]
+        slack_tau[np.setdiff1d(np.arange(packing.num_rows), covered[covered >= 0])] += 1.0 - p.rho
+        tau, slack_tau = np.maximum(tau, lowest), np.maximum(slack_tau, lowest)
+        if stalled and stalled % RENEWAL == 0:
+            tau, slack_tau = np.ones_like(tau), np.ones_like(slack_tau)
+            recent, recent_least = None, np.inf
+        stalled = 0 if better else stalled + 1
+        yield tau, slack_tau, best
+
+
+@pytest.mark.parametrize("name, rho", [*((name, 0.8) for name in PROBLEMS), ("mixed", 0.3)])
+def test_cycle_by_cycle(name, rho):
+    one = component(PROBLEMS[name])
+    parameters = AcoParameters(ants=6, alpha=1.5, beta=0.7, rho=rho, refinement="none")
+    told = []
+    colony = Colony(one, parameters, lambda who, state: told.append((who, state)))
+    rng = np.random.default_rng(7)
+    renewed = 0
+    expected = reference_colony(one, parameters, 40, np.random.default_rng(7))
+    for tau, slack_tau, best in expected:
+        before = one.weight
+        colony.iterate(one, rng)
+        np.testing.assert_allclose(colony.pheromone, tau, rtol=1e-12)
+        np.testing.assert_allclose(colony.slack_pheromone, slack_tau, rtol=1e-12)
+        assert (None if one.best is None else columns_of(one.best)) == best
+        renewed += bool((tau == 1.0).all())
+        one.iterations += 1
+        one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
+    assert told == [(one, colony)] * 40
+    assert renewed, "the renewal was not seen"
+    assert colony.pheromone.max() <= 1.0
+
+
+def test_a_colony_starts_from_the_best_known():
+    one = component(PROBLEMS["mixed"])
+    one.offer_greedy()
+    colony = Colony(one, AcoParameters(rho=0.6), lambda *_: None)
+    chosen = np.isin(np.arange(one.packing.num_columns), columns_of(one.best))
+    np.testing.assert_allclose(colony.pheromone[chosen], 1.0)
+    np.testing.assert_allclose(colony.pheromone[~chosen], max(0.6, colony.lowest))
+
+
+def test_ants_walk_in_the_default_mode():
+    """With nothing else at work they find what greedy does not."""
+    problem = open_problem()
+    seen = []
+    found = assoc.assign(problem, "aco", refinement="none", iterations=40, watch=seen.append)
+    greedy = assoc.assign(problem, "greedy")
+    best = assoc.assign(problem, "exact")
+    assert greedy.cost > best.cost + 1.0
+    assert found.cost == pytest.approx(best.cost, abs=1e-6)
+    assert [state.number for state in seen] == list(range(1, 41))
+
+
+def test_probability_of_a_cycle():
+    """What `Cycle` says, counted: the share of first draws of the first ant."""
+    seen = []
+    problem = open_problem()
+    assoc.assign(problem, "aco", alpha=1.3, beta=0.8, iterations=3, refinement="none", watch=seen.append)
+    state = seen[-1]
+    n = state.columns.size
+    packing = assoc.packing.prepare.prepare(problem).packing
+    rows = packing.cols[state.columns]
+    value = state.pheromone**1.3 * state.visibility**0.8
+    for node in range(len(value)):
+        own = rows[node][rows[node] >= 0] if node < n else state.rows[[node - n]]
+        shares = []
+        for r in own:
+            rivals = np.concatenate([(rows == r).any(axis=1), state.rows == r])
+            shares.append(value[node] / value[rivals].sum())
+        assert state.probability[node] == pytest.approx(np.mean(shares), rel=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["paper", "mmas"])
+def test_pheromone_by_tuple(mode):
+    """Histories are in the problem's tuples, and end where `assign` does."""
+    problem = assoc.build_problem(assoc.simulation.simulate("crowd", 0, targets=30, scans=1), 0)
+    limits = {"mode": mode, "iterations": 12, "refinement": "none"}
+    cycles = []
+    history = assoc.solvers.pheromone(problem, seed=2, watch=cycles.append, **limits)
+    solution = assoc.assign(problem, "aco", seed=2, **limits)
+    assert history.solution.cost == solution.cost
+    assert history.pheromone.shape == (len(history.cycles), len(history.tuples))
+    assert len(history.cycles) == max((one.number for one in cycles), default=0)
+    prices = dict(zip(map(tuple, problem.tuples.tolist()), problem.costs, strict=True))
+    assert history.costs == pytest.approx([prices[tuple(row)] for row in history.tuples.tolist()])
+    packing = assoc.packing.prepare.prepare(problem).packing
+    for one in cycles:
+        number = {tuple(row): i for i, row in enumerate(history.tuples.tolist())}
+        at = [number[tuple(row)] for row in problem.tuples[packing.origin[one.columns]].tolist()]
+        np.testing.assert_array_equal(history.pheromone[one.number - 1, at], one.pheromone[: len(at)])
+        np.testing.assert_array_equal(history.visibility[one.number - 1, at], one.visibility[: len(at)])
+    top = history.top(7)
+    assert top.tuples.shape == (7, 3) and top.chosen.all()
+
+
+def test_a_colony_learns_what_others_found():
+    """A better cover from elsewhere is what every third cycle lays pheromone for."""
+    one = component(open_problem())
+    one.offer_greedy()
+    colony = Colony(one, AcoParameters(ants=1, beta=0.0, rho=0.5, refinement="none"), lambda *_: None)
+    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
+    assert one.offer(found, one.weight_of(found))
+    one.iterations = 2
+    colony.iterate(one, np.random.default_rng(0))
+    chosen = np.isin(np.arange(one.packing.num_columns), columns_of(found))
+    assert (colony.pheromone[chosen] >= 0.5 + 0.5 * colony.lowest - 1e-12).all()
+    assert colony.least == one.weight

@@ -1,0 +1,181 @@
+"""The genetic algorithm against a plain one, generation by generation, same random numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.solvers.genetic.parameters import GeneticParameters
+from assoc.solvers.genetic.population import Breeding, _cross
+from tests.solvers.pieces import (
+    columns_of,
+    component,
+    cover_of,
+    is_complete,
+    open_problem,
+    problems,
+    reference_walk,
+    rows_of,
+    temperature,
+)
+
+PROBLEMS = problems()
+RENEWAL = 10
+
+
+def reference_child(one, mother, father, scale, mutation, rng):
+    """What both have, then the rest in an order drawn by reduced cost where it fits; then some is given up."""
+    packing = one.packing
+    taken, child = set(), []
+    for j in sorted(set(mother) & set(father)):
+        child.append(j)
+        taken |= set(rows_of(packing, j))
+    owners = cover_of(packing, mother), cover_of(packing, father)
+    rest = []
+    for r in range(packing.num_rows):
+        if owners[0][r] == owners[1][r]:
+            continue
+        for j in (owner[r] for owner in owners):
+            # each column is met in its first row
+            if j >= 0 and rows_of(packing, j)[0] == r:
+                gumbel = -np.log(-np.log(rng.random()))
+                rest.append((one.reduced[j] / scale + gumbel, int(j)))
+    for _, j in sorted(rest):
+        if not taken & set(rows_of(packing, j)):
+            child.append(j)
+            taken |= set(rows_of(packing, j))
+    owner = cover_of(packing, child)
+    for r in range(packing.num_rows):
+        if owner[r] >= 0 and rng.random() < mutation / packing.cols.shape[1]:
+            owner[rows_of(packing, owner[r])] = -1
+    return columns_of(owner)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_crossover_and_mutation(name):
+    one = component(PROBLEMS[name])
+    ones = np.ones(one.packing.num_columns), np.ones(one.packing.num_rows)
+    different = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        scale = temperature(one, np.inf) * (0.1, 1.0, 30.0)[seed % 3]
+        parents = reference_walk(one, *ones, 1.0, 1.0, 10.0 * scale, 2, rng)
+        mutation = (0.0, 0.3, 1.0)[seed // 4]
+        covers = [cover_of(one.packing, columns) for columns in parents]
+        child = _cross(one.arrays, one.reduced, *covers, scale, mutation, np.random.default_rng(seed))
+        expected = reference_child(one, *parents, scale, mutation, np.random.default_rng(seed))
+        assert columns_of(child) == expected
+        np.testing.assert_array_equal(child, cover_of(one.packing, expected))
+        if mutation == 0.0:
+            assert {*parents[0]} & {*parents[1]} <= {*expected} <= {*parents[0]} | {*parents[1]}
+            different += expected not in parents
+    assert different or name == "ties", "no child was other than its parents"
+
+
+class Reference:
+    """A population of column lists, bred without any local search."""
+
+    def __init__(self, one, parameters, rng):
+        self.one, self.p, self.rng = one, parameters, rng
+        self.best, self.least = None, np.inf
+        self.members, self.fitness = [], []
+        self.stalled = 0
+
+    def offer(self, columns):
+        """Weight of a new cover; the best complete one is kept."""
+        cost = self.one.packing.weights[columns].sum()
+        if cost < self.least - self.one.tolerance and is_complete(self.one.packing, columns):
+            self.best, self.least = columns, cost
+        return cost
+
+    def populate(self):
+        """Fill up with random greedy covers, strict and loose ones by turns."""
+        packing = self.one.packing
+        ones = np.ones(packing.num_columns), np.ones(packing.num_rows)
+        while len(self.members) < self.p.population:
+            strictness = 2.0 ** (len(self.members) % 10)
+            (columns,) = reference_walk(
+                self.one, *ones, 1.0, strictness, temperature(self.one, self.least), 1, self.rng
+            )
+            cost = self.offer(columns)
+            self.members.append(columns)
+            self.fitness.append(cost if is_complete(packing, columns) else np.inf)
+
+    def parent(self):
+        """Best of some members drawn with replacement."""
+        drawn = self.rng.integers(0, len(self.members), size=self.p.tournament)
+        return self.members[min(drawn, key=lambda i: self.fitness[i])]
+
+    def generation(self):
+        """Children replace the worst where they are better and new; a population without progress is renewed."""
+        before = self.least
+        if not self.members:
+            self.populate()
+        else:
+            for _ in range(self.p.offspring):
+                mother, father = self.parent(), self.parent()
+                scale = temperature(self.one, self.least)
+                child = reference_child(self.one, mother, father, scale, self.p.mutation, self.rng)
+                cost = self.offer(child)
+                worst = int(np.argmax(self.fitness))
+                new = all(abs(cost - other) > self.one.tolerance for other in self.fitness)
+                if is_complete(self.one.packing, child) and new and cost < self.fitness[worst]:
+                    self.members[worst], self.fitness[worst] = child, cost
+            if self.stalled and self.stalled % RENEWAL == 0:
+                best = int(np.argmin(self.fitness))
+                keep = [best] if (self.stalled // RENEWAL) % 2 else []
+                self.members = [self.members[i] for i in keep]
+                self.fitness = [self.fitness[i] for i in keep]
+                self.populate()
+        self.stalled = 0 if self.least < before - self.one.tolerance else self.stalled + 1
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_generation_by_generation(name):
+    one = component(PROBLEMS[name])
+    parameters = GeneticParameters(population=8, offspring=5, tournament=3, mutation=0.2, refinement="none")
+    breeding, rng = Breeding(one, parameters), np.random.default_rng(11)
+    expected = Reference(one, parameters, np.random.default_rng(11))
+    renewals = 0
+    for _ in range(35):
+        renewals += expected.stalled > 0 and expected.stalled % RENEWAL == 0
+        expected.generation()
+        before = one.weight
+        breeding.iterate(one, rng)
+        one.iterations += 1
+        one.stalled = 0 if one.weight < before - one.tolerance else one.stalled + 1
+        assert [columns_of(member) for member in breeding.members] == expected.members
+        np.testing.assert_allclose(breeding.fitness, expected.fitness, rtol=1e-12)
+        assert (None if one.best is None else columns_of(one.best)) == expected.best
+        assert one.stalled == expected.stalled
+    assert renewals >= 2, "renewals with the best and without it were not seen"
+
+
+def test_breeding_starts_from_the_best_known():
+    one = component(PROBLEMS["mixed"])
+    one.offer_greedy()
+    known = one.best.copy()
+    breeding = Breeding(one, GeneticParameters(refinement="none"))
+    breeding.iterate(one, np.random.default_rng(0))
+    np.testing.assert_array_equal(breeding.members[0], known)
+    assert breeding.members.shape == (20, one.packing.num_rows)
+
+
+def test_breeding_alone_finds_what_greedy_does_not():
+    problem = open_problem()
+    best, greedy = assoc.assign(problem, "exact").cost, assoc.assign(problem, "greedy").cost
+    costs = [assoc.assign(problem, "genetic", seed=seed, refinement="none").cost for seed in range(2)]
+    assert greedy > best + 1.0
+    assert min(costs) == pytest.approx(best, abs=1e-6)
+
+
+def test_a_population_learns_what_others_found():
+    """A better cover from elsewhere becomes a member."""
+    one = component(open_problem())
+    breeding = Breeding(one, GeneticParameters(population=4, offspring=1, refinement="none"))
+    breeding.iterate(one, np.random.default_rng(0))
+    found = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(200)), key=one.weight_of)
+    assert one.offer(found, one.weight_of(found))
+    breeding.iterate(one, np.random.default_rng(1))
+    assert found.tolist() in breeding.members.tolist()

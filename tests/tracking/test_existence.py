@@ -1,0 +1,76 @@
+"""Whether a target is still there: a Bernoulli recursion, and what of a track is reported."""
+
+import math
+
+import numpy as np
+import pytest
+
+from assoc import filters
+from assoc.filters import Gaussian
+from assoc.tracking import TRACKERS, LifeCycle
+from assoc.tracking.filter_choice import make_filter, manoeuvre_noise, pace_of
+from tests.tracking import plain
+
+LIFETIME = 50.0
+
+
+def tracker_of(kind, mean, **options):
+    motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
+    tracker = kind(
+        [plain.sensor(), plain.sensor(P=0.6)], filters.KalmanFilter(motion), region=plain.REGION,
+        life_cycle=LifeCycle(lifetime=LIFETIME, deletion_time=1e3), **options,
+    )  # fmt: skip
+    tracker.begin(0.0, Gaussian(mean[None], np.eye(6)[None]), score=20.0)
+    return tracker
+
+
+NOTHING = [np.zeros((0, 3))] * 2
+
+
+@pytest.mark.parametrize("kind", TRACKERS.values())
+def test_misses_and_time_take_from_existence_what_bayes_says(kind):
+    tracker = tracker_of(kind, np.array([500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    p, reported = 1 / (1 + math.exp(-20.0)), []
+    for k in range(1, 5):
+        tracker.step(2.0 * k, NOTHING)
+        p *= math.exp(-2.0 / LIFETIME)
+        for P in (0.8, 0.6):
+            p = p * (1 - P) / (1 - p * P)
+        (track,) = tracker.tracks
+        assert track.existence == pytest.approx(p, rel=1e-6)
+        assert track.confirmed
+        reported.append(track.reported)
+        assert track.reported == (p >= 0.5)
+    assert reported[0] and not reported[-1]
+
+
+@pytest.mark.parametrize("kind", TRACKERS.values())
+def test_a_detection_brings_a_track_back(kind):
+    tracker = tracker_of(kind, np.array([500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    for k in range(1, 4):
+        tracker.step(2.0 * k, NOTHING)
+    assert not any(track.reported for track in tracker.tracks)
+    tracker.step(8.0, [np.array([[500.0, 500.0, 250.0]])] * 2)
+    (track,) = [track for track in tracker.tracks if track.confirmed]
+    assert track.track_id == 1
+    assert track.reported
+
+
+@pytest.mark.parametrize("kind", TRACKERS.values())
+def test_what_no_sensor_can_see_is_not_missed(kind):
+    # the sensors see up to x = 1000 m
+    tracker = tracker_of(kind, np.array([1500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    tracker.step(2.0, NOTHING)
+    (track,) = tracker.tracks
+    assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
+
+
+def test_the_default_process_noise_suits_the_pace():
+    assert pace_of(np.array([0.0, 10.0, 20.0, 31.0])) == 10.0
+    assert pace_of(np.zeros(1)) == 1.0
+    assert manoeuvre_noise(0.1) == manoeuvre_noise(1.0) == 50.0
+    # the variance of a velocity's change from scan to scan is alike
+    assert manoeuvre_noise(10.0) ** 2 * 10.0 == pytest.approx(50.0**2)
+    slow = make_filter("imm-cv", [plain.sensor()], pace=10.0)
+    state = slow.predict(slow.start(Gaussian(np.zeros((1, 6)), 1e-6 * np.eye(6)[None])), 10.0)
+    assert state.covariances[0, 1, 3, 3] == pytest.approx(50.0**2, rel=1e-3)

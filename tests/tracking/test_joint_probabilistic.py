@@ -1,0 +1,125 @@
+"""The joint probabilistic tracker against enumeration of all joint events."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from assoc import InvalidInputError, filters
+from assoc.filters import Gaussian
+from assoc.filters.merging import merged
+from assoc.tracking import JointProbabilisticTracker
+from tests.tracking import plain
+
+SCORE = 1.5
+"""Of the tracks at the start: their existence is likely, not certain."""
+
+
+def tracker_of(sensor, **options):
+    motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
+    return JointProbabilisticTracker(
+        [sensor], filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12, **options
+    )
+
+
+def close_targets(rng, count=3):
+    """States of targets side by side, and a scan with one false alarm."""
+    mean = np.concatenate([rng.uniform(420, 450, (count, 3)), rng.normal(0, 10, (count, 3))], axis=1)
+    cov = np.diag([60.0] * 3 + [20.0] * 3)
+    seen = mean[rng.random(count) < 0.8, :3]
+    z = np.concatenate([seen + rng.normal(0, 10, seen.shape), rng.uniform(420, 450, (1, 3))])
+    return mean, cov, rng.permutation(z)
+
+
+def by_enumeration(mean, cov, z, sensor, score):
+    """Probability of each pair, of no measurement, and of existence; and corrected states."""
+    T, M = len(mean), len(z)
+    p, P = 1 / (1 + math.exp(-score)), sensor.detection_probability
+    density = sensor.false_alarm_rate / sensor.volume
+    done = [[plain.correct(mean[t], cov, z[m], sensor.covariance) for m in range(M)] for t in range(T)]
+    total, pair = 0.0, np.zeros((T, M + 1))
+    for way in itertools.product(range(M + 1), repeat=T):
+        used = [w for w in way if w]
+        if len(used) != len(set(used)):
+            continue
+        weight = 1.0
+        for t, w in enumerate(way):
+            weight *= p * P * math.exp(done[t][w - 1][2]) / density if w else 1 - p * P
+        total += weight
+        for t, w in enumerate(way):
+            pair[t, w] += weight
+    pair /= total
+    left = pair[:, 0] * p * (1 - P) / (1 - p * P)
+    return pair, left, done
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_probabilities_existence_and_states_are_those_of_all_joint_events(seed):
+    rng, sensor = np.random.default_rng(seed), plain.sensor()
+    mean, cov, z = close_targets(rng)
+    tracker = tracker_of(sensor, max_events=10_000)
+    tracker.begin(0.0, Gaussian(mean, np.repeat(cov[None], len(mean), axis=0)), score=SCORE)
+    tracker.step(0.0, [z])
+    pair, left, done = by_enumeration(mean, cov, z, sensor, SCORE)
+    (found,) = tracker.probabilities
+    for i, m, p, low, high in zip(
+        found.track_id, found.measurement, found.probability, found.lower, found.upper, strict=True
+    ):
+        assert p == pytest.approx(pair[i - 1, m + 1], abs=1e-9)
+        assert low - 1e-12 <= pair[i - 1, m + 1] <= high + 1e-12
+    exists = pair[:, 1:].sum(axis=1) + left
+    tracks = {track.track_id: track for track in tracker.tracks}
+    for t in range(len(mean)):
+        track = tracks[t + 1]
+        assert track.score == pytest.approx(math.log(exists[t] / (1 - exists[t])), abs=1e-6)
+        parts = [(left[t], mean[t], cov), *((pair[t, m + 1], *done[t][m][:2]) for m in range(len(z)))]
+        middle = sum(w * x for w, x, _ in parts) / exists[t]
+        spread = sum(w * (C + np.outer(x - middle, x - middle)) for w, x, C in parts) / exists[t]
+        np.testing.assert_allclose(track.mean, middle, rtol=1e-6)
+        np.testing.assert_allclose(track.covariance, spread, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_intervals_of_few_events_hold(seed):
+    rng, sensor = np.random.default_rng(seed), plain.sensor()
+    mean, cov, z = close_targets(rng, count=4)
+    tracker = tracker_of(sensor, max_events=2)
+    tracker.begin(0.0, Gaussian(mean, np.repeat(cov[None], len(mean), axis=0)), score=SCORE)
+    tracker.step(0.0, [z])
+    pair, _, _ = by_enumeration(mean, cov, z, sensor, SCORE)
+    (found,) = tracker.probabilities
+    true = pair[found.track_id - 1, found.measurement + 1]
+    assert (found.lower - 1e-12 <= true).all()
+    assert (true <= found.upper + 1e-12).all()
+    assert (found.upper - found.lower).max() > 1e-3
+
+
+def test_models_are_merged_each_by_itself():
+    rng = np.random.default_rng(2)
+    means, weights = rng.normal(0, 5, (3, 2, 4)), rng.dirichlet([1, 1], 3)
+    roots = rng.normal(0, 1, (3, 2, 4, 4))
+    covariances = roots @ roots.transpose(0, 1, 3, 2)
+    state = filters.InteractingMultipleModel(
+        [filters.KalmanFilter(filters.ConstantVelocity(q, dimensions=2)) for q in (1.0, 9.0)],
+        np.array([[0.9, 0.1], [0.1, 0.9]]),
+    ).start(Gaussian(means[:, 0], covariances[:, 0]))
+    mixture = type(state)(means, covariances, weights)
+    share = np.array([0.25, 0.75, 1.0])
+    found = merged(mixture, np.array([0, 0, 1]), share, 2)
+    # moments of the whole mixture are kept, and a single state stays what it is
+    whole = 0.25 * mixture.mean[0] + 0.75 * mixture.mean[1]
+    np.testing.assert_allclose(found.mean[0], whole)
+    away = mixture.mean[:2] - whole
+    parts = mixture.covariance[:2] + away[:, :, None] * away[:, None]
+    np.testing.assert_allclose(found.covariance[0], 0.25 * parts[0] + 0.75 * parts[1])
+    np.testing.assert_allclose(found.means[1], means[2])
+    np.testing.assert_allclose(found.weights[0], 0.25 * weights[0] + 0.75 * weights[1])
+
+
+def test_states_that_cannot_be_merged_are_refused():
+    ensemble = filters.EnsembleKalmanFilter(filters.ConstantVelocity(1.0), 20)
+    with pytest.raises(InvalidInputError, match="cannot be merged"):
+        JointProbabilisticTracker([plain.sensor()], ensemble, region=plain.REGION)
+    with pytest.raises(InvalidInputError, match="max_events"):
+        tracker_of(plain.sensor(), max_events=0)

@@ -1,0 +1,73 @@
+"""Sensors of which none can start a track alone: tracks begin where bearings cross, and ghosts die."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from assoc import build_problem
+from assoc.scene import Scan
+from assoc.sensors import BearingSensor
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth
+from assoc.tracking import TRACKERS
+from assoc.tracking.joint_starts import crossings
+
+REGION = np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 100.0]])
+NOISE, TARGETS = 2e-3, 4
+
+
+@cache
+def scene(seed, scans=25):
+    """Three bearing sensors around four slow targets, two false alarms in each scan."""
+    rng = np.random.default_rng(seed)
+    sensors = [
+        BearingSensor(
+            position=place, noise=np.array([NOISE]), detection_probability=0.9, false_alarm_rate=2.0,
+            field_of_view=np.array([padded_azimuth(azimuth_interval(place, REGION), NOISE)]), name=f"sensor {i}",
+        )
+        for i, place in enumerate(on_circle(np.zeros(3), 15e3, 3))
+    ]  # fmt: skip
+    middle = np.column_stack([rng.uniform(-5e3, 5e3, (TARGETS, 2)), np.full(TARGETS, 50.0)])
+    heading, speed = rng.uniform(-np.pi, np.pi, TARGETS), rng.uniform(10.0, 30.0, TARGETS)
+    velocity = np.column_stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(TARGETS)])
+    times = 4.0 * np.arange(scans)
+    paths = middle + (times - times.mean())[:, None, None] * velocity
+    ids = [np.arange(TARGETS)] * scans
+    return observe(sensors, times, ids, list(paths), rng, region=REGION, velocities=[velocity] * scans)
+
+
+@pytest.mark.parametrize("name", ["mht", "joint-probabilistic", "multi-sensor"])
+def test_three_bearings_start_all_tracks_and_ghosts_die(name):
+    one = scene(7)
+    tracker = TRACKERS[name].for_scene(one)
+    found, false = [], []
+    for k in range(one.num_scans):
+        scan = one.scan(k)
+        tracker.step(scan.time, scan.measurements)
+        places = np.array([track.position[:2] for track in tracker.tracks if track.reported]).reshape(-1, 2)
+        away = np.linalg.norm(scan.truth_positions[:, None, :2] - places[None], axis=2)
+        found.append(int((away.min(axis=1, initial=np.inf) < 300.0).sum()))
+        false.append(int((away.min(axis=0) > 500.0).sum()) if len(places) else 0)
+    assert TARGETS in found[:10]
+    assert found[-1] == TARGETS
+    assert not any(false[20:])
+
+
+def test_crossings_are_the_tuples_of_what_is_free():
+    one = scene(7)
+    scan = one.scan(3)
+    whole = build_problem(one, scan)
+    several = np.count_nonzero(whole.tuples, axis=1) > 1
+    free = [np.ones(len(z), dtype=np.bool_) for z in scan.measurements]
+    found = crossings(one, scan, free)
+    assert sorted(map(tuple, found.rows)) == sorted(map(tuple, whole.tuples[several]))
+    free[0][0] = False
+    left = crossings(one, scan, free)
+    without = several & (whole.tuples[:, 0] != 1)
+    assert sorted(map(tuple, left.rows)) == sorted(map(tuple, whole.tuples[without]))
+    costs = dict(zip(map(tuple, whole.tuples), whole.costs, strict=True))
+    np.testing.assert_allclose(left.costs, [costs[tuple(row)] for row in left.rows], rtol=1e-9)
+    nothing = [np.zeros(len(z), dtype=np.bool_) for z in scan.measurements]
+    assert crossings(one, scan, nothing) is None
+    assert crossings(one, Scan(0, 0.0, tuple(z[:0] for z in scan.measurements)), [z[:0] for z in nothing]) is None

@@ -1,0 +1,147 @@
+"""Plots one by one: the tracks of a scene, and what comes of clocks that jump, silence, repetition, strangers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from assoc._cli.live import replayed
+from assoc.errors import InvalidInputError
+from assoc.simulation import simulate
+from assoc.tracking import TRACKERS, LiveTracker
+
+TURNS = [4.0, 5.0, 5.5]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return simulate("rotating-radars", 4, aircraft=4, duration=40.0, false_alarms=1.0)
+
+
+def live(scene, **options):
+    told = []
+    made = LiveTracker(
+        scene,
+        lambda: TRACKERS["nearest-neighbour"].for_scene(scene),
+        **({"turns": TURNS, "tell": told.append} | options),
+    )
+    return made, told
+
+
+def fed(tracker, plots):
+    pictures = []
+    for plot in plots:
+        pictures += tracker.take(*plot)
+    return pictures + tracker.finish()
+
+
+def found(pictures, scene):
+    """Distance of each target at the end from the nearest track."""
+    last = pictures[-1]
+    ahead = float(scene.times[-1]) - last.time
+    places = np.array([track.position + ahead * track.velocity for track in last.tracks]).reshape(-1, 3)
+    truth = scene.truth.positions[-1]
+    assert last.time == pytest.approx(scene.times[-1], abs=1.5)
+    return [float(np.linalg.norm(places - one, axis=1).min()) for one in truth]
+
+
+def test_tracks_of_a_stream_are_those_of_the_scene(scene):
+    tracker, told = live(scene)
+    pictures = fed(tracker, replayed(scene, 0.0))
+    assert max(found(pictures, scene)) < 300.0
+    assert len(pictures[-1].tracks) == 4 and not told
+    assert [one.time for one in pictures] == list(map(float, range(1, len(pictures) + 1)))
+    plots = sum(len(one.plots) for one in pictures)
+    assert plots == sum(len(z) for scan in scene.measurements for z in scan) == tracker.counts["plots"]
+    assert "p99" in tracker.summary() and len(tracker.seconds) == len(pictures) >= 39
+
+
+def test_what_is_wrong_is_told_once_and_the_tracker_goes_on(scene):
+    tracker, told = live(scene)
+    plots = []
+    for k, plot in enumerate(replayed(scene, 0.0)):
+        plots.append(plot)
+        if k % 10 == 5:
+            plots += [
+                plot,  # repeated
+                plot._replace(sensor="nobody"),
+                plot._replace(values=plot.values[:1]),
+                plot._replace(values=[math.nan] * 3),
+                plot._replace(values=[-5e4, 0.0, 0.0]),
+                plot._replace(time=math.inf),
+                plot._replace(time=plot.time + 5_000.0),  # a clock ahead of all others
+                plot._replace(time=plot.time - 5_000.0),  # and one behind
+            ]
+    pictures = fed(tracker, plots)
+    assert max(found(pictures, scene)) < 300.0 and len(pictures[-1].tracks) == 4
+    kinds = ["unknown sensor 'nobody'", "repeats a plot", "left out: measurements of sensor", "ahead of all others"]
+    for words in [*kinds, "more than 30 s late"]:
+        assert sum(words in line for line in told) == 1, (words, told)
+    assert all("\n" not in line for line in told) and len(told) == 5
+    rounds = tracker.counts["repeated"]
+    assert rounds > 10
+    assert tracker.counts["unknown sensor"] == tracker.counts["ahead"] == tracker.counts["too old"] == rounds
+    assert tracker.counts["unusable"] == 4 * rounds
+
+
+def test_late_plots_are_put_in_their_place(scene):
+    rng = np.random.default_rng(0)
+    plots = list(replayed(scene, 0.0))
+    delay = rng.uniform(0, 10, len(plots)) * (rng.random(len(plots)) < 0.2)
+    order = np.argsort([plot.time + d for plot, d in zip(plots, delay, strict=True)])
+    tracker, told = live(scene)
+    pictures = fed(tracker, [plots[k] for k in order])
+    assert max(found(pictures, scene)) < 300.0
+    assert tracker.counts["late"] > 20 and not told and tracker.counts["plots"] == len(plots)
+    # with patience for them none is late
+    patient, _ = live(scene, wait=11.0)
+    fed(patient, [plots[k] for k in order])
+    assert patient.counts["late"] == 0
+
+
+def test_a_clock_that_jumps_for_all_is_believed(scene):
+    plots = list(replayed(scene, 0.0))
+    half = len(plots) // 2
+    for jump, words in ((7_200.0, "the clock jumped from"), (-7_200.0, "the clock went back from")):
+        tracker, told = live(scene)
+        moved = [plot._replace(time=plot.time + jump) for plot in plots[half:]]
+        pictures = fed(tracker, plots[:half] + moved)
+        assert sum(words in line for line in told) == 1
+        assert pictures[-1].time == pytest.approx(scene.times[-1] + jump, abs=1.5)
+        assert len(pictures[-1].tracks) >= 3
+        # tracks begin anew, with ids that were not used before
+        before = {t.track_id for one in pictures if abs(one.time) < 1_000 for t in one.tracks}
+        after = {t.track_id for one in pictures if abs(one.time) > 1_000 for t in one.tracks}
+        assert before and after and max(before) < min(after)
+
+
+def test_the_silence_of_a_radar_is_no_miss(scene):
+    plots = [plot for plot in replayed(scene, 0.0) if plot.sensor != "2" or plot.time < 10.0 or plot.time > 30.0]
+    tracker, told = live(scene)
+    pictures = fed(tracker, plots)
+    assert len(pictures[-1].tracks) == 4
+    name = scene.sensors[1].name
+    assert [line.split(" ")[0:4] for line in told] == [
+        [*name.split(), "says", "nothing"],
+        [*name.split(), "is", "back"],
+    ]
+
+
+def test_without_turns_a_sensor_looks_when_it_speaks():
+    still = simulate("crowd", 2, targets=5, scans=8, width=20_000.0)
+    tracker, told = live(still, turns=None)
+    pictures = fed(tracker, replayed(still, 0.0))
+    assert len(pictures[-1].tracks) == 5 and not told
+
+
+def test_what_is_refused(scene):
+    for options, words in [
+        ({"turns": [4.0]}, "turns: expected one for each of 3 sensors"),
+        ({"turns": [4.0, 5.0, 0.5]}, "turns: must not be shorter than the interval"),
+        ({"interval": 0.0}, "interval"),
+        ({"horizon": -1.0}, "horizon"),
+    ]:
+        with pytest.raises(InvalidInputError, match=words):
+            live(scene, **options)
