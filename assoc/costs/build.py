@@ -71,7 +71,7 @@ def build_problem(
     target_density : float or "auto", optional
         None is equation 5: the likelihood at the best position. A number is the density of targets in the region,
         per m^3 (per m^2 if no sensor measures full positions): positions are integrated out under it, and a cost gains
-        -ln(density (2 pi)^(n/2) |P|^(1/2)) with P the covariance of the position. "auto" takes the density from the
+        -ln(density (2 pi)^(n/2) det(P)^(1/2)) with P the covariance of the position. "auto" takes the density from the
         numbers of measurements in the scene. The prior is right where measurements hardly determine positions, as
         bearings: equation 5 then finds too many targets.
     all_tuples : bool
