@@ -23,7 +23,7 @@ PROGRAMS = {
 """Name of each: a module ``assoc.NAME`` with a function ``start``; what it does, and an example."""
 
 _OTHERS = {
-    "check": ("check a proof, or a solution, in exact arithmetic", "problem.npz proof.json"),
+    "check": ("check a proof, or a solution, in exact arithmetic", "problem.txt proof.json"),
     "completion": ("print what a shell needs to complete names and options", "bash (or zsh, fish)"),
 }
 
