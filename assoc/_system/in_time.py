@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import math
 import threading
 from collections.abc import Callable
 from typing import TypeVar
@@ -11,6 +12,7 @@ Answer = TypeVar("Answer")
 
 # seconds that work which was told to stop is given when Python ends
 _FAREWELL = 10.0
+_LOOK = 0.2
 
 
 class StopSignal:
@@ -36,6 +38,7 @@ class StopSignal:
 def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSignal | None = None) -> Answer | None:
     """Return what the work returns, or None when it is not back in that time; what it raises is raised.
 
+    The time may be infinite: then the work is done aside so that Ctrl-C is heard while a library is at it.
     The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself. With a
     `stop` signal it is told to end, and when Python ends it is given some seconds to do so: CP-SAT would take the
     whole process with it (SIGABRT, whatever the program's exit code was to be).
@@ -51,15 +54,27 @@ def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSig
 
     thread = threading.Thread(target=run_aside, name=name, daemon=True)
     thread.start()
-    thread.join(max(seconds, 0.0))
+    try:
+        # a signal may have come to another thread: this one looks now and then
+        while seconds == math.inf and thread.is_alive():
+            thread.join(_LOOK)
+        if seconds < math.inf:
+            thread.join(max(seconds, 0.0))
+    except BaseException:
+        _tell(stop, thread)
+        raise
     if errors:
         raise errors[0]
     if answers:
         return answers[0]
+    _tell(stop, thread)
+    return None
+
+
+def _tell(stop: StopSignal | None, thread: threading.Thread) -> None:
     if stop is not None:
         stop.send()
         _leave(thread)
-    return None
 
 
 _left: list[threading.Thread] = []

@@ -52,14 +52,12 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
     bound, duals = -math.inf, None
     columns: NDArray[np.integer] | None = None
-    if run.time_limit is None:
-        answer = _solve(packing, parameters, math.inf, run)
-    else:
+    if run.time_limit is not None:
         # made first: when the time is over it would be too late
         columns = _quick(packing, run)
         duals = dual_bound(packing, run=Run(run.rng, time_limit=0.3 * run.time_limit, started=run.started))
         bound = certified_bound(packing, duals)
-        answer = _solve_in_time(packing, parameters, run)
+    answer = _solve_in_time(packing, parameters, run)
     if answer.infeasible:
         raise infeasible(packing)
     if not answer.proven:
@@ -84,7 +82,7 @@ def _solve(
 
 
 def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> Answer:
-    """Solve in the time that is left, or give up.
+    """Solve in the time that is left, or give up; Ctrl-C is heard meanwhile.
 
     Backends look at the clock between steps of their own, and before their first step not at all: a large one
     may be late by many seconds. So the backend works in a thread, which is left behind when time is over (CP-SAT is
