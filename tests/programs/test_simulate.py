@@ -70,7 +70,7 @@ def test_help_is_silent_on_stderr(run, words):
     "words,message",
     [
         ([], "SCENARIO"),
-        (["five-radar", "-o", "x.npz"], "invalid choice: 'five-radar'"),
+        (["five-radar", "-o", "x.npz"], "unknown scenario 'five-radar'; did you mean three-radar?"),
         (["crowd"], "-o/--output"),
         (["crowd", "-o", "x.npz", "--targets", "many"], "--targets: expected a whole number, got 'many'"),
         (["crowd", "-o", "x.npz", "--noise", "-1"], "noise: expected a number above 0, got -1.0"),
