@@ -364,7 +364,7 @@ def _of_scene(
     name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
-    numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes))
+    numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
     table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
