@@ -11,7 +11,6 @@ from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
-
 # nodes for each component: some minutes on the hardest that were seen; `exact` alone searches to the end
 _NODES = 20_000
 
