@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import lzma
 import re
 import sys
 
@@ -113,9 +114,9 @@ def whole(word: object) -> int:
 
 
 def read_text(path: str) -> str:
-    """Return what a file holds, as far as it is not larger than 2 GB."""
-    with open(path, encoding="utf-8") as file:
-        return file.read(2_000_000_000)
+    """Return what a file, or one packed by xz, holds, as far as it is not larger than 2 GB."""
+    with lzma.open(path) if path.endswith(".xz") else open(path, "rb") as file:
+        return file.read(2_000_000_000).decode()
 
 
 def cost_of(problem: Problem, chosen: list[tuple[int, ...]]) -> int:
@@ -288,7 +289,7 @@ def main(words: list[str]) -> int:
     except RefusedError as error:
         print(f"{path}: refused: {error}", file=sys.stderr)
         return 1
-    except (OSError, ValueError, RecursionError, AttributeError, MemoryError) as error:
+    except (OSError, ValueError, RecursionError, AttributeError, MemoryError, lzma.LZMAError, EOFError) as error:
         print(f"{path}: {getattr(error, 'strerror', None) or error}".splitlines()[0], file=sys.stderr)
         return 2
     return 0

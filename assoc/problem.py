@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
 from assoc._system import memory
 from assoc.errors import InvalidInputError, LimitExceededError
 
@@ -219,10 +219,11 @@ class AssignmentProblem:
         return sorted(parts, key=lambda part: int(part[0]))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write ``problem.npz``, or plain text where the name ends in ``.txt`` (docs/formats.md, docs/proofs.md)."""
-        if os.fspath(path).endswith(".txt"):
-            from assoc._files.problem_text import write_problem_text
+        """Write ``problem.npz``, or plain text where the name ends in ``.txt`` or ``.txt.xz``.
 
+        The formats are described in docs/formats.md and docs/proofs.md.
+        """
+        if is_text(path):
             write_problem_text(path, self.tuples, self.costs, self.sizes, self.dummy)
             return
         from assoc._files.npz import save_npz
@@ -236,7 +237,7 @@ class AssignmentProblem:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> AssignmentProblem:
-        """Read ``problem.npz``, or plain text where the name ends in ``.txt``.
+        """Read ``problem.npz``, or plain text where the name ends in ``.txt`` or ``.txt.xz``.
 
         Raises
         ------
@@ -252,9 +253,7 @@ class AssignmentProblem:
 
     @staticmethod
     def _read(path: str | PathLike[str]) -> dict[str, Any]:
-        if os.fspath(path).endswith(".txt"):
-            from assoc._files.problem_text import read_problem_text
-
+        if is_text(path):
             return read_problem_text(path)
         from assoc._files.npz import Field, load_npz
 

@@ -37,6 +37,16 @@ EXPERIMENTS = (
         "one line of JSON: family scale of the benchmarks",
     ),
     Experiment(
+        "sdlib",
+        "the benchmark set: makes, solves and proves its instances, checks them, runs any solver on them",
+        "docs/benchmark_set.md (tables), experiments/sdlib/best.json with solutions and proofs",
+    ),
+    Experiment(
+        "sdlib.verify",
+        "one file without dependencies: is a solution feasible, and what does it cost, exactly",
+        "nothing: judges the rows of experiments/sdlib/best.json",
+    ),
+    Experiment(
         "pages",
         "nothing: writes the tables of four pages from the result files",
         "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md",

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import io
+import lzma
+import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.output import FilePath, write_text
+from assoc._files.output import FilePath, write_atomically
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FIRST_LINE = "assoc-problem 1"
+ENDINGS = (".txt", ".txt.xz")
 _LARGEST = 2_000_000_000
 
 
@@ -34,7 +37,15 @@ def write_problem_text(
     lines = [FIRST_LINE, "sizes " + " ".join(map(str, sizes.tolist())), f"dummies {'yes' if dummy else 'no'}"]
     lines.append(f"tuples {len(costs)}")
     lines += [f"{cost!r} {' '.join(map(str, one))}" for cost, one in zip(costs.tolist(), tuples.tolist(), strict=True)]
-    write_text(path, "\n".join(lines) + "\n")
+    content = ("\n".join(lines) + "\n").encode()
+    if os.fspath(path).endswith(".xz"):
+        content = lzma.compress(content, preset=9)
+    write_atomically(path, lambda file: file.write(content))
+
+
+def is_text(path: FilePath) -> bool:
+    """Whether a file of this name holds a problem as text, packed or not."""
+    return os.fspath(path).endswith(ENDINGS)
 
 
 def read_problem_text(path: FilePath) -> dict[str, Any]:
@@ -46,14 +57,17 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
         It is no such file.
     """
     try:
-        with open(path, encoding="utf-8") as file:
-            text = file.read(_LARGEST + 1)
+        with lzma.open(path) if os.fspath(path).endswith(".xz") else open(path, "rb") as file:
+            content = file.read(_LARGEST + 1)  # a packed file may be small and hold more than there is memory for
+        if len(content) > _LARGEST:
+            raise InvalidInputError(f"{path}: is larger than 2 GB")
+        text = content.decode()
+    except (lzma.LZMAError, EOFError):
+        raise InvalidInputError(f"{path}: is damaged, or not packed by xz") from None
     except UnicodeDecodeError:
         raise InvalidInputError(f"{path}: is no text, expected a problem in text form or an npz file") from None
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if len(text) > _LARGEST:
-        raise InvalidInputError(f"{path}: is larger than 2 GB")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not lines or lines[0].split() != FIRST_LINE.split():
         raise InvalidInputError(f"{path}: the first line must be {FIRST_LINE!r}")

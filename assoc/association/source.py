@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from assoc._files.npz import format_of
+from assoc._files.problem_text import is_text
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
@@ -19,7 +20,7 @@ def load_source(path: str) -> Source:
     InvalidInputError
         It is neither, or cannot be read.
     """
-    if path.endswith(".txt"):
+    if is_text(path):
         return AssignmentProblem.load(path)
     found = format_of(path)
     if found is None and _is_table(path):

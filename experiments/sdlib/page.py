@@ -1,0 +1,54 @@
+"""The tables of docs/benchmark_set.md, from what is known."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from assoc._files.output import write_text
+from experiments.sdlib import store
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmark_set.md"
+BEGIN = "<!-- tables: written by python -m experiments.sdlib page -->"
+END = "<!-- end of tables -->"
+
+
+def tables() -> str:
+    """Return the tables as text."""
+    rows = store.table()
+    families: dict[str, list[str]] = defaultdict(list)
+    for name, row in rows.items():
+        families[row["family"]].append(name)
+    optimal = sum(row["status"] == "optimal" for row in rows.values())
+    share = 100 * optimal / max(len(rows), 1)
+    lines = [f"{len(rows)} instances, {optimal} proved optimal ({share:.0f} %), each with a proof in the repository.", ""]
+    lines += ["| family | instances | tuples | proved |", "|---|---|---|---|"]
+    for family, names in sorted(families.items()):
+        counts = [rows[name]["tuples"] for name in names]
+        proved = sum(rows[name]["status"] == "optimal" for name in names)
+        lines.append(f"| {family} | {len(names)} | {min(counts):,} to {max(counts):,} | {proved} |")
+    lines += [
+        "",
+        "| instance | sizes | tuples | components | root bound | best value | best bound | status | who, when | seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    lines += [_line(name, rows[name]) for names in families.values() for name in names]
+    return "\n".join(lines)
+
+
+def _line(name: str, row: dict[str, Any]) -> str:
+    sizes = " ".join(map(str, row["sizes"]))
+    bound = row["value"] if row["status"] == "optimal" else f"{row['bound']:.6f}"
+    return (
+        f"| {name} | {sizes} | {row['tuples']:,} | {row['components']:,} | {row['root bound']:.6f} | {row['value']} "
+        f"| {bound} | {row['status']} | {row['who']}, {row['when']} | {row['seconds']:.2f} |"
+    )
+
+
+def write_page() -> None:
+    """Put the tables into the page."""
+    text = PAGE.read_text()
+    before, rest = text.split(BEGIN)
+    after = rest.split(END)[1]
+    write_text(PAGE, f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}")

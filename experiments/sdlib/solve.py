@@ -1,0 +1,103 @@
+"""Solve an instance, keep what is better than what was known, and prove it."""
+
+from __future__ import annotations
+
+import lzma
+import math
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from assoc import check
+from assoc._files.output import write_text
+from assoc.problem import AssignmentProblem
+from assoc.proofs.write import write_proof
+from assoc.solution import Solution
+from assoc.solvers.assign import assign
+from experiments.sdlib import store, verify
+from experiments.sdlib.instances import Instance
+
+# relative distance to which multipliers in floating point may leave a proof short of the optimum
+_CLOSED = 1e-9
+
+
+def solve(one: Instance, known: dict[str, Any] | None, seconds: float, today: str) -> dict[str, Any]:
+    """Solve an instance; return its row of the table, and write solution and proof where they are better."""
+    problem = store.load(one.name)
+    started = time.perf_counter()
+    solution = assign(problem, "exact", time_limit=seconds)
+    taken = time.perf_counter() - started
+    root = assign(problem, "lagrangian", time_limit=min(seconds, 10.0)).lower_bound
+    row = {
+        "family": one.family,
+        "sizes": problem.sizes.tolist(),
+        "dummies": problem.dummy,
+        "tuples": problem.num_tuples,
+        "components": len(problem.components()),
+        "root bound": root,
+        "value": None,
+        "bound": -math.inf,
+        "status": "open",
+        "who": "assoc exact",
+        "when": today,
+        "seconds": round(taken, 2),
+        **(known or {}),
+    }
+    cost = exact_cost(problem, solution)
+    better = row["value"] is None or float(cost) < float(row["value"])
+    if better:
+        row.update(value=cost, who="assoc exact", when=today, seconds=round(taken, 2))
+        store.solution_file(one.name).parent.mkdir(exist_ok=True)
+        write_text(store.solution_file(one.name), store.solution_text(solution, cost))
+    if solution.lower_bound > row["bound"]:
+        row["bound"] = solution.lower_bound
+    if (better or row["status"] != "optimal") and solution.status == "optimal":
+        bound = _prove(one.name, problem, solution)
+        row["bound"] = max(row["bound"], bound)
+        if float(cost) - bound <= _CLOSED * max(1.0, abs(float(cost))):
+            row.update(status="optimal", bound=bound, seconds=round(taken, 2))
+    return row
+
+
+def exact_cost(problem: AssignmentProblem, solution: Solution) -> str:
+    """Return the cost of a solution as `verify` adds it up."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "problem.txt"
+        problem.save(path)
+        return verify.decimal(verify.cost_of(*verify.read_instance(str(path)), _tuples(solution)))
+
+
+def _tuples(solution: Solution) -> list[tuple[int, ...]]:
+    return [tuple(one) for one in solution.tuples.tolist()]
+
+
+def _prove(name: str, problem: AssignmentProblem, solution: Solution) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "proof.json"
+        bound = write_proof(path, problem, solution)
+        store.proof_file(name).parent.mkdir(exist_ok=True)
+        store.pack(store.proof_file(name), path.read_text())
+    return bound
+
+
+def check_row(name: str, row: dict[str, Any]) -> str | None:
+    """Check a row of the table by the verifier and, if it says optimal, by the checker of proofs; what is wrong."""
+    try:
+        instance = verify.read_instance(str(store.instance_file(name)))
+        chosen, _ = verify.read_solution(str(store.solution_file(name)))
+        cost = verify.cost_of(*instance, chosen)
+        if verify.decimal(cost) != row["value"]:
+            return f"costs {verify.decimal(cost)}, the table says {row['value']}"
+        if row["status"] != "optimal":
+            return None
+        problem = check.read_problem(str(store.instance_file(name)))
+        with lzma.open(store.proof_file(name)) as file:
+            proof = file.read().decode()
+        said = check.check(problem, proof)[-1]
+        gap = float(said.split("gap ")[1].rstrip(")"))
+        if gap > _CLOSED * max(1.0, abs(float(cost))):
+            return f"the proof leaves a gap of {gap}"
+    except (OSError, ValueError, verify.NoSolutionError, check.RefusedError) as error:
+        return str(error)
+    return None

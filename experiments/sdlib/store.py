@@ -1,0 +1,56 @@
+"""Where the set lies: instances, best solutions and proofs as files, and the table of what is known."""
+
+from __future__ import annotations
+
+import json
+import lzma
+from pathlib import Path
+from typing import Any
+
+from assoc._files.output import write_atomically, write_json
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+
+FOLDER = Path(__file__).parent
+TABLE = FOLDER / "best.json"
+
+
+def instance_file(name: str) -> Path:
+    """Where an instance lies."""
+    return FOLDER / "instances" / f"{name}.txt.xz"
+
+
+def solution_file(name: str) -> Path:
+    """Where its best solution lies."""
+    return FOLDER / "solutions" / f"{name}.txt"
+
+
+def proof_file(name: str) -> Path:
+    """Where the proof lies that the best solution is optimal, if it is."""
+    return FOLDER / "proofs" / f"{name}.json.xz"
+
+
+def load(name: str) -> AssignmentProblem:
+    """Load an instance."""
+    return AssignmentProblem.load(instance_file(name))
+
+
+def solution_text(solution: Solution, cost: str) -> str:
+    """Write down a solution."""
+    lines = ["assoc-solution 1", f"cost {cost}", *(" ".join(map(str, one)) for one in solution.tuples.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def pack(path: Path, text: str) -> None:
+    """Write a text, packed."""
+    write_atomically(path, lambda file: file.write(lzma.compress(text.encode(), preset=9)))
+
+
+def table() -> dict[str, dict[str, Any]]:
+    """Return what is known of each instance; empty before anything is."""
+    return dict(json.loads(TABLE.read_text())["instances"]) if TABLE.exists() else {}
+
+
+def write_table(rows: dict[str, dict[str, Any]]) -> None:
+    """Write what is known."""
+    write_json(TABLE, {"format": "assoc.sdlib", "version": 1, "instances": dict(sorted(rows.items()))})

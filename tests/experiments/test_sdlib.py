@@ -1,0 +1,131 @@
+"""The benchmark set: stored instances are those that are made, and what the table says is checked."""
+
+import json
+import lzma
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from assoc.problem import AssignmentProblem
+from assoc.solvers.assign import assign
+from experiments.common.oracles import small_problems
+from experiments.sdlib import store, verify
+from experiments.sdlib.instances import instances
+from experiments.sdlib.page import BEGIN, END, PAGE, tables
+from experiments.sdlib.solve import check_row
+
+EVERY = instances()
+NAMES = [one.name for one in EVERY]
+# quickly made, quickly checked
+LIGHT = [one for one in EVERY if one.family in ("paper", "radars", "mixed sensors")] + [
+    one for one in EVERY if one.name in ("bearings-20-2001", "gated-3x100-1", "axial-8-1", "planted-4-1")
+]
+
+
+def test_names_and_files_are_those_of_the_table():
+    assert len(set(NAMES)) == len(NAMES) >= 80
+    assert set(store.table()) == set(NAMES)
+    assert {path.name for path in store.instance_file("x").parent.iterdir()} == {f"{n}.txt.xz" for n in NAMES}
+    total = sum(path.stat().st_size for path in store.FOLDER.rglob("*") if path.is_file())
+    assert total < 20e6
+
+
+@pytest.mark.parametrize("one", [pytest.param(one, marks=() if one in LIGHT else pytest.mark.slow) for one in EVERY])
+def test_stored_instances_are_made_by_code_and_seed(one, tmp_path):
+    one.make().save(tmp_path / "made.txt.xz")
+    with lzma.open(tmp_path / "made.txt.xz") as made, lzma.open(store.instance_file(one.name)) as stored:
+        assert made.read() == stored.read()
+
+
+@pytest.mark.parametrize("one", [pytest.param(one, marks=() if one in LIGHT else pytest.mark.slow) for one in EVERY])
+def test_solutions_and_proofs_of_the_table_hold(one):
+    assert check_row(one.name, store.table()[one.name]) is None
+
+
+def test_share_proved():
+    rows = store.table().values()
+    assert sum(row["status"] == "optimal" for row in rows) >= 0.9 * len(rows)
+
+
+def test_page_is_that_of_the_table():
+    assert PAGE.read_text().split(BEGIN)[1].split(END)[0].strip() == tables().strip()
+
+
+def test_verifier_is_one_short_file_without_dependencies():
+    path = verify.__file__
+    assert len(open(path).read().splitlines()) < 200
+    name = "bearings-20-2001"
+    words = [sys.executable, "-I", path, store.instance_file(name), store.solution_file(name)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd="/")
+    assert done.stdout == f"feasible {store.table()[name]['value']}\n"
+
+
+def test_verifier_agrees_with_the_library(tmp_path):
+    for number, problem in enumerate(small_problems(20, 5, dummy=True)):
+        solution = assign(problem, "greedy", advise=False)
+        problem.save(tmp_path / f"{number}.txt")
+        (tmp_path / "s").write_text(store.solution_text(solution, "0").replace("cost 0\n", ""))
+        read = verify.read_instance(str(tmp_path / f"{number}.txt"))
+        cost = verify.cost_of(*read, verify.read_solution(str(tmp_path / "s"))[0])
+        assert float(cost) == pytest.approx(solution.cost, abs=1e-9)
+
+
+GOOD = "assoc-problem 1\nsizes 1 2\ndummies yes\ntuples 4\n-3.5 1 1\n0.0 1 0\n0.0 0 1\n0.0 0 2\n"
+
+
+@pytest.mark.parametrize(
+    "instance,solution,code,words",
+    [
+        (GOOD, "assoc-solution 1\ncost -3.5\n1 1\n0 2\n", 0, "feasible -3.5"),
+        (GOOD, "assoc-solution 1\n1 1\n", 1, "measurement 2 of sensor 2 is not used"),
+        (GOOD, "assoc-solution 1\n1 1\n0 1\n0 2\n", 1, "measurement 1 of sensor 2 is used twice"),
+        (GOOD, "assoc-solution 1\n1 2\n0 1\n", 1, "is not in the instance"),
+        (GOOD, "assoc-solution 1\ncost -3.6\n1 1\n0 2\n", 1, "it costs -3.5, not -3.6"),
+        (GOOD, "1 1\n0 2\n", 2, "the first line must be 'assoc-solution 1'"),
+        (GOOD.replace("tuples 4", "tuples 5"), "", 2, "number of tuples"),
+        (GOOD.replace("-3.5", "nan"), "", 2, "expected a decimal number"),
+        (GOOD.replace("-3.5 1 1", "-3.5 1 3"), "", 2, "no tuple of these sizes"),
+        (GOOD.replace("dummies yes", "dummies no"), "", 2, "has a dummy"),
+        ("", "", 2, "the first lines must be"),
+    ],
+)
+def test_verifier_judges(instance, solution, code, words, tmp_path, capsys):
+    (tmp_path / "i.txt").write_text(instance)
+    (tmp_path / "s.txt").write_text(solution)
+    assert verify.main([str(tmp_path / "i.txt"), str(tmp_path / "s.txt")]) == code
+    said = capsys.readouterr()
+    assert words in said.out + said.err
+    assert (said.out + said.err).count("\n") == 1
+
+
+def test_any_solver_can_be_run(tmp_path, capsys):
+    from experiments.sdlib.__main__ import main
+
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "import sys\n"
+        "lines = open(sys.argv[1]).read().split('\\n')[4:]\n"
+        "alone = [l.split()[1:] for l in lines if l and sum(w != '0' for w in l.split()[1:]) == 1]\n"
+        "open(sys.argv[2], 'w').write('assoc-solution 1\\n' + '\\n'.join(' '.join(one) for one in alone))\n"
+    )
+    command = f"{sys.executable} {script} {{instance}} {{solution}}"
+    assert main(["run", "--command", command, "bearings-20-2001"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert row["cost"] == "0" or float(row["cost"]) == 0.0
+    assert row["excess"] == pytest.approx(-float(store.table()["bearings-20-2001"]["value"]))
+    assert main(["run", "--command", f"{sys.executable} -c pass {{instance}} {{solution}}", "bearings-20-2001"]) == 0
+    assert "no solution was written" in capsys.readouterr().out
+
+
+def test_packed_problems_are_read_and_refused(tmp_path):
+    problem = AssignmentProblem([[1, 1], [1, 0], [0, 1]], [-2.5, 0.0, 0.0], [1, 1])
+    problem.save(tmp_path / "p.txt.xz")
+    again = AssignmentProblem.load(tmp_path / "p.txt.xz")
+    assert np.array_equal(again.tuples, problem.tuples) and np.array_equal(again.costs, problem.costs)
+    whole = (tmp_path / "p.txt.xz").read_bytes()
+    for name, content in (("cut.txt.xz", whole[:-9]), ("plain.txt.xz", b"assoc-problem 1\n")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(Exception, match=rf"{name}: is damaged, or not packed by xz"):
+            AssignmentProblem.load(tmp_path / name)
