@@ -34,11 +34,11 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
-	$(PY) -m pytest -n 2 -q -m "not slow"
+	$(PY) -m pytest -n 2 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
-	$(PY) -m pytest -n 2 -q
+	$(PY) -m pytest -n 2 --dist worksteal -q
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .

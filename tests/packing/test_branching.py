@@ -105,6 +105,7 @@ def test_without_memory_for_its_tables_a_search_gives_up_its_root():
     assert search.done and search.out_of_memory and search.nodes == 0 and search.lower_bound == -np.inf
 
 
+@pytest.mark.slow
 def test_the_two_children_of_a_node_partition_its_solutions():
     """Two rows of different sensors are together in one child, apart in the other: no solution is lost or twice."""
     for problem, _ in feasible(30, 75):

@@ -15,6 +15,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.simulation import simulate
 from experiments.common.oracles import gated_problem
+from tests.sizes import sample
 from tests.solvers.pieces import component, problems
 
 PROBLEM = gated_problem(np.random.default_rng(12), (8, 8, 7), 0.5, "mixed")
@@ -126,7 +127,7 @@ def test_workers_exchange_their_best(lucky):
     assert len({draw for member in members for draw in member.draws}) == 15
 
 
-@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+@sample("solver", ["aco", "genetic", "tabu"], every=3)
 def test_the_same_seed_and_workers_give_the_same_search(solver):
     """To the last bit, whichever thread was quicker."""
     found = []

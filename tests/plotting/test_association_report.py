@@ -199,6 +199,7 @@ def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association,
     assert not (tmp_path / "out.html").exists() and not (tmp_path / "out.csv").exists()
 
 
+@pytest.mark.slow
 def test_the_program_writes_it(tmp_path, scene):
     scene.save(tmp_path / "scene.npz")
     words = ["scene.npz", "--solver", "greedy", "--scans", "2:5", "--report", "out.html"]

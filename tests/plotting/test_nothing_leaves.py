@@ -64,6 +64,7 @@ def test_the_page_names_no_server(pages, name):
     assert servers == {"www.w3.org"}  # names of vocabularies, which nothing asks for
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size"),
     [("scene", DESKTOP), ("problem", DESKTOP), ("tracks", DESKTOP), ("study", DESKTOP), ("scene", PHONE)],

@@ -32,6 +32,7 @@ def test_hundreds_of_spoiled_files(count, made, tmp_path, monkeypatch):
     assert [fault for fault in faults if fault] == []
 
 
+@pytest.mark.slow
 def test_bombs_are_refused_before_they_go_off(made, tmp_path):
     room = next(one for one in ROOMS if one.name == "problem.npz")
     for path in bombs(tmp_path, made["problem.npz"][0].read_bytes(), 300_000_000):

@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 LIBRARY = """
 import _thread, json, os, signal, sys, threading, time
 import numpy as np
@@ -46,6 +48,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 def test_in_the_library():
     names = ["exact", "aco", "tabu", "genetic", "milp", "kbest"]
     done = subprocess.run(

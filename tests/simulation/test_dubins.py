@@ -73,6 +73,7 @@ def test_shortest_is_unchanged_by_symmetries_and_obeys_the_triangle(start, goal)
     assert shortest(start, halfway, 1.0).length <= 0.5 * length + 1e-6
 
 
+@pytest.mark.slow
 def test_no_feasible_polyline_is_shorter():
     """A search over turns and straights in small steps cannot beat the formula."""
     start, goal = Pose(0, 0, 0), Pose(0.5, 1.5, 2.5)
@@ -90,6 +91,7 @@ def test_no_feasible_polyline_is_shorter():
         assert near > 0.01
 
 
+@pytest.mark.slow
 @given(poses, st.sampled_from([-1.0, 0.0, 0.4, 1.0]), st.floats(0.01, 6), st.floats(-4, 4), st.floats(-4, 4))
 @settings(max_examples=100)
 def test_distance_from_a_piece(start, curvature, length, x, y):
