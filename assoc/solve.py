@@ -25,7 +25,7 @@ from assoc._cli.options import (
     read_first,
 )
 from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
-from assoc._cli.progress import with_progress
+from assoc._cli.progress import SoFar, with_progress
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import check_kind, cores, density, scan_range
@@ -92,13 +92,14 @@ def _associate(
     files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"]}
+    so_far = SoFar()
+    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"], "watch": so_far.note}
     plan, items = _plan(sources, files, solver, settings, parameters, extras)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
     names = [files[number] for number, _ in items]
-    progress = with_progress(scans, len(items), "associating", shown=not parsed["quiet"])
+    progress = with_progress(scans, len(items), "associating", shown=not parsed["quiet"], so_far=so_far)
     # a pipe gets all scans and columns when all are there: programs read it
     table = _ScanTable(sources, names, len(names) if parsed["all"] else _SHOWN) if sys.stdout.isatty() else None
     association = plan.gather(progress if table is None else table.watch(progress))
@@ -202,7 +203,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
-    extras: dict[str, bool],
+    extras: dict[str, Any],
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 

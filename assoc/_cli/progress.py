@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from assoc._system.compile_time import is_compiling
 
 if TYPE_CHECKING:
+    from assoc.solution import TracePoint
     from assoc.sweeps.study import Counts
 
 Item = TypeVar("Item")
@@ -17,6 +19,28 @@ Item = TypeVar("Item")
 _EVERY = 5.0
 # seconds of compiling that need no words
 _SOON = 0.5
+# seconds after which a scan is slow enough to say how far it is
+_SLOW = 1.0
+
+
+class SoFar:
+    """What a solver has found of the scan that it is at, in words for the progress bar."""
+
+    def __init__(self) -> None:
+        self.next_scan()
+
+    def next_scan(self) -> None:
+        """Begin a scan."""
+        self._words = ""
+        self._began = time.monotonic()
+
+    def note(self, point: TracePoint) -> None:
+        """Take in a point of the solver's trace."""
+        if math.isfinite(point.cost):
+            self._words = f"cost {point.cost:.6g}, gap {max(point.cost - point.lower_bound, 0.0):.2g} so far"
+
+    def __str__(self) -> str:
+        return self._words if time.monotonic() - self._began > _SLOW else ""
 
 
 class ProgressBar:
@@ -30,9 +54,11 @@ class ProgressBar:
         What it counts, in the plural.
     shown : bool, default True
         Show nothing at all otherwise.
+    so_far : SoFar, optional
+        What is said of a scan that takes long.
     """
 
-    def __init__(self, label: str, unit: str, shown: bool = True) -> None:
+    def __init__(self, label: str, unit: str, shown: bool = True, so_far: SoFar | None = None) -> None:
         self._unit = unit
         self._progress: Any = None
         self._started = time.perf_counter()
@@ -51,10 +77,11 @@ class ProgressBar:
             from rich.text import Text
 
             class Compiling(ProgressColumn):
-                """Says why the first scans take so long, while they do."""
+                """Says how far a scan is that takes long, and why the first ones do."""
 
                 def render(self, task: Task) -> Text:
-                    return Text("compiling, once after installation" if is_compiling(_SOON) else "")
+                    compiling = "compiling, once after installation" if is_compiling(_SOON) else ""
+                    return Text("; ".join(filter(None, [str(so_far or ""), compiling])))
 
             self._progress = Progress(
                 TextColumn("{task.description}"),
@@ -115,11 +142,15 @@ class ProgressLog:
             print(f"{counts.done} of {counts.total} runs", file=sys.stderr, flush=True)
 
 
-def with_progress(items: Iterable[Item], total: int, label: str, *, shown: bool = True) -> Iterator[Item]:
+def with_progress(
+    items: Iterable[Item], total: int, label: str, *, shown: bool = True, so_far: SoFar | None = None
+) -> Iterator[Item]:
     """Yield the items, scans or what makes them, and show a progress bar while they are worked on."""
-    with ProgressBar(label, "scans", shown) as bar:
+    with ProgressBar(label, "scans", shown, so_far) as bar:
         bar.show(0, total, 0)
         for done, item in enumerate(items):
             bar.show(done, total, done)
             yield item
+            if so_far is not None:
+                so_far.next_scan()
         bar.show(total, total, total)

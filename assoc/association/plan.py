@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.solution import Solution
+from assoc.solution import Solution, TracePoint
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
 from assoc.solvers.pheromone_history import PheromoneHistory, pheromone
@@ -47,6 +47,8 @@ class Plan:
         Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
     gate_loss : bool
         Bound for each scan of a scene what the gates may have cost.
+    watch : callable, optional
+        Called with each ``TracePoint`` of a solver, where scans are solved in this process.
     """
 
     sources: Sequence[Source]
@@ -58,6 +60,7 @@ class Plan:
     kbest: int | None = None
     pheromone: bool = False
     gate_loss: bool = False
+    watch: Callable[[TracePoint], object] | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
@@ -69,7 +72,8 @@ class Plan:
     def __reduce__(self) -> Any:
         # another process knows solvers from elsewhere only if it is told
         names = () if self.kbest is not None else (self.solver,)
-        return _received, (registry.own(names), tuple(getattr(self, one.name) for one in fields(self)))
+        values = {one.name: getattr(self, one.name) for one in fields(self)} | {"watch": None}
+        return _received, (registry.own(names), tuple(values.values()))
 
     @property
     def all_parameters(self) -> dict[str, Any]:
@@ -109,7 +113,8 @@ class Plan:
         if self.pheromone and self.solver == "aco":
             history = pheromone(problem, seed=seed, time_limit=self.time_limit, **self.parameters).top(_NODES)
             return [history.solution], history
-        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)], None
+        limits: dict[str, Any] = {"seed": seed, "time_limit": self.time_limit}
+        return [assign(problem, self.solver, callback=self.watch, **limits, **self.parameters)], None
 
     def _best(
         self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float

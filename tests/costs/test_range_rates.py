@@ -36,7 +36,7 @@ def doppler_scene(seed, mixed=False, targets=2):
     return Scene(sensors, [0.0], [scan], region=REGION), places, velocities
 
 
-@pytest.mark.parametrize("mixed", [False, True])
+@sample("mixed", [False, True], every=2)
 @sample("seed", range(2), every=2)
 def test_costs_are_the_likelihood_summed_over_all_velocities(seed, mixed):
     scene, _, _ = doppler_scene(seed, mixed)

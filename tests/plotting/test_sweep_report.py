@@ -74,6 +74,7 @@ def test_studies_without_maps_and_without_runs(tmp_path):
     assert "no runs yet" in " ".join(parsed(tmp_path / "none.html").text)
 
 
+@pytest.mark.slow
 def test_the_program_writes_it(folder, tmp_path):
     command = [sys.executable, "-W", "error", "-m", "assoc.sweep", "--summary", str(folder), "--report", "s.html"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

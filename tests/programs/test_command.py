@@ -94,6 +94,7 @@ def test_the_command_shows_itself_in_usage(here, monkeypatch, capsys):
     assert main(["nonsense"]) == 2
 
 
+@pytest.mark.slow
 @sample("option", ["--json", "--csv"], every=2)
 def test_data_alone_go_to_stdout(run, here, option):
     done = run("assoc.solve", "s.npz", option, "-")

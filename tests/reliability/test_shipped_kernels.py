@@ -14,7 +14,7 @@ from llvmlite.binding import get_host_cpu_features
 
 from assoc._system.shipped import NEEDED
 from tests.release.kernels import PROCESSOR, pack
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 _PROGRAM = """
 import sys
@@ -104,7 +104,7 @@ def test_the_same_bytes_as_compiled_here(made, tmp_path, what):
     assert answer == made(what)[1]
 
 
-@pytest.mark.parametrize("spoil", [spoil_version, spoil_code], ids=["other numba", "cut short"])
+@sample("spoil", [spoil_version, spoil_code], every=2)
 def test_what_does_not_fit_is_compiled(kernels, tmp_path, spoil):
     folder, answer = kernels
     other = tmp_path / "kernels"

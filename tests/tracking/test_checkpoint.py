@@ -14,7 +14,7 @@ from assoc.tracking import TRACKERS
 from assoc.tracking.checkpoint import FORMAT, VERSION
 from assoc.tracking.filter_choice import two_speeds
 from tests.reliability.mutations import MARKER, spoil
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 SCENE = simulation.simulate("three-radar", 4, scans=7)
 SCANS = 5
@@ -98,16 +98,15 @@ OF_HYPOTHESES = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "lies"),
+@sample(
+    "name, lies",
     [
         *((name, LIES) for name in sorted(TRACKERS)),
         ("mht", OF_MHT),
         ("mht-hypothesis", OF_MHT),
         ("mht", OF_TREES),
         ("mht-hypothesis", OF_HYPOTHESES),
-    ],
-)
+    ], every=3)
 def test_each_lie_is_named(name, lies, tmp_path):
     tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
     for field, lie in lies.items():

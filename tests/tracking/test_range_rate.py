@@ -29,7 +29,7 @@ def velocity_errors(name, noise):
     return np.array(errors)
 
 
-@sample("name", TRACKERS, every=3)
+@sample("name", TRACKERS, every=6)
 def test_velocities_are_better(name):
     plain, doppler = velocity_errors(name, 0.0), velocity_errors(name, 0.5)
     assert len(doppler) >= 0.95 * len(plain) > 3 * 10

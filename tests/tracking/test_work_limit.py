@@ -25,7 +25,7 @@ def rows(tracker, scene):
     return table.to_frame().to_csv(), [one.assigned[0].tolist() for one in decisions]
 
 
-@sample("name", sorted(TRACKERS), every=3)
+@sample("name", sorted(TRACKERS), every=6)
 def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
     crowd = simulation.simulate("crowd", 1, targets=12, scans=3, width=400.0, height=300.0)
     quick = rows(TRACKERS[name].for_scene(crowd), crowd)

@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.ahead import compile_ahead, wait_for_kernels
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit, search_njit
+from assoc._system.interpreted import interpreted_only
 from assoc._types import Floats
 from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room, push_node, take_node
 from assoc.packing.branching.pairs import (
@@ -30,7 +32,7 @@ from assoc.packing.branching.pairs import (
     doubtful_pairs,
     new_trials,
 )
-from assoc.packing.packing import Packing
+from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.basis import Basis, new_basis, refactor
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort, restart, solve_dual
@@ -168,6 +170,7 @@ class BranchAndBound:
         if not self._memory_allows(34.0 * rows * rows + 100.0 * columns):
             self._open.give_up()
             return False
+        wait_for_kernels()
         self._work = _new_work(self._packing.cols, program_of(self._packing.arrays), self._packing.slack)
         return True
 
@@ -351,3 +354,16 @@ def _search(work: _Work, stack: Stack, num_open: int, incumbent: float, limits: 
             num_open += 1
         at_work = num_open - 1
     return num_open, incumbent, count_found, nodes
+
+
+def compile_branching_ahead() -> None:
+    """Have the search compiled by another process, where it is not compiled yet."""
+    compile_ahead(_search, compile_branching)
+
+
+def compile_branching() -> None:
+    """Compile the search, on three measurements of which each two could be one target."""
+    with interpreted_only():
+        rows = np.array([[0, 1, -1], [0, -1, 2], [-1, 1, 2]], np.int32)
+        packing = assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)
+    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9).run(10)

@@ -9,7 +9,7 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.search import BranchAndBound, compile_branching_ahead
 from assoc.packing.components.component import Component
 from assoc.packing.components.search import complete_greedily
 from assoc.packing.components.splitting import split_component
@@ -27,8 +27,10 @@ _LARGE = 30
 _MANY = 90
 _TURNS = 3
 # columns up to which a component is branched on before anything else, and for how many nodes
-_SMALL = 400
+_SMALL = 2000
 _SHORT = 50
+# columns from which a problem may be hard enough for its branching to be compiled beforehand
+_HARD = 500
 
 
 @dataclass(slots=True)
@@ -59,8 +61,14 @@ class _Task:
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
+    if packing.num_columns > _HARD:
+        compile_branching_ahead()
     reduction = Reduction(packing, run)
     components = reduction.reduce()
+    columns, weight, bound = reduction.closed_columns, reduction.closed_weight, reduction.closed_bound
+    if components:
+        # what is known before the search of hard ones: worth seeing where the search takes long
+        _record(run, 0, weight, bound, [_Task(one) for one in components])
     tasks: list[_Task] = []
     settled: list[_Task] = []
     nodes = 0
@@ -74,8 +82,6 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             settled.append(task)
         else:
             tasks.extend(_Task(one) for one in _sharpen(component, run))
-    columns = reduction.closed_columns
-    weight, bound = reduction.closed_weight, reduction.closed_bound
 
     def show(tasks: list[_Task]) -> None:
         _record(run, nodes, weight, bound, settled + tasks)
