@@ -70,5 +70,5 @@ class Priced:
         if not run.memory_allows(LinearProgram.memory(packing.num_columns, packing.num_rows)):
             return
         duals = LinearProgram(packing).solve(duals=self.duals, deadline=run.deadline()).duals
-        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+        hard_pass(packing, duals)
         self.take_over(duals)
