@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, hard_pass, reduced_costs
 from assoc.packing.packing import Packing

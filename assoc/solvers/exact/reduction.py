@@ -153,11 +153,9 @@ class Reduction:
             return np.full(whole.num_rows, -1, dtype=np.int32), np.full(whole.num_components, np.inf)
         cover = Cover.of(whole, self._run.start)
         uncovered = np.flatnonzero((cover.owner < 0) & ~whole.slack)
-        weight = np.bincount(
-            np.searchsorted(whole.col_start, self._run.start, side="right") - 1,
-            weights=whole.weights[self._run.start],
-            minlength=whole.num_components,
-        )
+        component = np.searchsorted(whole.col_start, self._run.start, side="right") - 1
+        weight = np.zeros(whole.num_components)
+        np.add.at(weight, component, whole.weights[self._run.start])
         weight[np.searchsorted(whole.row_start, uncovered, side="right") - 1] = np.inf
         return cover.owner, weight
 
