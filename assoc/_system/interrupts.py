@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ContextDecorator
 
 
-class interruptible(ContextDecorator):
+class interruptible(ContextDecorator):  # noqa: N801 - read like those of contextlib
     """Let Ctrl-C be a KeyboardInterrupt where it comes while a kernel's arguments or results are converted.
 
     Python then sees a function that returns a result and has an exception set, and says SystemError; once for

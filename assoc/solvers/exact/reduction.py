@@ -138,9 +138,9 @@ class Reduction:
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
         arrays, incumbents = self._whole.arrays, self._incumbents()
-        state: _State | None = _begin(arrays, *incumbents, closed, granularity, self._run.deadline())
+        state = _state(_begin(arrays, *incumbents, closed, granularity, self._run.deadline()))
         while state and counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
-            state = _reduce(state, closed, granularity, self._run.deadline())
+            state = _state(_reduce(state, closed, granularity, self._run.deadline()))
         self.closed_columns.append(closed.columns[: counts[1]])
         self.closed_bound = math.fsum(closed.values[: counts[2], 0])
         self.closed_weight = math.fsum(closed.values[: counts[2], 1])
@@ -172,10 +172,16 @@ class Reduction:
         return components
 
 
+def _state(arrays: Any) -> _State | None:
+    """The state of the arrays that a kernel returns."""
+    count = len(PackingArrays._fields)
+    return None if arrays is None else _State(PackingArrays(*arrays[:count]), *arrays[count:])
+
+
 @njit
 def _begin(
     packing: PackingArrays, owner: Any, weight: Floats, done: _Closed, granularity: float, deadline: float
-) -> _State | None:
+) -> Any:
     """Begin with incumbents and go through temperatures; one kernel, as most scenes need no second one."""
     num, num_rows, num_components = packing.weights.size, packing.slack.size, packing.col_start.size - 1
     smooth = np.zeros(num_rows)
@@ -195,8 +201,12 @@ def _begin(
 
 
 @njit
-def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> _State | None:
-    """Go through temperatures until none is left or the visits are used up; the new state, None: nothing is open."""
+def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> Any:
+    """Go through temperatures until none is left or the visits are used up.
+
+    Returns the arrays of the new state, in its order; None: nothing is open. A plain tuple: where Ctrl-C comes while a
+    result is converted, numba calls a record's class without having found it, and the process dies.
+    """
     packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
     counts, closed_columns, closed, proof = done
     visits = 0
@@ -271,7 +281,10 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         bound = bounds_by_component(packing, hard)
     if packing.slack.size == 0:
         return None
-    return _State(packing, origin, rows, smooth, hard, owner, weight, bound, temperature)
+    return (
+        packing.cols, packing.weights, packing.slack, packing.col_start, packing.row_start, packing.row_ptr,
+        packing.row_cols, origin, rows, smooth, hard, owner, weight, bound, temperature,
+    )  # fmt: skip
 
 
 @njit
