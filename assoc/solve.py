@@ -92,7 +92,8 @@ def _associate(
     files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"]}
+    plan, items = _plan(sources, files, solver, settings, parameters, extras)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
@@ -145,6 +146,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
+    add("--gate-loss", action="store_true", help="bound what the gates may have cost (takes about three times as long)")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
     add_speech_options(parser, "all parameters, the defaults included")
     parser.elsewhere = lambda: flags_of_solvers(solver)
@@ -200,8 +202,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
-    *,
-    pheromone: bool,
+    extras: dict[str, bool],
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
@@ -216,7 +217,7 @@ def _plan(
         parameters,
         gating,
         settings.get("kbest"),
-        pheromone,
+        **extras,
     )
     items = plan.items()
     if "scans" in settings:
