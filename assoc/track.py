@@ -26,6 +26,7 @@ from assoc._cli.options import (
 )
 from assoc._cli.program import Parser, command, prepare_process, prepare_streams, run_program, write_all
 from assoc._cli.progress import with_progress
+from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import Interruption
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, place_on_earth, seconds, whole_number
@@ -363,6 +364,7 @@ def _of_scene(
     name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
+    numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
     table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
@@ -410,6 +412,7 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
     shown = with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])
+    shown = with_scan_table(shown, tracker, lambda window: (window.times[-1], [len(window)]))
     return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
 
 
