@@ -53,7 +53,7 @@ def _warm_up(name: str, number: int, chosen: Sequence[parts.Part]) -> None:
     for part in chosen:
         for solver in part.solvers:
             with part.without():
-                run(one, solver, 20.0, 0, iterations=8, **part.parameters)
+                run(one, solver, 20.0 if part.words == parts.WHOLE else 0.3, 0, iterations=8, **part.parameters)
 
 
 def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -> list[Claim]:

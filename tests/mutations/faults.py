@@ -320,6 +320,13 @@ FAULTS = (
         _OF_SEARCH,
     ),
     Fault("iterations have no end", _SEARCH, " or component.iterations >= limits.iterations\n", "\n", _OF_SEARCH),
+    Fault(
+        "small components are bounded only after their search",
+        _SEARCH,
+        "component.proven = bound_of_component(component, run)",
+        "pass",
+        _OF_SEARCH,
+    ),
     Fault("the best cover is not refined", _TEAM, "        component.refine(run, self._clusters)\n", "", _OF_SEARCH),
     Fault("workers do not exchange", _TEAM, "own.offer(whole.best, whole.weight)", "pass", _OF_SEARCH),
     Fault("what other workers find is lost", _TEAM, "whole.offer(own.best, own.weight)", "pass", _OF_SEARCH),

@@ -137,3 +137,13 @@ def test_the_same_seed_and_workers_give_the_same_search(solver):
         assert solution.cost == pytest.approx(problem.costs[solution.indices].sum())
     assert found[1] == found[2]
     assert len({str(one) for one in found}) > 1
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_small_components_are_bounded_before_they_are_searched(solver):
+    # any two of these share a measurement: the linear program takes half of each, and bounds by 3 where 2 is all
+    problem = assoc.AssignmentProblem([[1, 1, 0], [1, 0, 1], [0, 1, 1]], [-2.0, -2.0, -2.0], [1, 1, 1])
+    solution = assoc.assign(problem, solver)
+    assert (solution.cost, solution.status) == (-2.0, "optimal") and solution.lower_bound == pytest.approx(-2.0)
+    # without the proof it would search on until its patience is over
+    assert solution.iterations == 1
