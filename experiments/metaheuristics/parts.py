@@ -21,7 +21,7 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu import moves
 
 SOLVERS = ("aco", "genetic", "tabu")
-WHOLE = "all parts"
+WHOLE, ALONE = "all parts", 'refinement="none"'
 
 
 class Part(NamedTuple):
@@ -37,12 +37,15 @@ class Part(NamedTuple):
         Of the solver.
     without : callable
         Makes the context in which the part is missing.
+    base : str
+        Words of what it is compared with.
     """
 
     words: str
     solvers: tuple[str, ...]
     parameters: dict[str, Any] = {}
     without: Callable[[], AbstractContextManager[Any]] = nullcontext
+    base: str = WHOLE
 
 
 def _unchanged(self: Any, priced: Any, owner: Any, weight: float, *_: Any) -> float:
@@ -136,8 +139,7 @@ def _no_moves() -> Iterator[None]:
         yield
 
 
-PARTS = (
-    Part(WHOLE, SOLVERS),
+OWN = (
     Part("no ants that walk", ("aco",), without=_no_ants),
     Part("no ants that dive", ("aco",), {"divers": 0}),
     Part("alpha 0: pheromone ignored", ("aco",), {"alpha": 0.0}),
@@ -152,13 +154,34 @@ PARTS = (
     Part("no aspiration", ("tabu",), without=_no_aspiration),
     Part("no column forced in", ("tabu",), without=_replaced(moves.TabuSearch, "_force", lambda *_: -1)),
     Part("no restarts", ("tabu",), {"restart": 1_000_000_000}),
+)
+"""Parts that one of the three has and the others have not."""
+
+SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
     Part("no large neighbourhoods", SOLVERS, without=_replaced(LargeNeighbourhood, "improve", _unchanged)),
     Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
     Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),
     Part('refinement="local"', SOLVERS, {"refinement": "local"}),
-    Part('refinement="none"', SOLVERS, {"refinement": "none"}),
+    Part(ALONE, SOLVERS, {"refinement": "none"}),
 )
-"""Every part, the whole first."""
+"""What all three have."""
+
+
+def _alone(part: Part) -> Part:
+    """The same part taken out of the metaheuristic without any refinement."""
+    return part._replace(
+        words=f"alone, {part.words}", parameters={"refinement": "none", **part.parameters}, base=ALONE
+    )
+
+
+PARTS = (
+    Part(WHOLE, SOLVERS),
+    *OWN,
+    *SHARED,
+    # nothing dives without refinement
+    *(_alone(part) for part in OWN if part.words != "no ants that dive"),
+)
+"""All variants, the whole first."""
 
 TWO_WORKERS = Part("two workers", SOLVERS, {"workers": 2})

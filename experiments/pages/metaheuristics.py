@@ -27,13 +27,13 @@ def _groups(results: Results, words: str) -> list[str]:
 def _of_solver(solver: str) -> Callable[[], str]:
     def make() -> str:
         r = Results("metaheuristics.ablation")
-        groups = _groups(r, 'refinement="none"')
+        groups = _groups(r, parts.ALONE)
         rows = []
         for part in parts.PARTS:
             if solver in part.solvers:
-                what = "above the best found" if part.words == parts.WHOLE else "above all parts"
+                above = "the best found" if part.words == parts.WHOLE else part.base
                 words = "all parts: above the best found" if part.words == parts.WHOLE else part.words
-                names = [f"{group}: {solver}, {part.words}, {what}" for group in groups]
+                names = [f"{group}: {solver}, {part.words}, above {above}" for group in groups]
                 rows.append([words, *(_cell(r[name]) if name in r else "" for name in names)])
         return table([f"`{solver}`, excess in %", *groups], rows)
 
@@ -48,7 +48,7 @@ def workers() -> str:
     rows = []
     for solver in parts.SOLVERS:
         one = [r[f"{group}: {solver}, {parts.WHOLE}, above the best found"] for group in groups]
-        two = [r[f"{group}: {solver}, {words}, above all parts"] for group in groups]
+        two = [r[f"{group}: {solver}, {words}, above {parts.WHOLE}"] for group in groups]
         rows.append([f"`{solver}`, one worker: above the best found", *map(_cell, one)])
         rows.append([f"`{solver}`, two workers less one", *map(_cell, two)])
     return table(["excess in %", *groups], rows)

@@ -84,14 +84,18 @@ def test_ablation_reports_every_part(tmp_path, capsys):
 def test_figures_are_differences_from_the_whole():
     costs = {
         ("aco", parts.WHOLE): np.array([-100.0, -50.0]),
-        ("aco", "alpha 0"): np.array([-99.0, -50.5]),
+        ("aco", parts.OWN[2].words): np.array([-99.0, -50.5]),
+        ("aco", parts.ALONE): np.array([-90.0, -40.0]),
+        ("aco", f"alone, {parts.OWN[2].words}"): np.array([-81.0, -38.0]),
         ("tabu", parts.WHOLE): np.array([-101.0, -50.0]),
     }
     claims = {claim.quantity: claim for claim in ablation.claims_of("ghosts 40", 2.0, costs)}
     assert claims["ghosts 40, 2 s: problems"].ours == 2
     whole = claims["ghosts 40, 2 s: aco, all parts, above the best found"]
     assert whole.ours == pytest.approx(100 * (1 / 101 + 0.5 / 50.5) / 2)
-    part = claims["ghosts 40, 2 s: aco, alpha 0, above all parts"]
+    alone = claims[f"ghosts 40, 2 s: aco, alone, {parts.OWN[2].words}, above {parts.ALONE}"]
+    assert alone.ours == pytest.approx(7.5) and alone.interval == pytest.approx((5.0, 10.0))
+    part = claims[f"ghosts 40, 2 s: aco, {parts.OWN[2].words}, above all parts"]
     assert part.ours == pytest.approx(0.0, abs=1e-12) and part.interval == pytest.approx((-1.0, 1.0))
 
 
