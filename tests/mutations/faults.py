@@ -216,6 +216,13 @@ FAULTS = (
         "            continue\n",
         _OF_GENETIC,
     ),
+    Fault(
+        "what lies open is not filled without refinement",
+        _BREEDING,
+        "            Cover(component.packing, owner).add_greedily(order)\n",
+        "",
+        _OF_GENETIC,
+    ),
     Fault("no mutation", _BREEDING, "rng.random() < mutation / num_sensors", "rng.random() < 0.0", _OF_GENETIC),
     Fault(
         "selection is inverted",
