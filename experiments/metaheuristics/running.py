@@ -56,8 +56,10 @@ def run(problem: AssignmentProblem, solver: str, seconds: float, seed: int, **pa
         solution = assoc.assign(one, solver, seed=seed, time_limit=seconds, callback=callback, **options)
         spent = time.process_time() - processor
         _pace.saw(time.perf_counter() - wall, spent / workers)
-    cost = check_answer(problem, solution.tuples)
-    return min(known) if known and spent > 1.02 * budget else cost
+    if not known or spent <= 1.02 * budget:
+        return check_answer(problem, solution.tuples)
+    # as an answer within its time: never worse than the greedy one
+    return min(*known, assoc.assign(problem, "greedy").cost)
 
 
 @contextmanager

@@ -39,7 +39,7 @@ def test_what_comes_after_the_budget_does_not_count(monkeypatch):
 
     monkeypatch.setattr(running.assoc, "assign", remembering)
     cost = running.run(one, "genetic", 1.0, 0)
-    assert cost == traces[0][0].cost
+    assert cost == min(traces[0][0].cost, assoc.assign(one, "greedy").cost)
 
 
 @pytest.mark.parametrize("part", [*parts.PARTS, parts.TWO_WORKERS], ids=lambda part: part.words)
@@ -129,18 +129,20 @@ def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
 def test_claims_of_a_case():
     case = sweep.Case("ghosts 10", 4, "paper")
     every = sweep.settings()
-    # alpha 3 is best on all problems but the first, where everything is worse
+    # the largest alpha is best on all problems but the second, where everything is worse
     excess = np.array([[9.0 - one["alpha"], 3.0, 3.0 - one["alpha"], 3.0 - one["alpha"]] for one in every])
     claims = {claim.quantity.split(": ")[1]: claim for claim in sweep.claims_of(case, excess)}
     best = next(words for words in claims if words.startswith("best setting"))
-    assert "alpha 3" in best and claims[best].ours == pytest.approx(1.5)
+    # chosen on the first and the third, judged on the second and the fourth
+    assert "alpha 2" in best and claims[best].ours == pytest.approx(2.0)
     assert claims["table 1's advice"].ours == pytest.approx(2.0)
-    assert claims["table 1's advice less the best setting"].ours == pytest.approx(0.5)
+    assert claims["default"].ours == pytest.approx(2.5)
+    assert claims["default less the best setting"].ours == pytest.approx(0.5)
     assert claims["worst setting"].ours == pytest.approx(4.5)
-    assert claims["alpha 2, beta 1"].ours == pytest.approx((7.0 + 3.0 + 1.0 + 1.0) / 4)
-    # those of alpha 3 before it, those of its own alpha as good
-    share = len(every) // 4
-    assert claims[f"rank of table 1's advice of {len(every)}"].ours == share + (share + 1) / 2
+    assert claims["alpha 1, beta 1"].ours == pytest.approx((8.0 + 3.0 + 2.0 + 2.0) / 4)
+    # it shares the first places with all of its alpha
+    share = len(every) // 3
+    assert claims[f"rank of table 1's advice of {len(every)}"].ours == (share + 1) / 2
 
 
 @pytest.mark.parametrize(

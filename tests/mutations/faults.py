@@ -335,6 +335,13 @@ FAULTS = (
         _OF_SEARCH,
     ),
     Fault("the best cover is not refined", _TEAM, "        component.refine(run, self._clusters)\n", "", _OF_SEARCH),
+    Fault(
+        "workers refine one and the same cover",
+        _TEAM,
+        "best = None if component.best is None else component.best.copy()",
+        "best = component.best",
+        _OF_SEARCH,
+    ),
     Fault("workers do not exchange", _TEAM, "own.offer(whole.best, whole.weight)", "pass", _OF_SEARCH),
     Fault("what other workers find is lost", _TEAM, "whole.offer(own.best, own.weight)", "pass", _OF_SEARCH),
     Fault("workers draw the same numbers", _TEAM, "Run(rng, time_limit", "Run(0, time_limit", _OF_SEARCH),

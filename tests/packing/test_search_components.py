@@ -126,6 +126,23 @@ def test_workers_exchange_their_best(lucky):
     assert len({draw for member in members for draw in member.draws}) == 15
 
 
+def test_workers_refine_covers_of_their_own():
+    """In place and at the same time: one array for all would be spoiled."""
+    one = component(PROBLEM, "full")
+    one.offer_greedy()
+    seen = []
+
+    class Keeping(Idle):
+        def iterate(self, part, rng):
+            seen.append(part.best)
+
+    with ThreadPoolExecutor(3) as pool:
+        Team(lambda *_: Keeping(), one, Run(4), 10, 3, pool).iterate()
+    covers = [*seen, one.best]
+    for i, first in enumerate(covers):
+        assert not any(np.shares_memory(first, other) for other in covers[i + 1 :])
+
+
 @pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
 def test_the_same_seed_and_workers_give_the_same_search(solver):
     """To the last bit, whichever thread was quicker."""
