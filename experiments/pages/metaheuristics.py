@@ -35,7 +35,8 @@ def _of_solver(solver: str) -> Callable[[], str]:
                 words = "all parts: above the best found" if part.words == parts.WHOLE else part.words
                 names = [f"{group}: {solver}, {part.words}, above {above}" for group in groups]
                 rows.append([words, *(_cell(r[name]) if name in r else "" for name in names)])
-        return table([f"`{solver}`, excess in %", *groups], rows)
+        heads = [f"{group}, {r[f'{group}: problems'].ours:.0f} problems" for group in groups]
+        return table([f"`{solver}`, excess in %", *heads], rows)
 
     return make
 
@@ -81,5 +82,5 @@ def _plain(claim: Claim) -> str:
     return number(claim.ours, 2)
 
 
-SOLVERS = {**{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS}, "workers": workers}
+SOLVERS = {**{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS}}
 ANT_COLONY = {"settings": settings}
