@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.growing_table import GrowingTable
 from assoc._cli.imports import HELP as IMPORT_HELP
 from assoc._cli.imports import import_modules
 from assoc._cli.inputs import check_ending, check_outputs, read_toml
@@ -37,6 +38,7 @@ from assoc.solvers import registry
 if TYPE_CHECKING:
     from assoc.association.association import Association
     from assoc.association.plan import Plan
+    from assoc.association.scan import ScanAssociation
     from assoc.association.source import Source
 
 DEFAULT_SOLVER = "exact"
@@ -90,19 +92,23 @@ def _associate(
     files = parsed["files"]
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"]}
+    plan, items = _plan(sources, files, solver, settings, parameters, extras)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     scans = plan.run(items, settings.get("jobs", 1))
-    association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
-    elapsed = time.perf_counter() - started
     names = [files[number] for number, _ in items]
+    progress = with_progress(scans, len(items), "associating", shown=not parsed["quiet"])
+    # a pipe gets all scans and columns when all are there: programs read it
+    table = _ScanTable(sources, names, len(names) if parsed["all"] else _SHOWN) if sys.stdout.isatty() else None
+    association = plan.gather(progress if table is None else table.watch(progress))
+    elapsed = time.perf_counter() - started
     of_items = [sources[number] for number, _ in items]
     write_all(
         lambda: _write_json(parsed["json"], association, names),
         lambda: _write_csv(parsed["csv"], association, names),
         lambda: _write_report(parsed["report"], association, of_items, names, words),
-        lambda: _print(association, names, elapsed, every=parsed["all"]),
+        lambda: _print(association, names, elapsed, table),
     )
 
 
@@ -140,6 +146,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
+    add("--gate-loss", action="store_true", help="bound what the gates may have cost (takes about three times as long)")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
     add_speech_options(parser, "all parameters, the defaults included")
     parser.elsewhere = lambda: flags_of_solvers(solver)
@@ -195,8 +202,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
-    *,
-    pheromone: bool,
+    extras: dict[str, bool],
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
@@ -211,7 +217,7 @@ def _plan(
         parameters,
         gating,
         settings.get("kbest"),
-        pheromone,
+        **extras,
     )
     items = plan.items()
     if "scans" in settings:
@@ -251,16 +257,46 @@ def _write_report(
         write_association_report(path, association, sources, names, words=words)
 
 
-def _print(association: Association, names: list[str], elapsed: float, *, every: bool) -> None:
+class _ScanTable:
+    """The table on a terminal: a row as soon as its scan is done, where the terminal is wide enough."""
+
+    def __init__(self, sources: Sequence[Source], names: list[str], most: int) -> None:
+        self._names = names
+        self._most = most
+        self._truth = any(getattr(source, "truth", None) is not None for source in sources)
+        self._growing: GrowingTable | None = None
+
+    def watch(self, scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
+        """Yield the scans, each after its row was printed."""
+        from assoc.association.table import LEFT_ALIGNED, WIDTHS, rows
+
+        for number, scan in enumerate(scans):
+            headers, cells = rows([scan], self._names, first=number, truth=self._truth, brief=True)
+            if self._growing is None:
+                self._growing = GrowingTable(headers, WIDTHS, LEFT_ALIGNED, self._most)
+            self._growing.add(cells)
+            yield scan
+
+    def finish(self, association: Association) -> None:
+        """Print what has not been printed yet."""
+        if self._growing is None or not self._growing.fits:
+            _print_table(association.scans[: self._most], self._names, brief=True)
+        if len(association.scans) > self._most:
+            print_lines(f"... and {len(association.scans) - self._most} more scans (--all shows them)")
+
+
+def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: bool) -> None:
     from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
-    # a pipe gets all scans and columns: programs read it
-    brief = sys.stdout.isatty()
-    shown = len(names) if every or not brief else _SHOWN
-    headers, cells = rows(association.scans[:shown], names[:shown], brief=brief)
+    headers, cells = rows(scans, names, brief=brief)
     print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
-    if len(names) > shown:
-        print_lines(f"... and {len(names) - shown} more scans (--all shows them)")
+
+
+def _print(association: Association, names: list[str], elapsed: float, table: _ScanTable | None) -> None:
+    if table is None:
+        _print_table(association.scans, names, brief=False)
+    else:
+        table.finish(association)
     print()
     print_lines(association.summary())
     total = association.totals()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import ordered_map
 from assoc.association.association import Association
+from assoc.association.gate_loss import gate_loss
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
@@ -44,6 +45,8 @@ class Plan:
         Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
     pheromone : bool
         Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
+    gate_loss : bool
+        Bound for each scan of a scene what the gates may have cost.
     """
 
     sources: Sequence[Source]
@@ -54,6 +57,7 @@ class Plan:
     gating: Mapping[str, Any] = field(default_factory=dict)
     kbest: int | None = None
     pheromone: bool = False
+    gate_loss: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
@@ -91,7 +95,11 @@ class Plan:
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
         solutions, history = self._solve(problem, seed)
-        return self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
+        best = self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
+        if not self.gate_loss:
+            return best
+        loss = gate_loss(scene, scan, best.solution.cost, self.gating, self.time_limit)
+        return replace(best, gate_loss=loss, compile_time=compile_seconds() - compiled)
 
     def _solve(
         self, problem: AssignmentProblem, seed: int | np.random.SeedSequence

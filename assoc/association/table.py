@@ -13,12 +13,20 @@ from assoc.association.scan import ScanAssociation
 KEYS = ("file", "scan", "rank")
 """Columns that say which row it is."""
 
+WIDTHS = {"cost": 10, "status": 11, "ms": 8, "correct": 7}
+"""By header: what most cells need."""
+
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")
 
 
 def rows(
-    scans: Sequence[ScanAssociation], files: Sequence[str], *, brief: bool = False
+    scans: Sequence[ScanAssociation],
+    files: Sequence[str],
+    *,
+    first: int = 0,
+    truth: bool | None = None,
+    brief: bool = False,
 ) -> tuple[list[str], list[list[str]]]:
     """Headers and cells for people.
 
@@ -26,20 +34,27 @@ def rows(
     ----------
     scans : sequence of ScanAssociation
     files : sequence of str
-        The file of each scan; shown only if there are several.
+        The file of each scan, also of those before and after these; shown only if there are several.
+    first : int, default 0
+        Which of the files is that of the first scan.
+    truth : bool, optional
+        Whether there is a column of correct tuples; by default if the truth of one of the scans is known.
     brief : bool, default False
-        Leave out the folders of files, and lower bound and gap where all scans are certified optimal.
+        For a terminal: leave out the folders of files and the lower bound, and say the gap only of scans that are
+        not certified optimal, in the place of their status.
     """
     if brief:
         files = _short_names(files)
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
-    truth = any(scan.true_tuples is not None for scan in scans)
-    headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
+    truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
+    losses = any(scan.gate_loss is not None for scan in scans)
+    headers = [*(["file"] if several else []), *_HEADERS]
+    headers += [*(["gate loss"] if losses else []), *(["correct"] if truth else [])]
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
     cells = []
-    for scan, file, rank in _lines(scans, files):
+    for scan, file, rank in _lines(scans, files[first : first + len(scans)]):
         solution = scan.solution
         row = [printable(file)] if several else []
         row += [
@@ -54,13 +69,25 @@ def rows(
             solution.status,
             f"{1e3 * solution.runtime:.2f}",
         ]
+        if losses:
+            row.append(_loss(scan))
         if truth:
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
-    if brief and all(one.solution.status == "optimal" for one, _, _ in _lines(scans, files)):
+    if brief:
+        gap, status = headers.index("gap"), headers.index("status")
+        for row in cells:
+            row[status] = row[status] if row[status] == "optimal" else f"gap {row[gap]}"
         kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
         headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
+
+
+def _loss(scan: ScanAssociation) -> str:
+    """What the gates may have cost; 0 where that is no more than the tolerance of a certificate."""
+    if scan.gate_loss is None:
+        return ""
+    return "0" if scan.gate_loss <= 1e-6 * max(1.0, abs(scan.solution.cost)) else f"{scan.gate_loss:.2g}"
 
 
 def _short_names(files: Sequence[str]) -> list[str]:
@@ -81,12 +108,13 @@ def _lines(
 def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
     ranked = any(scan.ranked for scan in scans)
+    losses = any(scan.gate_loss is not None for scan in scans)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
         + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
-        + ["compile_time"]
+        + ["compile_time", *(["gate_loss"] if losses else [])]
     )
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
@@ -96,5 +124,6 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
             + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap]
             + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
             + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
+            + ([scan.gate_loss] if losses else [])
         )
     return text.getvalue()
