@@ -37,6 +37,11 @@ EXPERIMENTS = (
         "one line of JSON: family scale of the benchmarks",
     ),
     Experiment(
+        "benchmarks.wide_gaps",
+        "seeds of ghosts whose linear program is far below the optimum",
+        "the seeds of family wide gap in experiments/benchmarks/families.py",
+    ),
+    Experiment(
         "pages",
         "nothing: writes the tables of five pages from the result files",
         "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md",
