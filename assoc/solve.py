@@ -23,8 +23,9 @@ from assoc._cli.options import (
     parameter_values,
     read_first,
 )
-from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
-from assoc._cli.progress import with_progress
+from assoc._cli.program import Parser, command, prepare_streams, run_program, write_all
+from assoc._cli.progress import ProgressBar, with_progress
+from assoc._cli.signals import EarlyEnd
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import check_kind, cores, density, scan_range
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from assoc.association.plan import Plan
     from assoc.association.source import Source
 
+_EARLY_END = EarlyEnd("assoc.solve")
+# seconds that the scan under way gets when the program is asked to end
+_LAST_SCAN = 3.0
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
 _GATING = ("gate_probability", "max_tuples", "target_density")
@@ -47,7 +51,8 @@ _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
-    prepare_process("assoc.solve")
+    prepare_streams()
+    _EARLY_END.on_signals()
     return main(arguments)
 
 
@@ -85,24 +90,44 @@ def _solve(words: list[str]) -> None:
 def _associate(
     words: list[str], solver: str, parsed: dict[str, Any], settings: dict[str, Any], parameters: dict[str, Any]
 ) -> None:
+    from assoc._cli.solver_log import SolverLog
     from assoc.association.source import load_source
 
-    files = parsed["files"]
+    files, jobs = parsed["files"], settings.get("jobs", 1)
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    plan, items = _plan(sources, files, solver, settings, parameters, pheromone=parsed["report"] is not None)
+    bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
+    log = SolverLog(bar, parsed["verbose"])
+    plan, items = _plan(sources, files, solver, settings, parameters, log, pheromone=parsed["report"] is not None)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
-    scans = plan.run(items, settings.get("jobs", 1))
-    association = plan.gather(with_progress(scans, len(items), "associating", shown=not parsed["quiet"]))
+    scans = []
+    # other processes do not hear that they should end: their scans are given up
+    with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
+        try:
+            for scan in with_progress(plan.run(items, jobs), len(items), bar):
+                scans.append(scan)
+                log.end(scan)
+        except KeyboardInterrupt:
+            if not _EARLY_END.asked:
+                raise
+    if scans or not items:
+        found = plan.gather(scans)
+        _write(words, parsed, found, [(sources[n], files[n]) for n, _ in items[: len(scans)]], started)
+    _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written" if scans else "")
+
+
+def _write(
+    words: list[str], parsed: dict[str, Any], found: Association, origins: list[tuple[Source, str]], started: float
+) -> None:
+    """Write and print what was found; each scan with the source and the file that it is of."""
     elapsed = time.perf_counter() - started
-    names = [files[number] for number, _ in items]
-    of_items = [sources[number] for number, _ in items]
+    sources, names = [source for source, _ in origins], [name for _, name in origins]
     write_all(
-        lambda: _write_json(parsed["json"], association, names),
-        lambda: _write_csv(parsed["csv"], association, names),
-        lambda: _write_report(parsed["report"], association, of_items, names, words),
-        lambda: _print(association, names, elapsed, every=parsed["all"]),
+        lambda: _write_json(parsed["json"], found, names),
+        lambda: _write_csv(parsed["csv"], found, names),
+        lambda: _write_report(parsed["report"], found, sources, names, words),
+        lambda: _print(found, names, elapsed, every=parsed["all"]),
     )
 
 
@@ -141,7 +166,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
     add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "all parameters, the defaults included")
+    add_speech_options(parser, "all parameters, and how cost and bound change while a scan is solved")
     parser.elsewhere = lambda: flags_of_solvers(solver)
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
@@ -195,6 +220,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
+    log: Any,
     *,
     pheromone: bool,
 ) -> tuple[Plan, list[tuple[int, int]]]:
@@ -212,6 +238,7 @@ def _plan(
         gating,
         settings.get("kbest"),
         pheromone,
+        log,
     )
     items = plan.items()
     if "scans" in settings:

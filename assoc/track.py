@@ -24,9 +24,9 @@ from assoc._cli.options import (
     parameter_values,
     read_first,
 )
-from assoc._cli.program import Parser, command, prepare_process, prepare_streams, run_program, write_all
-from assoc._cli.progress import with_progress
-from assoc._cli.signals import Interruption
+from assoc._cli.program import Parser, command, prepare_streams, run_program, write_all
+from assoc._cli.progress import ProgressBar, with_progress
+from assoc._cli.signals import EarlyEnd, Interruption
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, place_on_earth, seconds, whole_number
 from assoc._files.output import STDOUT
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
     from assoc.tracking.plots.plot_tracks import PlotTracks
 
 _INTERRUPTION = Interruption("assoc.track")
+_EARLY_END = EarlyEnd("assoc.track")
+# seconds that the scan under way gets when the program is asked to end: tracks are known between scans only
+_LAST_SCAN = 20.0
 TRACKERS = {
     "multi-sensor": "one assignment over tracks and all sensors in each scan (default for scenes)",
     "static": "associates the sensors of a scan first, then assigns the results to tracks",
@@ -85,12 +88,12 @@ further options (docs/tracking.md):
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    prepare_streams()
     if "--live" in words:
         # what has come in is still written
-        prepare_streams()
         _INTERRUPTION.interrupt_on_signals()
     else:
-        prepare_process("assoc.track")
+        _EARLY_END.on_signals()
     return main(words)
 
 
@@ -151,10 +154,10 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
     if _is_npz(file):
         if parsed["window"] is not None:
             raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
-        count, tracker, table, scene = _of_scene(file, parsed, settings)
-        plots = None
+        tracker, table, scene, total = _of_scene(file, parsed, settings)
+        count, plots = scene.num_scans, None
     else:
-        tracker, plots = _of_plots(file, parsed, settings)
+        tracker, plots, total = _of_plots(file, parsed, settings)
         count, table, scene = len(plots.windows), plots.table, None
         table.origin = parsed["origin"]
     compiling = compile_seconds() - compiled
@@ -191,6 +194,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         lambda: _compare(scene, table, parsed["cutoff"]),
         lambda: _report_rates(plots),
     )
+    _EARLY_END.say(f"the tracks of {count} of {total} scans are written")
 
 
 def _further(solver: str) -> tuple[list[Option], list[Option], list[Option]]:
@@ -340,7 +344,8 @@ def _make(
 
 def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
-) -> tuple[int, Tracker, TrackTable, Scene | None]:
+) -> tuple[Tracker, TrackTable, Scene, int]:
+    """The tracker, its tracks, the scene as far as it was tracked, and how many scans it has in all."""
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
@@ -362,14 +367,17 @@ def _of_scene(
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
-    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
-    table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, bar)
+    with _EARLY_END.work(_LAST_SCAN):
+        table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
-    return scene.num_scans, tracker, table, scene
+    tracked = scene if bar.done == scene.num_scans else scene.part(0, bar.done)
+    return tracker, table, tracked, scene.num_scans
 
 
-def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks]:
+def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks, int]:
     import numpy as np
 
     from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
@@ -409,8 +417,10 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     tracker = _make(name, [radar_of(recording, **radar)], parsed, settings, None)
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    shown = with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])
-    return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
+    shown = with_progress(windows, len(windows), ProgressBar("tracking", "scans", shown=not parsed["quiet"]))
+    with _EARLY_END.work(_LAST_SCAN):
+        done = track_plots(tracker, recording, shown, confirmed=not parsed["all"])
+    return tracker, done, len(windows)
 
 
 def _write_rates(path: str, plots: PlotTracks) -> None:

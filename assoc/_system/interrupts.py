@@ -1,9 +1,22 @@
-"""Ctrl-C in the middle of kernels."""
+"""Ctrl-C in the middle of kernels, and work that is asked to come to its end."""
 
 from __future__ import annotations
 
 import contextlib
+import threading
 from collections.abc import Iterator
+
+_end_asked = threading.Event()
+
+
+def ask_to_end() -> None:
+    """Ask the searches of this process to end with what they have, and loops over scans to begin no other."""
+    _end_asked.set()
+
+
+def end_is_asked() -> bool:
+    """Whether a program was asked to come to its end."""
+    return _end_asked.is_set()
 
 
 @contextlib.contextmanager

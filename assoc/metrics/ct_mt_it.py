@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.plot_identity import identity_after_each
@@ -32,6 +33,7 @@ class CtMtIt:
     per_window: Array
 
 
+@door
 def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) -> CtMtIt:
     """CT, MT and IT of plots that a tracker has given to tracks.
 

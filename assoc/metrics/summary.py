@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.metrics.gospa import gospa_over_time, mean_gospa
 from assoc.metrics.identity import Identity, identity
 from assoc.metrics.ospa import ospa_over_time
@@ -45,6 +46,7 @@ class Summary:
         return {**{name: value for name, value in values.items() if name != "identity"}, **values["identity"]}
 
 
+@door
 def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summary:
     """Compare tracks with the truth.
 

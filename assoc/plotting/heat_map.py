@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new
@@ -27,6 +28,7 @@ LABELS = {
 """What is said of each measure; their units are those of `FACTORS`."""
 
 
+@door
 def plot_heat_map(
     study: pd.DataFrame, measure: str = "gap", parameters: Sequence[str] | None = None, *, ax: Any = None
 ) -> Any:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._parameters import checked_time_limit
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
@@ -19,7 +21,6 @@ from assoc.ranking.clusters import clusters_of, distinct, numbered
 from assoc.ranking.columns import AllColumns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
-from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -70,6 +71,7 @@ class Marginals:
         return frame[frame["upper"] > 0.0].reset_index(drop=True)
 
 
+@door
 @interruptible()
 def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
     """Return the association probability of every tuple, from the k best solutions.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system import memory
+from assoc._system.door import door
 from assoc._types import Floats
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
@@ -69,10 +70,11 @@ class PheromoneHistory:
         )
 
 
+@door
 def pheromone(
     problem: AssignmentProblem,
     *,
-    seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    seed: int | np.random.SeedSequence | np.random.Generator | None = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
     watch: Callable[[Cycle], object] | None = None,

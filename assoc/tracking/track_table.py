@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door, doors
 from assoc._types import Array
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
@@ -31,6 +32,7 @@ of the filter's estimate and not from plot to plot), the heading in degrees, clo
 compass heading."""
 
 
+@doors
 class TrackTable:
     """Collects tracks of scan after scan.
 
@@ -142,6 +144,7 @@ class TrackTable:
         return times, ids, np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
 
 
+@door
 def track_scene(
     tracker: Tracker, scene: Scene, *, confirmed: bool = True, scans: Iterable[int] | None = None
 ) -> tuple[TrackTable, list[Decision]]:

@@ -9,6 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from assoc._parameters import whole_seed
+from assoc._system.door import doors
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
@@ -72,6 +74,7 @@ def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
+@doors
 class Tracker(Checkpoint):
     """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
 
@@ -118,7 +121,7 @@ class Tracker(Checkpoint):
         region: Array | None = None,
         solver: str = "exact",
         solver_parameters: Mapping[str, Any] | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         time_limit: float | None = None,
         life_cycle: LifeCycle | None = None,
         initiation: Initiation | None = None,
@@ -139,9 +142,7 @@ class Tracker(Checkpoint):
         self.solver = solver
         self.solver_parameters = dict(solver_parameters or {})
         make_parameters(solver, self.solver_parameters)
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
-        self.seed = int(seed)
+        self.seed = whole_seed(seed)
         self.time_limit = time_limit
         good = isinstance(gate_probability, (int, float, np.floating)) and not isinstance(gate_probability, bool)
         if not good or not 0 < gate_probability < 1:

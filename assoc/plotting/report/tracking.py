@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -48,6 +49,7 @@ _ALTITUDES = '<div id="altitude-plot" class="plot small"></div>'
 _COUNTS = '<div id="counts-plot" class="plot small"></div>'
 
 
+@door
 def write_tracking_report(
     path: str | os.PathLike[str],
     tracks: pd.DataFrame,

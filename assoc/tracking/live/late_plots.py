@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
@@ -40,6 +41,7 @@ class _Kept:
     assigned: tuple[Array, ...] = ()
 
 
+@doors
 class LatePlots:
     """A tracker for measurements that may be late.
 
