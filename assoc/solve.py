@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assoc._cli.growing_table import GrowingTable
 from assoc._cli.imports import HELP as IMPORT_HELP
 from assoc._cli.imports import import_modules
 from assoc._cli.inputs import check_ending, check_outputs, read_toml
@@ -38,6 +39,7 @@ from assoc.solvers import registry
 if TYPE_CHECKING:
     from assoc.association.association import Association
     from assoc.association.plan import Plan
+    from assoc.association.scan import ScanAssociation
     from assoc.association.source import Source
 
 _EARLY_END = EarlyEnd("assoc.solve")
@@ -101,34 +103,34 @@ def _associate(
     plan, items = _plan(sources, files, solver, settings, parameters, log, pheromone=parsed["report"] is not None)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
-    scans = []
+    names = [files[number] for number, _ in items]
+    # a pipe gets all scans and columns when all are there: programs read it
+    table = _ScanTable(sources, names, len(names) if parsed["all"] else _SHOWN) if sys.stdout.isatty() else None
+    progress = with_progress(plan.run(items, jobs), len(items), bar)
+    # with -v the log has a line for each scan already
+    watched = progress if table is None or parsed["verbose"] else table.watch(progress)
+    scans: list[ScanAssociation] = []
     # other processes do not hear that they should end: their scans are given up
     with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
         try:
-            for scan in with_progress(plan.run(items, jobs), len(items), bar):
+            for scan in watched:
                 scans.append(scan)
                 log.end(scan)
         except KeyboardInterrupt:
             if not _EARLY_END.asked:
                 raise
-    if scans or not items:
-        found = plan.gather(scans)
-        _write(words, parsed, found, [(sources[n], files[n]) for n, _ in items[: len(scans)]], started)
-    _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written" if scans else "")
-
-
-def _write(
-    words: list[str], parsed: dict[str, Any], found: Association, origins: list[tuple[Source, str]], started: float
-) -> None:
-    """Write and print what was found; each scan with the source and the file that it is of."""
     elapsed = time.perf_counter() - started
-    sources, names = [source for source, _ in origins], [name for _, name in origins]
+    if not scans and items:
+        _EARLY_END.say("")
+    found, names = plan.gather(scans), names[: len(scans)]
+    of_items = [sources[number] for number, _ in items[: len(scans)]]
     write_all(
         lambda: _write_json(parsed["json"], found, names),
         lambda: _write_csv(parsed["csv"], found, names),
-        lambda: _write_report(parsed["report"], found, sources, names, words),
-        lambda: _print(found, names, elapsed, every=parsed["all"]),
+        lambda: _write_report(parsed["report"], found, of_items, names, words),
+        lambda: _print(found, names, elapsed, table),
     )
+    _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written")
 
 
 def completions() -> dict[str, Sequence[str]]:
@@ -278,16 +280,46 @@ def _write_report(
         write_association_report(path, association, sources, names, words=words)
 
 
-def _print(association: Association, names: list[str], elapsed: float, *, every: bool) -> None:
+class _ScanTable:
+    """The table on a terminal: a row as soon as its scan is done, where the terminal is wide enough."""
+
+    def __init__(self, sources: Sequence[Source], names: list[str], most: int) -> None:
+        self._names = names
+        self._most = most
+        self._truth = any(getattr(source, "truth", None) is not None for source in sources)
+        self._growing: GrowingTable | None = None
+
+    def watch(self, scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
+        """Yield the scans, each after its row was printed."""
+        from assoc.association.table import LEFT_ALIGNED, WIDTHS, rows
+
+        for number, scan in enumerate(scans):
+            headers, cells = rows([scan], self._names, first=number, truth=self._truth, brief=True)
+            if self._growing is None:
+                self._growing = GrowingTable(headers, WIDTHS, LEFT_ALIGNED, self._most)
+            self._growing.add(cells)
+            yield scan
+
+    def finish(self, association: Association) -> None:
+        """Print what has not been printed yet."""
+        if self._growing is None or not self._growing.fits:
+            _print_table(association.scans[: self._most], self._names, brief=True)
+        if len(association.scans) > self._most:
+            print_lines(f"... and {len(association.scans) - self._most} more scans (--all shows them)")
+
+
+def _print_table(scans: Sequence[ScanAssociation], names: list[str], *, brief: bool) -> None:
     from assoc.association.table import KEYS, LEFT_ALIGNED, rows
 
-    # a pipe gets all scans and columns: programs read it
-    brief = sys.stdout.isatty()
-    shown = len(names) if every or not brief else _SHOWN
-    headers, cells = rows(association.scans[:shown], names[:shown], brief=brief)
+    headers, cells = rows(scans, names, brief=brief)
     print_table(headers, cells, keys=sum(header in KEYS for header in headers), left=LEFT_ALIGNED)
-    if len(names) > shown:
-        print_lines(f"... and {len(names) - shown} more scans (--all shows them)")
+
+
+def _print(association: Association, names: list[str], elapsed: float, table: _ScanTable | None) -> None:
+    if table is None:
+        _print_table(association.scans, names, brief=False)
+    else:
+        table.finish(association)
     print()
     print_lines(association.summary())
     total = association.totals()

@@ -26,6 +26,7 @@ from assoc._cli.options import (
 )
 from assoc._cli.program import Parser, command, prepare_streams, run_program, write_all
 from assoc._cli.progress import ProgressBar, with_progress
+from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import EarlyEnd, Interruption
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.values import number, place_on_earth, seconds, whole_number
@@ -369,6 +370,7 @@ def _of_scene(
     tracker = _make(name, scene.sensors, parsed, settings, scene.region, pace)
     bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
     numbers = with_progress(range(scene.num_scans), scene.num_scans, bar)
+    numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
     with _EARLY_END.work(_LAST_SCAN):
         table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
@@ -418,6 +420,7 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
     shown = with_progress(windows, len(windows), ProgressBar("tracking", "scans", shown=not parsed["quiet"]))
+    shown = with_scan_table(shown, tracker, lambda window: (window.times[-1], [len(window)]))
     with _EARLY_END.work(_LAST_SCAN):
         done = track_plots(tracker, recording, shown, confirmed=not parsed["all"])
     return tracker, done, len(windows)

@@ -6,7 +6,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 
-_BETWEEN = "  "
+BETWEEN = "  "
 
 
 def print_table(
@@ -36,9 +36,17 @@ def print_table(
     if sys.stdout.isatty():
         lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
     else:
-        lines = _aligned([[header] for header in headers], rows, left, headers)
+        lines = _plain(headers, rows, left)
     for line in lines:
         print(line)
+
+
+def _plain(headers: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[str]) -> Iterator[str]:
+    words = [[header] for header in headers]
+    widths = _widths(words, rows)
+    yield from _headings(words, widths, headers, left)
+    for row in rows:
+        yield aligned(row, widths, headers, left)
 
 
 def fitted_lines(
@@ -65,19 +73,19 @@ def fitted_lines(
             units[-1].append(i)
         else:
             units.append([i])
-    fixed = sum(high[:keys]) + len(_BETWEEN) * keys
-    needed = [sum(high[i] for i in unit) + len(_BETWEEN) * (len(unit) - 1) for unit in units]
+    fixed = sum(high[:keys]) + len(BETWEEN) * keys
+    needed = [sum(high[i] for i in unit) + len(BETWEEN) * (len(unit) - 1) for unit in units]
     if units and fixed + max(needed) > width:
         yield from _listed(headers, rows)
         return
     blocks: list[list[int]] = []
     used = width
     for unit, wide in zip(units, needed, strict=True):
-        if not blocks or used + len(_BETWEEN) + wide > width:
+        if not blocks or used + len(BETWEEN) + wide > width:
             blocks.append([*every[:keys]])
-            used = fixed - len(_BETWEEN)
+            used = fixed - len(BETWEEN)
         blocks[-1] += unit
-        used += len(_BETWEEN) + wide
+        used += len(BETWEEN) + wide
     for number, block in enumerate(blocks or [[*every]]):
         if number:
             yield ""
@@ -86,7 +94,7 @@ def fitted_lines(
 
 def _width(columns: Iterable[int], words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> int:
     widths = [max(map(len, [*words[i], *(row[i] for row in rows)])) for i in columns]
-    return sum(widths) + len(_BETWEEN) * (len(widths) - 1)
+    return sum(widths) + len(BETWEEN) * (len(widths) - 1)
 
 
 def _drawn(
@@ -98,28 +106,45 @@ def _drawn(
 ) -> Iterator[str]:
     """Some columns of a table, with a line below their headers."""
     chosen = [words[i] for i in columns]
-    lines = _aligned(chosen, [[row[i] for i in columns] for row in rows], left, [headers[i] for i in columns])
-    for _ in range(max(map(len, chosen))):
-        yield next(lines)
-    utf = (sys.stdout.encoding or "").lower().startswith("utf")
-    yield ("─" if utf else "-") * _width(columns, words, rows)
-    yield from lines
+    cells = [[row[i] for i in columns] for row in rows]
+    names = [headers[i] for i in columns]
+    widths = _widths(chosen, cells)
+    yield from heading(chosen, widths, names, left)
+    for row in cells:
+        yield aligned(row, widths, names, left)
 
 
-def _aligned(
-    words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[str], headers: Sequence[str]
+def _widths(words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> list[int]:
+    return [max(map(len, [*split, *(row[i] for row in rows)])) for i, split in enumerate(words)]
+
+
+def heading(
+    words: Sequence[Sequence[str]], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]
 ) -> Iterator[str]:
-    """Lines of headers, each of one or several words below one another, and of rows, in columns."""
+    """Lines of headers, each of one or several words below one another, and a line below them."""
+    yield from _headings(words, widths, headers, left)
+    # rich's stand-in for stdout, while a progress bar is shown, knows no encoding
+    stream = getattr(sys.stdout, "rich_proxied_file", sys.stdout)
+    utf = (stream.encoding or "").lower().startswith("utf")
+    yield ("─" if utf else "-") * (sum(widths) + len(BETWEEN) * (len(widths) - 1))
+
+
+def _headings(
+    words: Sequence[Sequence[str]], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]
+) -> Iterator[str]:
     high = max(map(len, words))
     over = [[*[""] * (high - len(split)), *split] for split in words]
-    table = [*zip(*over, strict=True), *rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for row in table:
-        texts = [
-            text.ljust(width) if header in left else text.rjust(width)
-            for header, text, width in zip(headers, row, widths, strict=True)
-        ]
-        yield _BETWEEN.join(texts).rstrip()
+    for line in zip(*over, strict=True):
+        yield aligned(line, widths, headers, left)
+
+
+def aligned(row: Sequence[str], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]) -> str:
+    """Return a line of cells, each as wide as its column."""
+    texts = [
+        text.ljust(width) if header in left else text.rjust(width)
+        for header, text, width in zip(headers, row, widths, strict=True)
+    ]
+    return BETWEEN.join(texts).rstrip()
 
 
 def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -129,4 +154,4 @@ def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[s
         if number:
             yield ""
         for header, cell in zip(headers, row, strict=True):
-            yield f"{header.ljust(wide)}{_BETWEEN}{cell}"
+            yield f"{header.ljust(wide)}{BETWEEN}{cell}"

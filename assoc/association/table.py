@@ -13,12 +13,20 @@ from assoc.association.scan import ScanAssociation
 KEYS = ("file", "scan", "rank")
 """Columns that say which row it is."""
 
+WIDTHS = {"cost": 10, "status": 11, "ms": 8, "correct": 7}
+"""By header: what most cells need."""
+
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")
 
 
 def rows(
-    scans: Sequence[ScanAssociation], files: Sequence[str], *, brief: bool = False
+    scans: Sequence[ScanAssociation],
+    files: Sequence[str],
+    *,
+    first: int = 0,
+    truth: bool | None = None,
+    brief: bool = False,
 ) -> tuple[list[str], list[list[str]]]:
     """Headers and cells for people.
 
@@ -26,20 +34,25 @@ def rows(
     ----------
     scans : sequence of ScanAssociation
     files : sequence of str
-        The file of each scan; shown only if there are several.
+        The file of each scan, also of those before and after these; shown only if there are several.
+    first : int, default 0
+        Which of the files is that of the first scan.
+    truth : bool, optional
+        Whether there is a column of correct tuples; by default if the truth of one of the scans is known.
     brief : bool, default False
-        Leave out the folders of files, and lower bound and gap where all scans are certified optimal.
+        For a terminal: leave out the folders of files and the lower bound, and say the gap only of scans that are
+        not certified optimal, in the place of their status.
     """
     if brief:
         files = _short_names(files)
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
-    truth = any(scan.true_tuples is not None for scan in scans)
+    truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
     headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
     cells = []
-    for scan, file, rank in _lines(scans, files):
+    for scan, file, rank in _lines(scans, files[first : first + len(scans)]):
         solution = scan.solution
         row = [printable(file)] if several else []
         row += [
@@ -57,7 +70,10 @@ def rows(
         if truth:
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
-    if brief and all(one.solution.status == "optimal" for one, _, _ in _lines(scans, files)):
+    if brief:
+        gap, status = headers.index("gap"), headers.index("status")
+        for row in cells:
+            row[status] = row[status] if row[status] == "optimal" else f"gap {row[gap]}"
         kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
         headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells

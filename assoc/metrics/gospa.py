@@ -120,7 +120,7 @@ def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     ----------
     Rahmathullah, Garcia-Fernandez & Svensson, FUSION 2017, section V, where the mean is over runs.
     """
-    if not values:
+    if len(values) == 0:
         return {"distance": 0.0, "localisation": 0.0, "missed": 0.0, "false": 0.0}
     parts = {
         name: float(np.mean([getattr(one, name) for one in values])) for name in ("localisation", "missed", "false")

@@ -10,7 +10,6 @@ import numpy as np
 import assoc
 from assoc import sweeps
 from assoc.metrics import Trajectories
-from assoc.scene import Truth
 from assoc.simulation import simulate
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.tracking import TRACKERS, TrackTable
