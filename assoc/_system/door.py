@@ -65,7 +65,7 @@ def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords:
         bound = inspect.signature(function).bind(*args, **keywords).arguments
     except TypeError:
         return None  # too many or too few: Python says it well
-    kinds = annotations(function)
+    kinds = annotations_of(function)
     for name, value in bound.items():
         parameter = inspect.signature(function).parameters[name]
         kind = kinds.get(name, Any)
@@ -98,7 +98,7 @@ class _Names(dict[str, Any]):
         return _Unloaded(name, (), {})
 
 
-def annotations(function: Callable[..., Any]) -> dict[str, Any]:
+def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
     names = _Names(vars(sys.modules[function.__module__]))
     found = {}
     # a dataclass's constructor is made from strings, too

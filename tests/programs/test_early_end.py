@@ -12,11 +12,11 @@ import time
 
 import pytest
 
+import assoc
 from assoc._cli.progress import ProgressBar
 from assoc._cli.solver_log import SolverLog
 from assoc.association.plan import Plan
-from assoc.problem import AssignmentProblem
-from assoc.scene.scene import Scene
+from assoc.packing.run import Run
 from assoc.simulation import simulate
 
 ASLEEP = """
@@ -38,7 +38,7 @@ def solve(packing, parameters, run):
     return Outcome(np.zeros(0, dtype=np.int64), 0)
 
 solve.calls = 0
-register("asleep", solve, Nothing)
+register("asleep", Nothing, solve)
 """
 
 
@@ -110,28 +110,21 @@ def test_a_solver_tells_how_far_it_is(capsys):
         assert float(row[4]) == pytest.approx(one.solution.lower_bound, abs=1e-4)
 
 
-def test_long_searches_tell_rising_bounds(monkeypatch):
-    """Branch and bound adds points to its trace although the best solution stays the same."""
-    from assoc.packing import run
-
-    problem = hard_problem()
-    heard = []
-    monkeypatch.setattr(run, "_NEWS", 0.0)
-    from assoc import assign
-
-    assign(problem, "exact", callback=lambda point: heard.append(point) and None)
-    often = len(heard)
-    monkeypatch.setattr(run, "_NEWS", 1e9)
-    heard.clear()
-    assign(problem, "exact", callback=lambda point: heard.append(point) and None)
-    assert often > len(heard)
+def test_long_searches_tell_where_they_are():
+    """A search whose best solution stays the same has news after half a second."""
+    run = Run(0)
+    assert run.is_silent()
+    run.record(1, -1.0, -2.0)
+    assert not run.is_silent()
+    run.trace[-1] = run.trace[-1]._replace(seconds=-10.0)
+    assert run.is_silent()
 
 
-def hard_problem() -> AssignmentProblem:
-    import assoc
-
-    scene: Scene = simulate("bearing-only", 301, targets=20, scans=1)
-    return assoc.build_problem(scene, scene.scan(0))
+def test_a_search_ends_when_it_is_asked_to(monkeypatch):
+    monkeypatch.setattr("assoc.packing.run.end_is_asked", lambda: True)
+    solution = assoc.assign(assoc.build_problem(simulate("bearing-only", 1, targets=40, scans=1), 0), "aco")
+    assert solution.stopped_by == "interrupted" and solution.status == "feasible"
+    assert solution.lower_bound <= solution.cost < 0
 
 
 def test_parts_of_scenes():
