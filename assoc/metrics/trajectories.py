@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
@@ -18,7 +19,7 @@ SAME_TIME = 1e-6
 
 @doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectories:
+class Trajectories(Shown):
     """Targets, or tracks, over time.
 
     Parameters

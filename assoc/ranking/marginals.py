@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assoc._parameters import checked_time_limit
 from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._text.shown import Shown
 from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
@@ -36,8 +37,8 @@ _ROUNDING = 1e-12
 _FAR = 4000.0
 
 
-@dataclass(frozen=True, slots=True)
-class Marginals:
+@dataclass(frozen=True, slots=True, repr=False)
+class Marginals(Shown):
     """Probability of each tuple to be an association.
 
     Attributes
@@ -69,6 +70,9 @@ class Marginals:
         columns = {f"sensor_{s + 1}": self.tuples[:, s] for s in range(self.tuples.shape[1])}
         frame = pd.DataFrame({**columns, "probability": self.probability, "lower": self.lower, "upper": self.upper})
         return frame[frame["upper"] > 0.0].reset_index(drop=True)
+
+    def __repr__(self) -> str:
+        return f"Marginals({len(self.tuples)} tuples, {self.listed} solutions listed, unseen weight {self.unseen:.3g})"
 
 
 @door

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array, wrap_angle
@@ -20,7 +21,7 @@ UNDECODED = 0
 
 @doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording:
+class Recording(Shown):
     """Plots of a radar, in the order of time.
 
     Parameters

@@ -12,6 +12,7 @@ import numpy as np
 
 from assoc._files.output import write_json
 from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.correction import own_biases, without_biases
@@ -48,7 +49,7 @@ class Residuals:
 
 @doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Registration:
+class Registration(Shown):
     """Biases of sensors: what a sensor states, less what is true.
 
     Attributes

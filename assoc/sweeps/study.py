@@ -9,6 +9,7 @@ from typing import Any
 
 from assoc._parameters import checked_time_limit, is_whole, whole_seed
 from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError
 from assoc.sweeps.backends.batches import Batches, RunNumbers
@@ -49,8 +50,8 @@ class Counts:
 
 
 @doors
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Shown):
     """Settings to run on scenes and problems.
 
     Parameters
@@ -100,6 +101,9 @@ class Study:
             raise InvalidInputError("scans: expected the numbers of the scans of each source, as ranges")
         if not isinstance(self.gating, Mapping):
             raise InvalidInputError(f"gating: expected a mapping, got {type(self.gating).__name__}")
+
+    def __repr__(self) -> str:
+        return f"Study({len(self.settings)} settings, {len(self.sources)} sources, {self.size} runs)"
 
     @property
     def manifest(self) -> Manifest:
