@@ -6,6 +6,7 @@
 # make mutants          faults put in on purpose: each must make the tests of its room fail
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
+# make test-newest      a part of the tests with a newer Python (3.13 or 3.12) where there is one; TESTS=tests for all
 # make test-uncompiled  a part of the tests with numba switched off
 # make test-cold        the same bytes with a cold cache of kernels, a warm one, and on 1, 2 and 4 processes
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
@@ -18,6 +19,11 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 p
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then command -v $$p; break; fi; done)
 VENV := .venv
 OLDEST := .venv-oldest
+# newer ones that the tests are run with, on the path or installed by pyenv
+NEWEST := .venv-newest
+NEWER ?= $(shell for p in python3.13 python3.12 $(HOME)/.pyenv/versions/3.13*/bin/python $(HOME)/.pyenv/versions/3.12*/bin/python; do \
+	if "$$p" -c '' >/dev/null 2>&1; then command -v "$$p"; break; fi; done)
+TESTS ?= $(UNCOMPILED) tests/ranking tests/proofs tests/filters/test_gaussian_filters.py
 # tests with much behind them that are quick without a compiler
 UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tests/simulation/test_observation.py \
 	tests/solvers/test_reduction.py tests/packing/test_matching.py tests/packing/test_dimensionwise.py \
@@ -25,7 +31,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-all test-oldest test-uncompiled test-cold lint docs fuzz mutants dist check-dist audit bench bench-quick bench-cold clean
+.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz mutants dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -59,6 +65,10 @@ mutants: $(VENV)/.installed-test
 test-oldest: $(OLDEST)/.installed-test
 	NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/kernels" $(OLDEST)/bin/python -m pytest -n 2 -q -p no:cacheprovider
 
+test-newest:
+	@if [ -n "$(NEWER)" ]; then $(MAKE) $(NEWEST)/.installed-test && $(NEWEST)/bin/python -m pytest -n 2 -q -p no:cacheprovider \
+		-m "not slow" $(TESTS); else echo "no Python 3.13 or 3.12 here: nothing tested" >&2; fi
+
 test-uncompiled: $(VENV)/.installed-test
 	NUMBA_DISABLE_JIT=1 $(PY) -m pytest -n 2 -q -p no:cacheprovider $(UNCOMPILED)
 
@@ -85,7 +95,7 @@ bench-cold: $(VENV)/.installed-test
 	$(PY) -m experiments.cold_start
 
 clean:
-	rm -rf $(VENV) $(OLDEST) demo dist docs/_build
+	rm -rf $(VENV) $(OLDEST) $(NEWEST) demo dist docs/_build
 
 # the stamps make a changed pyproject.toml (a new dependency, say) reach an environment that exists already
 $(VENV)/.created:
@@ -111,6 +121,11 @@ $(VENV)/.installed-docs: $(VENV)/.installed
 
 $(VENV)/.installed-release: $(VENV)/.installed
 	$(PIP) -e ".[release]"
+	@touch $@
+
+$(NEWEST)/.installed-test: pyproject.toml
+	"$(NEWER)" -m venv --clear $(NEWEST)
+	$(NEWEST)/bin/python -m pip install --quiet --disable-pip-version-check -e ".[test]"
 	@touch $@
 
 $(OLDEST)/.installed-test: $(VENV)/.installed-test tests/release/oldest.py

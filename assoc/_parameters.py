@@ -181,9 +181,11 @@ class Parameters:
 
     def _whole(self, *names: str, least: int = 1, most: int | None = None) -> None:
         """Refuse fields that are not whole numbers of at least so much, or from least to most."""
-        expected = f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+        limit = math.inf if most is None else most
         for name in names:
-            self._require(is_whole(getattr(self, name), least, math.inf if most is None else most), name, expected)
+            if not is_whole(getattr(self, name), least, limit):
+                expected = f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+                self._require(False, name, expected)
 
     def _number(
         self, *names: str, above: float = -math.inf, least: float = -math.inf, most: float | None = None

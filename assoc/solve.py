@@ -100,7 +100,8 @@ def _associate(
     started = time.perf_counter()
     bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
     log = SolverLog(bar, parsed["verbose"])
-    plan, items = _plan(sources, files, solver, settings, parameters, log, pheromone=parsed["report"] is not None)
+    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"], "watch": log}
+    plan, items = _plan(sources, files, solver, settings, parameters, extras)
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     names = [files[number] for number, _ in items]
@@ -167,6 +168,7 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
+    add("--gate-loss", action="store_true", help="bound what the gates may have cost (takes about three times as long)")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
     add_speech_options(parser, "all parameters, and how cost and bound change while a scan is solved")
     parser.elsewhere = lambda: flags_of_solvers(solver)
@@ -222,9 +224,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
-    log: Any,
-    *,
-    pheromone: bool,
+    extras: dict[str, Any],
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
@@ -239,8 +239,7 @@ def _plan(
         parameters,
         gating,
         settings.get("kbest"),
-        pheromone,
-        log,
+        **extras,
     )
     items = plan.items()
     if "scans" in settings:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
-from collections.abc import Iterator
+from contextlib import ContextDecorator
 
 _end_asked = threading.Event()
 
@@ -19,19 +18,19 @@ def end_is_asked() -> bool:
     return _end_asked.is_set()
 
 
-@contextlib.contextmanager
-def interruptible() -> Iterator[None]:
+class interruptible(ContextDecorator):  # noqa: N801 - read like those of contextlib
     """Let Ctrl-C be a KeyboardInterrupt where it comes while a kernel's arguments or results are converted.
 
     Python then sees a function that returns a result and has an exception set, and says SystemError; once for
-    every conversion that is nested in another.
+    every conversion that is nested in another. A class, as every solution of a tiny scene pays for a generator.
     """
-    try:
-        yield
-    except SystemError as error:
-        cause: BaseException | None = error
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        cause = error
         while isinstance(cause, SystemError):
             cause = cause.__cause__
-        if isinstance(cause, KeyboardInterrupt):
+        if isinstance(error, SystemError) and isinstance(cause, KeyboardInterrupt):
             raise cause from None
-        raise

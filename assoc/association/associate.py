@@ -23,6 +23,7 @@ def associate(
     time_limit: float | None = None,
     jobs: int = 1,
     gating: Mapping[str, Any] | None = None,
+    gate_loss: bool = False,
     **parameters: Any,
 ) -> Association:
     """Find for every scan which measurements come from the same target, and which are false alarms.
@@ -43,6 +44,9 @@ def associate(
     gating : mapping, optional
         Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``speed``, ``target_density``,
         ``all_tuples``.
+    gate_loss : bool, default False
+        Whether to bound for each scan what the gates may have cost (``ScanAssociation.gate_loss``): the scan is built
+        and solved once more without gates, which takes about three times as long.
     **parameters
         Parameters of the solver (``assoc.solvers.parameters(solver)``).
 
@@ -61,5 +65,6 @@ def associate(
 
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, {} if gating is None else gating)
+    gates = {} if gating is None else gating
+    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, gate_loss=bool(gate_loss))
     return plan.gather(plan.run(plan.items(), jobs))

@@ -55,8 +55,11 @@ class Association:
 
         ``optimal`` counts the scans whose status is "optimal"; ``true_tuples``, ``correct_tuples`` and
         their ratio ``share_correct`` are over the scans with known truth, None where there is none.
+        ``gate_loss`` is there only where it was asked for.
         """
         solutions = self.solutions
+        losses = [scan.gate_loss for scan in self.scans if scan.gate_loss is not None]
+        gate_loss = math.fsum(losses) if losses else None
         known = [scan for scan in self.scans if scan.true_tuples is not None]
         true = sum(scan.true_tuples or 0 for scan in known) if known else None
         correct = sum(scan.correct_tuples or 0 for scan in known) if known else None
@@ -71,6 +74,7 @@ class Association:
             "optimal": sum(solution.status == "optimal" for solution in solutions),
             "runtime": math.fsum(solution.runtime for solution in solutions),
             "compile_time": math.fsum(scan.compile_time for scan in self.scans),
+            **({} if gate_loss is None else {"gate_loss": plain(gate_loss)}),
             "true_tuples": true,
             "correct_tuples": correct,
             "share_correct": correct / true if true and correct is not None else None,
@@ -87,6 +91,9 @@ class Association:
             f"{self.solver}: {total['optimal']} of {total['scans']} scans certified optimal, "
             f"median {median:.3g} ms a scan",
         ]
+        if "gate_loss" in total:
+            bound = total["gate_loss"]
+            lines.append("gates: may have cost any amount" if bound is None else f"gates: cost at most {bound:.3g}")
         if total["share_correct"] is not None:
             lines.append(
                 f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "

@@ -14,6 +14,7 @@ from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import ordered_map
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
+from assoc.association.gate_loss import gate_loss
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
@@ -52,6 +53,8 @@ class Plan:
         Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
     watch : callable, optional
         Called with the number of a scan and each TracePoint of its solver, in this process only.
+    gate_loss : bool
+        Bound for each scan of a scene what the gates may have cost.
     """
 
     sources: Sequence[Source]
@@ -63,6 +66,7 @@ class Plan:
     kbest: int | None = None
     pheromone: bool = False
     watch: Callable[[int, TracePoint], object] | None = None
+    gate_loss: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", whole_seed(self.seed))
@@ -106,7 +110,11 @@ class Plan:
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
         solutions, history = self._solve(problem, seed, scan.index)
-        return self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
+        best = self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
+        if not self.gate_loss:
+            return best
+        loss = gate_loss(scene, scan, best.solution.cost, self.gating, self.time_limit)
+        return replace(best, gate_loss=loss, compile_time=compile_seconds() - compiled)
 
     def _solve(
         self, problem: AssignmentProblem, seed: int | np.random.SeedSequence, scan: int

@@ -49,6 +49,9 @@ class ScanAssociation(Shown):
     compile_time : float
         Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
         no part of ``solution.runtime``.
+    gate_loss : float or None
+        By how much the cost can be above the optimum of all tuples of negative cost, gated or not; infinite where
+        nothing is known, None where it was not asked for.
     """
 
     scan: int
@@ -64,6 +67,7 @@ class ScanAssociation(Shown):
     ranked: tuple[ScanAssociation, ...] = ()
     pheromone: PheromoneHistory | None = None
     compile_time: float = 0.0
+    gate_loss: float | None = None
 
     @property
     def false_alarms(self) -> int:
@@ -100,6 +104,8 @@ class ScanAssociation(Shown):
             "runtime": solution.runtime,
             "compile_time": self.compile_time,
         }
+        if self.gate_loss is not None:
+            content["gate_loss"] = plain(self.gate_loss)
         if self.ranked:
             content["ranked"] = [
                 {"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)

@@ -48,7 +48,9 @@ def rows(
     several = len(set(files)) > 1
     ranked = any(scan.ranked for scan in scans)
     truth = any(scan.true_tuples is not None for scan in scans) if truth is None else truth
-    headers = [*(["file"] if several else []), *_HEADERS, *(["correct"] if truth else [])]
+    losses = any(scan.gate_loss is not None for scan in scans)
+    headers = [*(["file"] if several else []), *_HEADERS]
+    headers += [*(["gate loss"] if losses else []), *(["correct"] if truth else [])]
     if ranked:
         headers.insert(headers.index("scan") + 1, "rank")
     cells = []
@@ -67,6 +69,8 @@ def rows(
             solution.status,
             f"{1e3 * solution.runtime:.2f}",
         ]
+        if losses:
+            row.append(_loss(scan))
         if truth:
             row.append("" if scan.true_tuples is None else f"{scan.correct_tuples}/{scan.true_tuples}")
         cells.append(row)
@@ -77,6 +81,13 @@ def rows(
         kept = [column for column, header in enumerate(headers) if header not in ("lower bound", "gap")]
         headers, cells = [headers[i] for i in kept], [[row[i] for i in kept] for row in cells]
     return headers, cells
+
+
+def _loss(scan: ScanAssociation) -> str:
+    """What the gates may have cost; 0 where that is no more than the tolerance of a certificate."""
+    if scan.gate_loss is None:
+        return ""
+    return "0" if scan.gate_loss <= 1e-6 * max(1.0, abs(scan.solution.cost)) else f"{scan.gate_loss:.2g}"
 
 
 def _short_names(files: Sequence[str]) -> list[str]:
@@ -97,12 +108,13 @@ def _lines(
 def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
     """Return the table as CSV with full precision; sizes are joined by blanks, unknown values are empty."""
     ranked = any(scan.ranked for scan in scans)
+    losses = any(scan.gate_loss is not None for scan in scans)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         ["file", "scan", *(["rank"] if ranked else []), "time", "sizes", "targets", "false_alarms", "cost"]
         + ["lower_bound", "gap", "status", "runtime", "stopped_by", "iterations", "true_tuples", "correct_tuples"]
-        + ["compile_time"]
+        + ["compile_time", *(["gate_loss"] if losses else [])]
     )
     for scan, file, rank in _lines(scans, files):
         solution = scan.solution
@@ -112,5 +124,6 @@ def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:
             + [len(scan.targets), scan.false_alarms, solution.cost, solution.lower_bound, solution.gap]
             + [solution.status, solution.runtime, solution.stopped_by, solution.iterations]
             + [scan.true_tuples, scan.correct_tuples, scan.compile_time]
+            + ([scan.gate_loss] if losses else [])
         )
     return text.getvalue()

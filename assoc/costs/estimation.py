@@ -32,6 +32,12 @@ _WEAK = 1.0
 _MAX_STEPS = 100
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
 _POOR_FIT = 10.0
+# chi-square above which a tuple with a range-azimuth radar is fitted from another height, too
+_DOUBTFUL = 3.0
+# in half heights: ranges above this bend too little for that, where there are no others to be near
+_FAR = 2.0
+# how far beyond the region's heights such a fit may end, in half heights: mirror images lie farther
+_HEIGHT_SLACK = 1.1
 
 
 @njit
@@ -108,6 +114,20 @@ def _start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) 
     if not ok:
         return scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
     return x, y, z
+
+
+@njit
+def _at_height(sensors: SensorArrays, scan: ScanArrays, n: int, z: float) -> tuple[float, float, float]:
+    """Where a range and azimuth are at a height; as high or low as the range allows."""
+    s = scan.owner[n]
+    far, azimuth = scan.z[n, 0], scan.z[n, 1]
+    up = min(max(z - sensors.place[s, 2], -far), far)
+    ground = math.sqrt(far * far - up * up)
+    return (
+        sensors.place[s, 0] + ground * math.cos(azimuth),
+        sensors.place[s, 1] + ground * math.sin(azimuth),
+        sensors.place[s, 2] + up,
+    )
 
 
 @njit
@@ -219,30 +239,62 @@ def _settle(
 
 
 @njit
-def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[float, float, float, float, Six, Six]:
-    """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed."""
-    # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
-    full_ones = tall_ones = located_ones = 0
-    for n in members:
-        s = scan.owner[n]
-        full_ones += 1 if sensors.full[s] else 0
-        tall_ones += 1 if sensors.full[s] or sensors.code[s] == RADAR2D else 0
-        located_ones += 1 if sensors.code[s] != BEARING else 0
-    full, flat = full_ones > 0, tall_ones == 0
-    if located_ones == 0:
-        crossing, ahead = _bearing_starts(sensors, scan, members)
-        best = _settle(sensors, scan, members, crossing, flat)
-        if not best[0] <= _POOR_FIT:
-            other = _settle(sensors, scan, members, ahead, flat)
-            if other[0] < best[0] or not math.isfinite(best[0]):
-                best = other
-        return best
-    at = _start(sensors, scan, members, full)
+def _from(
+    sensors: SensorArrays, scan: ScanArrays, members: Array, at: tuple[float, float, float], full: bool, flat: bool
+) -> tuple[float, float, float, float, Six, Six]:
+    """Position that a start leads to."""
     if full:
         none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         chi, x, y, z, A = _descend(sensors, scan, members, at, none)
         return chi, x, y, z, A, none
     return _settle(sensors, scan, members, at, flat)
+
+
+@njit
+def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[float, float, float, float, Six, Six]:
+    """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed.
+
+    Ranges near a radar that measures no elevation bend so much that the fit may end in a local minimum, hundreds of
+    chi-square above the best. A fit that is not good starts again where such a radar sees its measurement at its own
+    height or at the bottom of the region, whichever explains all measurements better.
+    """
+    # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
+    full_ones = tall_ones = located_ones = slant_ones = 0
+    for n in members:
+        s = scan.owner[n]
+        full_ones += 1 if sensors.full[s] else 0
+        tall_ones += 1 if sensors.full[s] or sensors.code[s] == RADAR2D else 0
+        located_ones += 1 if sensors.code[s] != BEARING else 0
+        slant_ones += 1 if sensors.code[s] == RADAR2D else 0
+    full, flat = full_ones > 0, tall_ones == 0
+    at = ahead = (0.0, 0.0, 0.0)
+    if located_ones == 0:
+        at, ahead = _bearing_starts(sensors, scan, members)
+    else:
+        at = _start(sensors, scan, members, full)
+    best = _from(sensors, scan, members, at, full, flat)
+    if located_ones == 0 and not best[0] <= _POOR_FIT:
+        other = _from(sensors, scan, members, ahead, full, flat)
+        if other[0] < best[0] or not math.isfinite(best[0]):
+            best = other
+    if slant_ones == 0 or len(members) == 1 or best[0] <= _DOUBTFUL:
+        return best
+    least = math.inf
+    for n in members:
+        s = scan.owner[n]
+        far = slant_ones == len(members) and scan.z[n, 0] > _FAR * sensors.half[2]
+        if sensors.code[s] != RADAR2D or far:
+            continue
+        for height in (sensors.place[s, 2], sensors.middle[2] - sensors.half[2]):
+            there = _at_height(sensors, scan, n, height)
+            chi = normal(sensors, scan, members, there[0], there[1], there[2])[0]
+            if chi < least:
+                least, at = chi, there
+    if least < math.inf:
+        other = _from(sensors, scan, members, at, full, flat)
+        if other[0] < best[0] and abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]:
+            return other
+    return best
 
 
 @njit

@@ -126,8 +126,8 @@ def assign(
             from assoc.proofs import write_proof  # loads what few calls need
 
             write_proof(proof, problem, solution)
-    # only where nothing was found is it worth a look why
-    if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
+    # only where nothing was found is it worth a look why: every column of a problem with dummies is a target
+    if advise and problem.dummy and not len(outcome.columns):
         for line in doubts_about_costs(problem):
             warn(line)
     return solution
@@ -138,7 +138,7 @@ def _checked(outcome: object, solver: str) -> Outcome:
     if not isinstance(outcome, Outcome):
         raise InvalidInputError(f"solver {solver!r}: expected it to return an Outcome, got {type(outcome).__name__}")
     columns = np.asarray(outcome.columns)
-    if columns.ndim != 1 or not (columns.size == 0 or np.issubdtype(columns.dtype, np.integer)):
+    if columns.ndim != 1 or not (columns.size == 0 or columns.dtype.kind in "iu"):
         raise InvalidInputError(
             f"solver {solver!r}: expected the columns of its Outcome to be a list of whole numbers, got an array of "
             f"shape {columns.shape} and type {columns.dtype}"

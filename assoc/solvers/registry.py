@@ -85,8 +85,7 @@ def parameters(name: str) -> type[Parameters]:
     """
     if name in _REGISTERED:
         return _REGISTERED[name][0]
-    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
-    return kind
+    return _kind(name)
 
 
 def solver(name: str) -> SolveFunction:
@@ -120,6 +119,12 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         return kind(**values)
     except TypeError as error:
         raise InvalidInputError(f"parameters of solver {name!r}: {error}") from None
+
+
+@cache
+def _kind(name: str) -> type[Parameters]:
+    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
+    return kind
 
 
 @cache

@@ -176,7 +176,7 @@ class JointProbabilisticTracker(Tracker):
     def _begin(self, s: int, z: Array, taken: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array]:
         """New tracks of measurements that are rather no track's, and their numbers."""
         free = np.flatnonzero(taken < 0.5)
-        states, fit, positions, score = self._singles(s, z[free])
+        states, fit, positions, score = self._new_tracks.singles(s, z[free])
         free = free[fit]
         when = np.full(len(free), time) if stamps is None else stamps[free]
         order = np.lexsort((*positions.T, when))

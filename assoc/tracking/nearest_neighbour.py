@@ -69,7 +69,7 @@ class NearestNeighbourTracker(Tracker):
             chosen = self._choose(pairs.track, pairs.measurement, gain, missed, batch.score, len(z))
             batch, hit, ids = self._take_in(batch, pairs, chosen, s, len(z), time)
             free = np.flatnonzero(ids == 0)
-            states, fit, positions, score = self._singles(s, z[free])
+            states, fit, positions, score = self._new_tracks.singles(s, z[free])
             free = free[fit]
             order = np.lexsort(positions.T)
             new = self._new_ids(len(free))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.branching.nodes import OpenNodes, new_node, push_children, take_node
@@ -23,6 +24,8 @@ from assoc.packing.run import Run
 from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values
 from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
 from assoc.packing.simplex.program import all_allowed, make_feasible, program_of, weight_limit
+from assoc.problem import AssignmentProblem
+from assoc.solvers.assign import assign
 from experiments.common.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
 
 
@@ -234,3 +237,16 @@ def test_first_solution_is_one_or_there_is_none():
         else:
             assert columns is None
     assert found > 20
+
+
+def test_search_for_a_first_solution_ends(monkeypatch):
+    """Without dummies even a first solution is hard to find: heuristics do not search for ever, and say so."""
+    rng = np.random.default_rng(1)
+    planted = np.stack([rng.permutation(15) + 1 for _ in range(4)], axis=1)
+    tuples = np.unique(np.vstack([planted, rng.integers(1, 16, (120, 4))]), axis=0)
+    problem = AssignmentProblem(tuples, rng.random(len(tuples)), [15] * 4, dummy=False)
+    assert assign(problem, "genetic", iterations=5).cost > 0.0
+    monkeypatch.setattr("assoc.packing.branching.feasibility._NODES", 0)
+    with pytest.raises(InfeasibleError, match="no complete solution was found in 0 nodes; solver exact"):
+        assign(problem, "genetic", iterations=5)
+    assert assign(problem, "exact").status == "optimal"

@@ -161,6 +161,7 @@ def test_speeds_in_knots(tmp_path):
     wrong = simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), interval=7.0)
     for k in range(one.num_scans):
         np.testing.assert_allclose(one.truth.positions[k], other.truth.positions[k], atol=1e-6)
-    assert any(np.abs(a - b).max(initial=0.0) > 1.0 for a, b in zip(one.truth.positions, wrong.truth.positions, strict=True))
+    pairs = zip(one.truth.positions, wrong.truth.positions, strict=True)
+    assert any(np.abs(a - b).max(initial=0.0) > 1.0 for a, b in pairs)
     with pytest.raises(InvalidInputError, match="speed_unit: expected 'm/s' or 'kt'"):
         simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), speed_unit="mph")

@@ -11,17 +11,22 @@ from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
+# nodes for each component: some minutes on the hardest that were seen; `exact` alone searches to the end
+_NODES = 20_000
+
 
 def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
-    """Return the columns of some complete solution; None when none exists or time is over."""
+    """Return the columns of some complete solution; None when none exists, or time or nodes are used up."""
     if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
         return None
     chosen = []
     for c in range(packing.num_components):
         part = packing.component(c)
         search = BranchAndBound(part, dual_bound(part, run=run), np.inf, 1e-9, run.deadline(), run.memory_allows)
-        while search.columns is None and not search.done and not run.should_stop():
+        while search.columns is None and not search.done and search.nodes < _NODES and not run.should_stop():
             search.run(20)
+        if search.columns is None and not search.done and not run.should_stop():
+            run.stopped_by = "iterations"
         if search.columns is None:
             if search.out_of_memory:
                 raise LimitExceededError("no memory to find out whether there is a solution; split the problem")
@@ -35,6 +40,8 @@ def infeasible(packing: Packing, run: Run | None = None) -> InfeasibleError:
     uncovered = int((~packing.slack & (np.diff(packing.row_ptr) == 0)).sum())
     if uncovered:
         return InfeasibleError(f"{uncovered} measurement(s) that must be used are in no tuple")
+    if run is not None and run.stopped_by == "iterations":
+        return InfeasibleError(f"no complete solution was found in {_NODES:,} nodes; solver exact searches to the end")
     if run is not None and run.should_stop():
         return InfeasibleError("no complete solution was found in the time limit")
     return InfeasibleError("no choice of tuples uses every index of the smallest dimension exactly once")

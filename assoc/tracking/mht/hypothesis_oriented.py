@@ -213,7 +213,7 @@ class HypothesisOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array, Array]:
         numbers = np.arange(len(z))
-        states, fit, positions, score = self._singles(s, z)
+        states, fit, positions, score = self._new_tracks.singles(s, z)
         numbers = numbers[fit]
         when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
         ids = np.empty(len(numbers), dtype=np.int64)

@@ -188,7 +188,7 @@ class TrackOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float) -> tuple[Any, Roots]:
         """New trees, one for each measurement that tells a position, and their states."""
-        states, fit, positions, score = self._singles(s, z)
+        states, fit, positions, score = self._new_tracks.singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
         ids = np.empty(len(numbers), dtype=np.int64)

@@ -81,6 +81,6 @@ class MultiSensorTracker(SingleScanTracker):
         if not problem.num_tuples:
             return problem.tuples, problem.costs
         # where false alarms are rarer than new targets a single measurement is one, too
-        scores = self._new_scores(problem.tuples, problem.costs, self._fused(scan, problem.tuples)[1])
+        scores = self._new_tracks.scores(problem.tuples, problem.costs, self._new_tracks.fused(scan, problem.tuples)[1])
         good = scores > 0
         return problem.tuples[good], -scores[good]
