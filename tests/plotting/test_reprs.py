@@ -83,7 +83,7 @@ def results(scene):
     tracker = tracking.MultiSensorTracker.for_scene(scene)
     table, decisions = tracking.track_scene(tracker, scene)
     truth = metrics.Trajectories.from_scene(scene)
-    plots = simulation.simulate_recording("rotating-radar", 0, turns=3).recording
+    plots = simulation.simulate_recording("rotating-radar", 0, aircraft=4, duration=40.0).recording
     windows = recordings.clustering_time_window(plots)
     number = np.repeat(np.arange(len(windows)), [len(window) for window in windows])
     known = plots.aircraft[np.concatenate([window.rows for window in windows])]
