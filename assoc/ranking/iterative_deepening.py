@@ -19,6 +19,9 @@ from assoc.ranking.merging import merge
 
 Columns = NDArray[np.int32]
 
+# excess of a round, as a multiple of that of the best solution known
+_AHEAD = 1.1
+
 
 @dataclass(slots=True)
 class Found:
@@ -112,7 +115,8 @@ class Deepening:
         if place >= steps.size:
             return np.inf
         known = self._ahead.weight - self._columns.bound + 4.0 * self._tolerance
-        return max(float(steps[place]), known) if known < np.inf else float(steps[place])
+        # a little more than that of one solution: the others should not take a round of their own
+        return max(float(steps[place]), _AHEAD * known) if known < np.inf else float(steps[place])
 
     def _round(self, excess: float) -> Found:
         """Rank all solutions of at most this excess; fewer than k if there are fewer."""

@@ -25,7 +25,13 @@ def bound_of_component(component: Component, run: Run) -> float:
     if run.should_stop():
         return component.bound
     search = BranchAndBound(
-        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+        component.packing,
+        component.duals,
+        component.weight,
+        component.tolerance,
+        run.deadline(),
+        run.memory_allows,
+        cuts=True,
     )
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)
