@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 TABLE, QUICK_TABLE, README = Path("docs/benchmarks.csv"), Path("docs/benchmarks-quick.csv"), Path("README.md")
+# what a brief run gives other solvers, in seconds
+_BRIEF_LIMIT = 5.0
 FAMILIES = ("paper", "gated", "ghost", "wide gap", "known optimum", "random axial", "planted", "scale", "kbest")
 
 
@@ -39,6 +42,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--peer-limit", type=float, metavar="S", help="time limit of other solvers at the most, in seconds"
+    )
+    parser.add_argument(
+        "--brief",
+        action="store_true",
+        help="everything in some 25 minutes: two seeds (ghosts up to ten), and other solvers get 5 s",
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help=f"the rows (default {TABLE})")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
@@ -103,6 +111,7 @@ def _command(options: argparse.Namespace) -> str:
     """What to type for the same run."""
     words = ["python -m experiments.benchmarks"]
     words += ["--quick"] if options.quick else []
+    words += ["--brief"] if options.brief else []
     for name in ("families", "sizes", "solvers"):
         if getattr(options, name):
             words += [f"--{name}", *(value.replace(" ", "_") for value in getattr(options, name))]
@@ -130,6 +139,9 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
         print(text, file=sys.stderr, flush=True)
 
     chosen = [case for case in cases(options.quick) if _to_run(case, families, options.sizes)]
+    if options.brief:
+        chosen = [replace(case, seeds=case.brief, chosen=case.chosen[: case.brief]) for case in chosen]
+        options.peer_limit = options.peer_limit or _BRIEF_LIMIT
     if options.peer_limit is not None:
         chosen = [case.with_peers_within(options.peer_limit) for case in chosen]
     if options.solvers:
@@ -141,9 +153,9 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
     for case in chosen:
         yield run.run_case(case, options.seeds, log)
     if "scale" in families:
-        yield scale.run(options.quick, options.seeds, log)
+        yield scale.run(options.quick, 2 if options.brief else options.seeds, log)
     if "kbest" in families:
-        yield ranking.run(options.quick, options.seeds, log)
+        yield ranking.run(options.quick, 2 if options.brief else options.seeds, log)
 
 
 if __name__ == "__main__":

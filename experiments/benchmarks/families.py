@@ -50,7 +50,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Case:
-    """One size of a family: how to make its instances and who runs on them, on so many seeds or on those chosen."""
+    """One size of a family: how to make its instances and who runs on them, on so many seeds or on those chosen.
+
+    ``brief`` is the number of seeds of a whole run in little time.
+    """
 
     family: str
     size: str
@@ -59,6 +62,7 @@ class Case:
     peers: tuple[Entry, ...]
     seeds: int = 5
     chosen: tuple[int, ...] = ()
+    brief: int = 2
     quick: bool = field(default=False, kw_only=True)
 
     def restricted_to(self, solvers: Collection[str]) -> Case:
@@ -176,7 +180,12 @@ def _ghost_cases(quick: bool) -> list[Case]:
         alone = ("scip_1",) if targets == 20 and not quick else ()
         peers = [Entry(name, limit) for name in (*names, *alone) for limit in limits]
         peers += [Entry("sequential", 5.0), Entry("nrl_tracker", 60.0)]
-        result.append(Case("ghost", str(targets), _ghost(targets), ours, tuple(peers), seeds, quick=True))
+        if not quick:
+            peers += [Entry("kap", 60.0), *(Entry("chils", limit) for limit in limits)]
+            # the other codes for independent sets, where their graph is not too large
+            peers += _entries(("branch_reduce", "mmwis"), 60.0) if targets <= 40 else ()
+        brief = {20: 10, 40: 5}.get(targets, 2)
+        result.append(Case("ghost", str(targets), _ghost(targets), ours, tuple(peers), seeds, brief=brief, quick=True))
     return result
 
 
@@ -187,7 +196,17 @@ def _wide_gap_cases(quick: bool) -> list[Case]:
     for targets, seeds in WIDE_GAPS.items():
         chosen = seeds[:2] if quick else seeds
         result.append(
-            Case("wide gap", str(targets), _ghost(targets), ours, peers, len(chosen), chosen, quick=targets == 20)
+            Case(
+                "wide gap",
+                str(targets),
+                _ghost(targets),
+                ours,
+                peers,
+                len(chosen),
+                chosen,
+                brief=5 if targets == 20 else 2,
+                quick=targets == 20,
+            )
         )
     return result
 

@@ -214,6 +214,19 @@ def test_the_readme_is_written_with_the_report(tmp_path: Path, monkeypatch: pyte
     assert "| 3 sensors, 300 targets | 10 ms | 300 ms (HiGHS) | 2 % |" in text
 
 
+def test_the_readme_says_how_long_others_had() -> None:
+    base = replace(ROW, family="ghost", size="40", limit=5.0)
+    ours = [replace(base, solver=name) for name in ("exact", "aco", "genetic", "tabu")]
+    for limit in (7.0, 60.0):
+        peer = replace(ours[0], solver="highs", peer=True, limit=limit)
+        assert f"best other solver, {limit:g} s" in readme.render([*ours, peer])
+
+
+def test_a_brief_run_is_whole() -> None:
+    assert {(case.family, case.size): case.brief for case in cases()}["ghost", "20"] == 10
+    assert all(1 <= case.brief <= case.seeds for case in cases())
+
+
 def test_report_says_what_its_reader_should_know() -> None:
     assert "**These rows**: two runs." in markdown.render([ROW, PEER], None, "make bench", "two runs.")
     assert "These rows" not in markdown.render([ROW, PEER], None, "make bench")
