@@ -19,8 +19,8 @@ from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import EarlyEnd, Interruption
 from assoc._cli.speech import spoken
-from assoc._cli.track_options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
-from assoc._cli.track_options import completions as completions
+from assoc._cli.track.options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
+from assoc._cli.track.options import completions as completions
 from assoc._cli.values import number, seconds
 from assoc._files.output import STDOUT
 from assoc._system.compile_time import compile_seconds
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _track(words: list[str]) -> None:
     parsed, settings = read_options(words)
     if parsed["live"]:
-        from assoc._cli.track_live import track_live
+        from assoc._cli.track.live import track_live
 
         track_live(parsed["file"], parsed, settings, _INTERRUPTION)
         return

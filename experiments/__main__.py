@@ -38,8 +38,8 @@ EXPERIMENTS = (
     ),
     Experiment(
         "pages",
-        "nothing: writes the tables of four pages from the result files",
-        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md",
+        "nothing: writes the tables of five pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md",
     ),
     Experiment(
         "papers.ant_colony",
@@ -103,6 +103,17 @@ EXPERIMENTS = (
         "trackers.fusion_in_stone_soup",
         "fusion before tracking, in Stone Soup",
         "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
+    ),
+    Experiment(
+        "metaheuristics.ablation",
+        "aco, genetic and tabu with each part taken out, and with two workers",
+        "docs/solvers.md (what each part contributes); with --publish "
+        "experiments/results/metaheuristics.ablation.json",
+    ),
+    Experiment(
+        "metaheuristics.sweep",
+        "alpha, beta, rho, ants and refinement of the ant colony on problems that are not easy",
+        "nothing in the pages; response surfaces as pictures",
     ),
     Experiment(
         "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"

@@ -95,7 +95,7 @@ class Decision(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Step(Decision):
-    """What one step of a tracker did; for a tracker that defers decisions, its opinion so far.
+    """What one step of a tracker did; for a tracker that defers decisions, what it would decide now.
 
     Attributes
     ----------

@@ -26,6 +26,8 @@ from assoc.solvers.tabu.parameters import TabuParameters
 _LARGE = 30
 _MANY = 90
 _TURNS = 3
+# share of a component's gap by which its bound has risen when the trace says so
+_WORTH = 0.02
 # columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 400
 _SHORT = 50
@@ -90,7 +92,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             if task.search is None:
                 task.search = _branching(component, run)
                 component.stalled = 0
-            before = task.search.nodes
+            before, bound_before = task.search.nodes, task.bound
             # some ten milliseconds of work between two looks at the clock
             task.search.run(min(max(1, 20_000 // max(component.packing.num_columns, 1)), node_limit - nodes))
             nodes += task.search.nodes - before
@@ -98,7 +100,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             if not task.search.done:
                 task.turns += 1
                 # as long as they improve it, metaheuristics get half the time; then less and less
-                if task.turns >= _TURNS * min(1 + component.stalled // 5, 5):
+                if task.turns >= _TURNS * min(1 + component.stalled, 10):
                     task.turns = 0
                     if _search_better(task, run):
                         task.search.weight = component.weight
@@ -107,7 +109,8 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 # in one search the nodes of independent components multiply
                 smaller = split_component(component) if better else None
                 tasks.extend([task] if smaller is None else [_Task(one) for one in smaller])
-                if better or run.is_silent():
+                risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
+                if better or risen or run.is_silent():
                     _record(run, nodes, weight, bound, tasks)
                 continue
             if better:
@@ -128,9 +131,15 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branching(component: Component, run: Run) -> BranchAndBound:
+def _branching(component: Component, run: Run, cuts: bool = True) -> BranchAndBound:
     return BranchAndBound(
-        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+        component.packing,
+        component.duals,
+        component.weight,
+        component.tolerance,
+        run.deadline(),
+        run.memory_allows,
+        cuts=cuts,
     )
 
 
@@ -139,7 +148,7 @@ def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
     task = _Task(component)
     if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = _branching(component, run)
+    task.search = _branching(component, run, cuts=False)
     task.search.run(nodes)
     task.take_over()
     return task

@@ -19,7 +19,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.checking import checked_measurements
-from assoc.tracking.memory import Memory
+from assoc.tracking.checkpoint import Memory
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.tracker import Tracker
 
