@@ -13,7 +13,7 @@ import sys
 import pandas as pd
 import pytest
 
-from assoc._cli.live import parse_line, replayed
+from assoc._cli.track.plot_lines import parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
