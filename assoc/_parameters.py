@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import secrets
 import types
 from dataclasses import MISSING, Field, fields
 from numbers import Integral, Real
@@ -128,6 +129,30 @@ def positive(value: object, what: str, *, zero: bool = False) -> float:
     if not is_number(value, 0.0) or (not zero and value == 0):
         raise InvalidInputError(f"{what} must be a number {'>= 0' if zero else 'above 0'}, got {value!r}")
     return float(value)  # type: ignore[arg-type]
+
+
+def whole_seed(seed: object) -> int:
+    """Return a seed as an int; None draws one, so that every call is another.
+
+    Raises
+    ------
+    InvalidInputError
+        It is neither None nor a whole number >= 0.
+    """
+    if seed is None:
+        return secrets.randbits(63)
+    if not is_whole(seed, 0):
+        raise InvalidInputError(f"seed: expected a whole number >= 0, or None for a random one, got {seed!r}")
+    return int(seed)  # type: ignore[call-overload]
+
+
+def checked_time_limit(time_limit: object) -> float | None:
+    """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
+    if time_limit is None:
+        return None
+    if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:
+        return float(time_limit)
+    raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
 
 
 class Parameters:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from assoc._cli.lines import print_lines
 from assoc._cli.options import flag_of
-from assoc._cli.program import prepare_process, prepare_streams, run_program, write_all
-from assoc._cli.progress import with_progress
+from assoc._cli.program import prepare_streams, run_program, write_all
+from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
-from assoc._cli.signals import Interruption
+from assoc._cli.signals import EarlyEnd, Interruption
 from assoc._cli.speech import spoken
-from assoc._cli.track_options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
-from assoc._cli.track_options import completions as completions
+from assoc._cli.track.options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
+from assoc._cli.track.options import completions as completions
 from assoc._cli.values import number, seconds
 from assoc._files.output import STDOUT
 from assoc._system.compile_time import compile_seconds
@@ -34,17 +34,20 @@ if TYPE_CHECKING:
     from assoc.tracking.plots.plot_tracks import PlotTracks
 
 _INTERRUPTION = Interruption("assoc.track")
+_EARLY_END = EarlyEnd("assoc.track")
+# seconds that the scan under way gets when the program is asked to end: tracks are known between scans only
+_LAST_SCAN = 20.0
 
 
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    prepare_streams()
     if "--live" in words:
         # what has come in is still written
-        prepare_streams()
         _INTERRUPTION.interrupt_on_signals()
     else:
-        prepare_process("assoc.track")
+        _EARLY_END.on_signals()
     return main(words)
 
 
@@ -57,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _track(words: list[str]) -> None:
     parsed, settings = read_options(words)
     if parsed["live"]:
-        from assoc._cli.track_live import track_live
+        from assoc._cli.track.live import track_live
 
         track_live(parsed["file"], parsed, settings, _INTERRUPTION)
         return
@@ -71,10 +74,10 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
     if _is_npz(file):
         if parsed["window"] is not None:
             raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
-        count, tracker, table, scene = _of_scene(file, parsed, settings)
-        plots = None
+        tracker, table, scene, total = _of_scene(file, parsed, settings)
+        count, plots = scene.num_scans, None
     else:
-        tracker, plots = _of_plots(file, parsed, settings)
+        tracker, plots, total = _of_plots(file, parsed, settings)
         count, table, scene = len(plots.windows), plots.table, None
         table.origin = parsed["origin"]
     compiling = compile_seconds() - compiled
@@ -111,6 +114,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         lambda: _compare(scene, table, parsed["cutoff"]),
         lambda: _report_rates(plots),
     )
+    _EARLY_END.say(f"the tracks of {count} of {total} scans are written")
 
 
 def _is_npz(file: str) -> bool:
@@ -143,7 +147,8 @@ def _read_asterix(file: str, radar: str | None) -> Recording:
 
 def _of_scene(
     file: str, parsed: dict[str, Any], settings: dict[str, Any]
-) -> tuple[int, Tracker, TrackTable, Scene | None]:
+) -> tuple[Tracker, TrackTable, Scene, int]:
+    """The tracker, its tracks, the scene as far as it was tracked, and how many scans it has in all."""
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
@@ -165,15 +170,18 @@ def _of_scene(
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
     name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
     tracker = make_tracker(name, scene.sensors, parsed, settings, scene.region, pace)
-    numbers = with_progress(range(scene.num_scans), scene.num_scans, "tracking", shown=not parsed["quiet"])
+    bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
+    numbers = with_progress(range(scene.num_scans), scene.num_scans, bar)
     numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
-    table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    with _EARLY_END.work(_LAST_SCAN):
+        table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
-    return scene.num_scans, tracker, table, scene
+    tracked = scene if bar.done == scene.num_scans else scene.part(0, bar.done)
+    return tracker, table, tracked, scene.num_scans
 
 
-def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks]:
+def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks, int]:
     import numpy as np
 
     from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
@@ -213,9 +221,11 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     tracker = make_tracker(name, [radar_of(recording, **radar)], parsed, settings, None)
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    shown = with_progress(windows, len(windows), "tracking", shown=not parsed["quiet"])
+    shown = with_progress(windows, len(windows), ProgressBar("tracking", "scans", shown=not parsed["quiet"]))
     shown = with_scan_table(shown, tracker, lambda window: (window.times[-1], [len(window)]))
-    return tracker, track_plots(tracker, recording, windows, confirmed=not parsed["all"], progress=shown)
+    with _EARLY_END.work(_LAST_SCAN):
+        done = track_plots(tracker, recording, shown, confirmed=not parsed["all"])
+    return tracker, done, len(windows)
 
 
 def _write_rates(path: str, plots: PlotTracks) -> None:

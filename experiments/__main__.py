@@ -37,9 +37,14 @@ EXPERIMENTS = (
         "one line of JSON: family scale of the benchmarks",
     ),
     Experiment(
+        "benchmarks.wide_gaps",
+        "seeds of ghosts whose linear program is far below the optimum",
+        "the seeds of family wide gap in experiments/benchmarks/families.py",
+    ),
+    Experiment(
         "pages",
-        "nothing: writes the tables of five pages from the result files",
-        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md",
+        "nothing: writes the tables of six pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md, docs/ant_colony.md",
     ),
     Experiment(
         "papers.ant_colony",
@@ -113,7 +118,7 @@ EXPERIMENTS = (
     Experiment(
         "metaheuristics.sweep",
         "alpha, beta, rho, ants and refinement of the ant colony on problems that are not easy",
-        "nothing in the pages; response surfaces as pictures",
+        "docs/ant_colony.md and its figures; with --publish experiments/results/metaheuristics.sweep.json",
     ),
     Experiment(
         "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"

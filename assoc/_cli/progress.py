@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from assoc._system.compile_time import is_compiling
+from assoc._system.interrupts import end_is_asked
 
 if TYPE_CHECKING:
-    from assoc.solution import TracePoint
     from assoc.sweeps.study import Counts
 
 Item = TypeVar("Item")
@@ -19,28 +18,6 @@ Item = TypeVar("Item")
 _EVERY = 5.0
 # seconds of compiling that need no words
 _SOON = 0.5
-# seconds after which a scan is slow enough to say how far it is
-_SLOW = 1.0
-
-
-class SoFar:
-    """What a solver has found of the scan that it is at, in words for the progress bar."""
-
-    def __init__(self) -> None:
-        self.next_scan()
-
-    def next_scan(self) -> None:
-        """Begin a scan."""
-        self._words = ""
-        self._began = time.monotonic()
-
-    def note(self, point: TracePoint) -> None:
-        """Take in a point of the solver's trace."""
-        if math.isfinite(point.cost):
-            self._words = f"cost {point.cost:.6g}, gap {max(point.cost - point.lower_bound, 0.0):.2g} so far"
-
-    def __str__(self) -> str:
-        return self._words if time.monotonic() - self._began > _SLOW else ""
 
 
 class ProgressBar:
@@ -54,12 +31,14 @@ class ProgressBar:
         What it counts, in the plural.
     shown : bool, default True
         Show nothing at all otherwise.
-    so_far : SoFar, optional
-        What is said of a scan that takes long.
     """
 
-    def __init__(self, label: str, unit: str, shown: bool = True, so_far: SoFar | None = None) -> None:
+    def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit
+        self.note = ""
+        """What is shown below the bar."""
+        self.done = 0
+        """What came to its end."""
         self._progress: Any = None
         self._started = time.perf_counter()
         if shown and sys.stderr.isatty():
@@ -76,14 +55,23 @@ class ProgressBar:
             )
             from rich.text import Text
 
+            bar = self
+
+            class WithNote(Progress):
+                """Shows the note below the bar."""
+
+                def get_renderables(self) -> Any:
+                    yield self.make_tasks_table(self.tasks)
+                    if bar.note:
+                        yield Text(bar.note, overflow="ellipsis", no_wrap=True)
+
             class Compiling(ProgressColumn):
-                """Says how far a scan is that takes long, and why the first ones do."""
+                """Says why the first scans take so long, while they do."""
 
                 def render(self, task: Task) -> Text:
-                    compiling = "compiling, once after installation" if is_compiling(_SOON) else ""
-                    return Text("; ".join(filter(None, [str(so_far or ""), compiling])))
+                    return Text("compiling, once after installation" if is_compiling(_SOON) else "")
 
-            self._progress = Progress(
+            self._progress = WithNote(
                 TextColumn("{task.description}"),
                 BarColumn(),
                 MofNCompleteColumn(),
@@ -107,6 +95,13 @@ class ProgressBar:
     def __call__(self, counts: Counts) -> None:
         """Show where a study is."""
         self.show(counts.done, counts.total, counts.new)
+
+    def say(self, line: str) -> None:
+        """Print a line on stderr, above the bar."""
+        if self._progress is None:
+            print(line, file=sys.stderr, flush=True)
+        else:
+            self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
         """Take the bar away."""
@@ -142,15 +137,15 @@ class ProgressLog:
             print(f"{counts.done} of {counts.total} runs", file=sys.stderr, flush=True)
 
 
-def with_progress(
-    items: Iterable[Item], total: int, label: str, *, shown: bool = True, so_far: SoFar | None = None
-) -> Iterator[Item]:
-    """Yield the items, scans or what makes them, and show a progress bar while they are worked on."""
-    with ProgressBar(label, "scans", shown, so_far) as bar:
+def with_progress(items: Iterable[Item], total: int, bar: ProgressBar) -> Iterator[Item]:
+    """Yield the items, scans or what makes them, until it is asked to end, and show how many are done."""
+    with bar:
         bar.show(0, total, 0)
         for done, item in enumerate(items):
             bar.show(done, total, done)
             yield item
-            if so_far is not None:
-                so_far.next_scan()
-        bar.show(total, total, total)
+            bar.done = done + 1
+            if end_is_asked():
+                break
+        else:
+            bar.show(total, total, total)

@@ -1,8 +1,21 @@
-"""Ctrl-C in the middle of kernels."""
+"""Ctrl-C in the middle of kernels, and work that is asked to come to its end."""
 
 from __future__ import annotations
 
+import threading
 from contextlib import ContextDecorator
+
+_end_asked = threading.Event()
+
+
+def ask_to_end() -> None:
+    """Ask the searches of this process to end with what they have, and loops over scans to begin no other."""
+    _end_asked.set()
+
+
+def end_is_asked() -> bool:
+    """Whether a program was asked to come to its end."""
+    return _end_asked.is_set()
 
 
 class interruptible(ContextDecorator):  # noqa: N801 - read like those of contextlib

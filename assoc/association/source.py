@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
 from assoc._files.npz import format_of
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
@@ -11,14 +14,29 @@ from assoc.solvers.doubts import doubts_about_costs
 Source = Scene | AssignmentProblem
 
 
-def load_source(path: str) -> Source:
+@door
+def load(path: str | os.PathLike[str]) -> Source:
     """Load a scene or a problem, whichever the file says it is.
+
+    Parameters
+    ----------
+    path : path-like
+        scene.npz or problem.npz; a problem as plain text ends in .txt.
+
+    Returns
+    -------
+    Scene or AssignmentProblem
 
     Raises
     ------
     InvalidInputError
         It is neither, or cannot be read.
     """
+    return load_source(os.fspath(path))
+
+
+def load_source(path: str) -> Source:
+    """Load a scene or a problem from a file; see `load`."""
     if path.endswith(".txt"):
         return AssignmentProblem.load(path)
     found = format_of(path)

@@ -187,10 +187,10 @@ class Deepening:
 
     def _branch(self, packing: Packing, duals: Floats, c: int, limit: float, lists: _Lists) -> None:
         """Rank a component that was too much for enumeration; the lists are filled in."""
-        piece = packing.component(c)
+        component = packing.component(c)
         own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
         ranking = ComponentRanking(
-            piece,
+            component,
             own_duals,
             self._k,
             limit,
@@ -199,7 +199,7 @@ class Deepening:
             memory_allows=self._run.memory_allows,
         )
         # about ten milliseconds of work between two looks at the clock
-        turn = max(1, 100_000 // max(piece.num_columns, 1))
+        turn = max(1, 100_000 // max(component.num_columns, 1))
         while not ranking.done and not self._run.should_stop():
             ranking.run(turn)
         self._nodes += ranking.nodes

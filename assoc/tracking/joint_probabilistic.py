@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
@@ -63,6 +64,7 @@ class PairProbabilities:
     upper: Array
 
 
+@doors
 class JointProbabilisticTracker(Tracker):
     """Joint integrated probabilistic data association, with certified probabilities.
 

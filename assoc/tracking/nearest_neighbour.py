@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.own_times import score_costs
 from assoc.costs.tracks.scores import doubted_gain
@@ -21,6 +22,7 @@ from assoc.tracking.tracker import Tracker
 Rule = Literal["greedy", "assignment"]
 
 
+@doors
 class NearestNeighbourTracker(Tracker):
     """The plain tracker that others are measured against.
 

@@ -9,6 +9,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from assoc._parameters import whole_seed
+from assoc._system.door import doors
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
@@ -28,12 +30,11 @@ from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.checking import checked_measurements
-from assoc.tracking.checkpoint import Checkpoint
+from assoc.tracking.checkpoint import Checkpoint, Memory
 from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_starts import Crossings
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.memory import Memory
 from assoc.tracking.new_tracks import NewTracks
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch, empty_batch
@@ -46,6 +47,7 @@ _FORGETTING = 0.05
 _LEAST_TURN = 1e-3
 
 
+@doors
 class Tracker(Checkpoint):
     """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
 
@@ -92,7 +94,7 @@ class Tracker(Checkpoint):
         region: Array | None = None,
         solver: str = "exact",
         solver_parameters: Mapping[str, Any] | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         time_limit: float | None = None,
         life_cycle: LifeCycle | None = None,
         initiation: Initiation | None = None,
@@ -113,9 +115,7 @@ class Tracker(Checkpoint):
         self.solver = solver
         self.solver_parameters = dict(solver_parameters or {})
         make_parameters(solver, self.solver_parameters)
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
-        self.seed = int(seed)
+        self.seed = whole_seed(seed)
         self.time_limit = time_limit
         good = isinstance(gate_probability, (int, float, np.floating)) and not isinstance(gate_probability, bool)
         if not good or not 0 < gate_probability < 1:

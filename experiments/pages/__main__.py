@@ -22,6 +22,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "recordings.md": measured.RECORDINGS,
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
+    "ant_colony.md": metaheuristics.ANT_COLONY,
 }
 """Page -> name of the table -> what makes it."""
 

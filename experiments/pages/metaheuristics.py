@@ -63,7 +63,8 @@ def settings() -> str:
         if f"{case.name}: worst setting" not in r:
             continue
         best = r.starting(f"{case.name}: best setting")[0]
-        words = best.quantity.split("best setting, ")[1]
+        alike = r[f"{case.name}: worst setting"].ours < 1e-9
+        words = "all are alike" if alike else best.quantity.split("best setting, ")[1]
         rank = r.starting(f"{case.name}: rank of table 1's advice")[0]
         of = rank.quantity.rsplit(" ", 1)[1]
         rows.append([
@@ -82,5 +83,5 @@ def _plain(claim: Claim) -> str:
     return number(claim.ours, 2)
 
 
-SOLVERS = {**{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS}}
+SOLVERS = {**{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS}, "workers": workers}
 ANT_COLONY = {"settings": settings}

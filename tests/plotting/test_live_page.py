@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from assoc._cli.live import replayed
+from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
 from assoc.simulation import simulate

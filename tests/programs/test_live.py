@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from assoc import track
-from assoc._cli.live import parse_line, replayed
+from assoc._cli.track.plot_lines import parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate

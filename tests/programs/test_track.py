@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from assoc import track
-from assoc._cli import track_options
+from assoc._cli.track import options as track_options
 from assoc.recordings import Recording, write_plots
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, MultiSensorTracker

@@ -12,8 +12,9 @@ import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
-from tests.reliability.fuzzing import ROOMS, Room, _bomb, judge, prepare, run_case, warm_up
+from tests.reliability.fuzzing import _bomb, judge, prepare, run_case, warm_up
 from tests.reliability.mutations import bombs
+from tests.reliability.readers import ROOMS, Room
 from tests.sizes import few_or_all
 
 

@@ -67,7 +67,7 @@ is not among them: covers are built with it."""
 
 @dataclass(slots=True)
 class Component(Priced):
-    """A connected piece of the problem with its multipliers and the best cover known.
+    """An independent component of the problem with its multipliers and the best cover known.
 
     Attributes
     ----------

@@ -115,7 +115,8 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 # in one search the nodes of independent components multiply
                 smaller = split_component(component) if better else None
                 tasks.extend([task] if smaller is None else [_Task(one) for one in smaller])
-                if better or task.bound > bound_before + _WORTH * (component.weight - bound_before):
+                risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
+                if better or risen or run.is_silent():
                     _record(run, nodes, weight, bound, tasks)
                 continue
             if better:

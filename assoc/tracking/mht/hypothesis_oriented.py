@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
@@ -39,6 +40,7 @@ from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
+@doors
 class HypothesisOrientedMHT(Tracker):
     """Multiple hypothesis tracker that keeps the m best hypotheses about everything.
 

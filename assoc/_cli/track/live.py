@@ -6,10 +6,10 @@ import math
 import sys
 from typing import Any
 
-from assoc._cli.live import Lines, TrackWriter, parse_line, replayed
 from assoc._cli.options import flag_of
 from assoc._cli.signals import Interruption
-from assoc._cli.track_options import RADAR, make_tracker
+from assoc._cli.track.options import RADAR, make_tracker
+from assoc._cli.track.plot_lines import Lines, TrackWriter, parse_line, replayed
 from assoc._cli.values import number, whole_number
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
