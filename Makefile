@@ -12,7 +12,8 @@
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
 # make check-dist       builds them, checks what they hold, that they work in an empty environment, and compile nothing
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
-# make bench  benchmarks at full size (bench-quick: a minute's worth)
+# make bench  benchmarks at full size, some hours (bench-quick: a minute's worth;
+#             python -m experiments.benchmarks --brief: everything in 25 minutes)
 # make bench-cold       what a user waits for after an installation, with an empty cache of kernels
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
@@ -40,11 +41,11 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
-	$(PY) -m pytest -n 2 -q -m "not slow"
+	$(PY) -m pytest -n 2 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
-	$(PY) -m pytest -n 2 -q
+	$(PY) -m pytest -n 2 --dist worksteal -q
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from assoc import plotting, solvers, sweeps
     from assoc.association.associate import associate
     from assoc.association.association import Association
+    from assoc.association.source import load
     from assoc.costs import build_problem
     from assoc.problem import AssignmentProblem
     from assoc.ranking.kbest import kbest
@@ -39,6 +40,7 @@ __all__ = [
     "associate",
     "build_problem",
     "kbest",
+    "load",
     "marginals",
     "plotting",
     "solvers",
@@ -57,6 +59,7 @@ __getattr__, __dir__ = lazy_names(
         "associate": "association",
         "build_problem": "costs",
         "kbest": "ranking.kbest",
+        "load": "association.source",
         "marginals": "ranking.marginals",
         "plotting": "plotting",
         "solvers": "solvers",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import secrets
 import types
 from dataclasses import MISSING, Field, fields
 from numbers import Integral, Real
@@ -130,6 +131,30 @@ def positive(value: object, what: str, *, zero: bool = False) -> float:
     return float(value)  # type: ignore[arg-type]
 
 
+def whole_seed(seed: object) -> int:
+    """Return a seed as an int; None draws one, so that every call is another.
+
+    Raises
+    ------
+    InvalidInputError
+        It is neither None nor a whole number >= 0.
+    """
+    if seed is None:
+        return secrets.randbits(63)
+    if not is_whole(seed, 0):
+        raise InvalidInputError(f"seed: expected a whole number >= 0, or None for a random one, got {seed!r}")
+    return int(seed)  # type: ignore[call-overload]
+
+
+def checked_time_limit(time_limit: object) -> float | None:
+    """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
+    if time_limit is None:
+        return None
+    if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:
+        return float(time_limit)
+    raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
+
+
 class Parameters:
     """Base of the parameter dataclasses; gives them one way to check and to complain."""
 
@@ -156,9 +181,11 @@ class Parameters:
 
     def _whole(self, *names: str, least: int = 1, most: int | None = None) -> None:
         """Refuse fields that are not whole numbers of at least so much, or from least to most."""
-        expected = f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+        limit = math.inf if most is None else most
         for name in names:
-            self._require(is_whole(getattr(self, name), least, math.inf if most is None else most), name, expected)
+            if not is_whole(getattr(self, name), least, limit):
+                expected = f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+                self._require(False, name, expected)
 
     def _number(
         self, *names: str, above: float = -math.inf, least: float = -math.inf, most: float | None = None

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
 from assoc._system import memory
+from assoc._system.door import doors
 from assoc.errors import InvalidInputError, LimitExceededError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMAT = "assoc.problem"
 VERSION = 1
@@ -22,6 +26,7 @@ _MAX_SINGLETON_NUMBERS = 64_000_000
 _MAX_TOTAL_COST = 1e300
 
 
+@doors
 class AssignmentProblem:
     """Choose tuples of minimum total cost such that each measurement is in exactly one.
 
@@ -169,6 +174,80 @@ class AssignmentProblem:
         offset = 0 if dummy else 1
         sizes = np.array(dense.shape, dtype=np.int64) - (1 - offset)
         return cls(index + offset, dense[keep], sizes, dummy=dummy)
+
+    @classmethod
+    def from_sparse(cls, array: Any, dummy: bool = True) -> AssignmentProblem:
+        """Read a sparse cost array: what it does not store is forbidden, a stored 0 is a cost.
+
+        Parameters
+        ----------
+        array : scipy sparse array, or any with ``coords``, ``data`` and ``shape``
+            Of one dimension for each sensor, as in `from_dense`; scipy has arrays of more than two as ``coo_array``.
+            Entries stored more than once are summed.
+        dummy : bool, default True
+            Whether index 0 is the dummy.
+
+        Raises
+        ------
+        InvalidInputError
+            It is no such array, or holds NaN or -inf.
+        """
+        entries = array.tocoo(copy=True) if callable(getattr(array, "tocoo", None)) else array
+        if not all(hasattr(entries, name) for name in ("coords", "data", "shape")):
+            raise InvalidInputError(f"array: expected a sparse array (scipy.sparse), got {type(array).__name__}")
+        if hasattr(entries, "sum_duplicates"):
+            entries.sum_duplicates()
+        index, costs = np.stack([np.asarray(one) for one in entries.coords], axis=1), _numbers(entries.data, "array")
+        if dummy and min(entries.shape) == 0:
+            raise InvalidInputError(f"array: each dimension needs its dummy at index 0, got {entries.shape}")
+        keep = index.any(axis=1) if dummy else np.ones(costs.size, dtype=np.bool_)
+        offset = 0 if dummy else 1
+        sizes = [int(n) - (1 - offset) for n in entries.shape]
+        return cls(index[keep].astype(np.int64) + offset, costs[keep], sizes, dummy=dummy)
+
+    @classmethod
+    def from_frame(
+        cls, frame: pd.DataFrame, sizes: ArrayLike | None = None, *, cost: str = "cost", dummy: bool = True
+    ) -> AssignmentProblem:
+        """Read a table of tuples.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            One row for each tuple: a column ``cost``, every other column a sensor with the number of its measurement,
+            from 1; 0 or nothing: it missed the target.
+        sizes : array_like of int, shape (S,), optional
+            Measurements of each sensor; by default the largest number in its column, so that measurements after it
+            that no tuple has are not known of.
+        cost : str, default "cost"
+            Name of the column of costs.
+        dummy : bool, default True
+            Whether a sensor may miss a target.
+
+        Raises
+        ------
+        InvalidInputError
+            It is no table, has no such column, or a number is none.
+        """
+        if not hasattr(frame, "columns") or not hasattr(frame, "drop"):
+            raise InvalidInputError(f"frame: expected a pandas DataFrame, got {type(frame).__name__}")
+        if cost not in frame.columns:
+            raise InvalidInputError(f"frame: has no column {cost!r}, only {', '.join(map(str, frame.columns))}")
+        columns = []
+        for name in frame.columns.drop(cost):
+            try:
+                numbers = frame[name].to_numpy(dtype=np.float64, na_value=0.0)
+            except (TypeError, ValueError):
+                raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
+            numbers = np.where(np.isnan(numbers), 0.0, numbers)
+            if (numbers != np.round(numbers)).any():
+                raise InvalidInputError(f"frame: column {name!r}: expected whole numbers")
+            columns.append(numbers.astype(np.int64))
+        if not columns:
+            raise InvalidInputError("frame: expected a column for each sensor beside the costs, got none")
+        tuples = np.stack(columns, axis=1)
+        counts = tuples.max(axis=0, initial=0) if sizes is None else sizes
+        return cls(tuples, _numbers(frame[cost].to_numpy(), f"frame: column {cost!r}"), counts, dummy=dummy)
 
     def to_dense(self) -> NDArray[np.float64]:
         """Return the dense tensor of ``from_dense``; what is not listed is ``inf``, the all-dummy entry 0.

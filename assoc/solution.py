@@ -53,8 +53,8 @@ class Solution:
     runtime : float
         Seconds from the problem to this solution, without compiling.
     stopped_by : str
-        Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", or "memory_limit": what
-        was left needed more memory than there was.
+        Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", "interrupted"
+        (a program that was asked to end), or "memory_limit": what was left needed more memory than there was.
     duals : tuple of float arrays
         One multiplier per measurement of each sensor, from which the bound can be checked: with them
         every tuple's reduced cost is >= 0 up to rounding. Empty where the proof was by enumeration.

@@ -24,8 +24,9 @@ from assoc._cli.options import (
     parameter_values,
     read_first,
 )
-from assoc._cli.program import Parser, command, prepare_process, run_program, write_all
-from assoc._cli.progress import with_progress
+from assoc._cli.program import Parser, command, prepare_streams, run_program, write_all
+from assoc._cli.progress import ProgressBar, with_progress
+from assoc._cli.signals import EarlyEnd
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import check_kind, cores, density, scan_range
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from assoc.association.scan import ScanAssociation
     from assoc.association.source import Source
 
+_EARLY_END = EarlyEnd("assoc.solve")
+# seconds that the scan under way gets when the program is asked to end
+_LAST_SCAN = 3.0
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
 _GATING = ("gate_probability", "max_tuples", "target_density")
@@ -49,7 +53,8 @@ _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
-    prepare_process("assoc.solve")
+    prepare_streams()
+    _EARLY_END.on_signals()
     return main(arguments)
 
 
@@ -73,8 +78,8 @@ def _solve(words: list[str]) -> None:
     if "kbest" in settings and (explicit or parameters):
         raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
     files = parsed["files"]
-    check_outputs([parsed["json"], parsed["csv"], parsed["report"]], [*files, parsed["config"]])
-    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
+    check_outputs([parsed["json"], parsed["csv"], parsed["report"], parsed["proof"]], [*files, parsed["config"]])
+    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm"), ("proof", ".json")):
         check_ending(parsed[option], flag_of(option), *endings, strict=False)
     if parsed["report"]:
         check_extra("plotly", "report")
@@ -87,29 +92,49 @@ def _solve(words: list[str]) -> None:
 def _associate(
     words: list[str], solver: str, parsed: dict[str, Any], settings: dict[str, Any], parameters: dict[str, Any]
 ) -> None:
+    from assoc._cli.solver_log import SolverLog
     from assoc.association.source import load_source
 
-    files = parsed["files"]
+    files, jobs = parsed["files"], settings.get("jobs", 1)
     sources = [load_source(file) for file in files]
     started = time.perf_counter()
-    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"]}
+    bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
+    log = SolverLog(bar, parsed["verbose"])
+    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"], "watch": log}
     plan, items = _plan(sources, files, solver, settings, parameters, extras)
+    if parsed["proof"] and len(items) != 1:
+        raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
     if parsed["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
-    scans = plan.run(items, settings.get("jobs", 1))
     names = [files[number] for number, _ in items]
-    progress = with_progress(scans, len(items), "associating", shown=not parsed["quiet"])
     # a pipe gets all scans and columns when all are there: programs read it
     table = _ScanTable(sources, names, len(names) if parsed["all"] else _SHOWN) if sys.stdout.isatty() else None
-    association = plan.gather(progress if table is None else table.watch(progress))
+    progress = with_progress(plan.run(items, jobs), len(items), bar)
+    # with -v the log has a line for each scan already
+    watched = progress if table is None or parsed["verbose"] else table.watch(progress)
+    scans: list[ScanAssociation] = []
+    # other processes do not hear that they should end: their scans are given up
+    with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
+        try:
+            for scan in watched:
+                scans.append(scan)
+                log.end(scan)
+        except KeyboardInterrupt:
+            if not _EARLY_END.asked:
+                raise
     elapsed = time.perf_counter() - started
-    of_items = [sources[number] for number, _ in items]
+    if not scans and items:
+        _EARLY_END.say("")
+    found, names = plan.gather(scans), names[: len(scans)]
+    of_items = [sources[number] for number, _ in items[: len(scans)]]
     write_all(
-        lambda: _write_json(parsed["json"], association, names),
-        lambda: _write_csv(parsed["csv"], association, names),
-        lambda: _write_report(parsed["report"], association, of_items, names, words),
-        lambda: _print(association, names, elapsed, table),
+        lambda: _write_json(parsed["json"], found, names),
+        lambda: _write_csv(parsed["csv"], found, names),
+        lambda: _write_report(parsed["report"], found, of_items, names, words),
+        lambda: _write_proof(parsed["proof"], plan, found, items),
+        lambda: _print(found, names, elapsed, table),
     )
+    _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written")
 
 
 def completions() -> dict[str, Sequence[str]]:
@@ -146,9 +171,10 @@ def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
     add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
     add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
     add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
+    add("--proof", metavar="FILE", help="write a proof for 'assoc check' as JSON, and its problem beside it as .txt")
     add("--gate-loss", action="store_true", help="bound what the gates may have cost (takes about three times as long)")
     add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "all parameters, the defaults included")
+    add_speech_options(parser, "all parameters, and how cost and bound change while a scan is solved")
     parser.elsewhere = lambda: flags_of_solvers(solver)
     if choices:
         group = parser.add_argument_group(f"parameters of {solver}")
@@ -202,7 +228,7 @@ def _plan(
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
-    extras: dict[str, bool],
+    extras: dict[str, Any],
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
@@ -255,6 +281,16 @@ def _write_report(
         from assoc.plotting.report import write_association_report
 
         write_association_report(path, association, sources, names, words=words)
+
+
+def _write_proof(path: str | None, plan: Plan, found: Association, items: Sequence[tuple[int, int]]) -> None:
+    if path is None or not found.scans:
+        return
+    from assoc.proofs import write_proof
+
+    problem = plan.problem(items[0])
+    problem.save(f"{path.removesuffix('.json')}.txt")
+    write_proof(path, problem, found.scans[0].solution)
 
 
 class _ScanTable:

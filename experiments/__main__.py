@@ -47,9 +47,14 @@ EXPERIMENTS = (
         "nothing: judges the rows of experiments/sdlib/best.json",
     ),
     Experiment(
+        "benchmarks.wide_gaps",
+        "seeds of ghosts whose linear program is far below the optimum",
+        "the seeds of family wide gap in experiments/benchmarks/families.py",
+    ),
+    Experiment(
         "pages",
-        "nothing: writes the tables of four pages from the result files",
-        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md",
+        "nothing: writes the tables of six pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md, docs/ant_colony.md",
     ),
     Experiment(
         "papers.ant_colony",
@@ -113,6 +118,17 @@ EXPERIMENTS = (
         "trackers.fusion_in_stone_soup",
         "fusion before tracking, in Stone Soup",
         "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
+    ),
+    Experiment(
+        "metaheuristics.ablation",
+        "aco, genetic and tabu with each part taken out, and with two workers",
+        "docs/solvers.md (what each part contributes); with --publish "
+        "experiments/results/metaheuristics.ablation.json",
+    ),
+    Experiment(
+        "metaheuristics.sweep",
+        "alpha, beta, rho, ants and refinement of the ant colony on problems that are not easy",
+        "docs/ant_colony.md and its figures; with --publish experiments/results/metaheuristics.sweep.json",
     ),
     Experiment(
         "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"

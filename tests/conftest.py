@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 
+import pytest
 from hypothesis import settings
 
 # tests are of compiled kernels, and what they start is not to compile beside them; those of interpreting switch it on
@@ -19,3 +20,12 @@ settings.load_profile("assoc")
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Where slow tests run, leave out the few cases of a test that has all of them, too (sizes.py)."""
+    if config.option.markexpr:
+        return
+    few = [item for item in items if item.get_closest_marker("few")]
+    config.hook.pytest_deselected(items=few)
+    items[:] = [item for item in items if not item.get_closest_marker("few")]

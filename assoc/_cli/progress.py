@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from assoc._system.compile_time import is_compiling
+from assoc._system.interrupts import end_is_asked
 
 if TYPE_CHECKING:
     from assoc.sweeps.study import Counts
@@ -34,6 +35,10 @@ class ProgressBar:
 
     def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit
+        self.note = ""
+        """What is shown below the bar."""
+        self.done = 0
+        """What came to its end."""
         self._progress: Any = None
         self._started = time.perf_counter()
         if shown and sys.stderr.isatty():
@@ -50,13 +55,23 @@ class ProgressBar:
             )
             from rich.text import Text
 
+            bar = self
+
+            class WithNote(Progress):
+                """Shows the note below the bar."""
+
+                def get_renderables(self) -> Any:
+                    yield self.make_tasks_table(self.tasks)
+                    if bar.note:
+                        yield Text(bar.note, overflow="ellipsis", no_wrap=True)
+
             class Compiling(ProgressColumn):
                 """Says why the first scans take so long, while they do."""
 
                 def render(self, task: Task) -> Text:
                     return Text("compiling, once after installation" if is_compiling(_SOON) else "")
 
-            self._progress = Progress(
+            self._progress = WithNote(
                 TextColumn("{task.description}"),
                 BarColumn(),
                 MofNCompleteColumn(),
@@ -80,6 +95,13 @@ class ProgressBar:
     def __call__(self, counts: Counts) -> None:
         """Show where a study is."""
         self.show(counts.done, counts.total, counts.new)
+
+    def say(self, line: str) -> None:
+        """Print a line on stderr, above the bar."""
+        if self._progress is None:
+            print(line, file=sys.stderr, flush=True)
+        else:
+            self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
         """Take the bar away."""
@@ -115,11 +137,15 @@ class ProgressLog:
             print(f"{counts.done} of {counts.total} runs", file=sys.stderr, flush=True)
 
 
-def with_progress(items: Iterable[Item], total: int, label: str, *, shown: bool = True) -> Iterator[Item]:
-    """Yield the items, scans or what makes them, and show a progress bar while they are worked on."""
-    with ProgressBar(label, "scans", shown) as bar:
+def with_progress(items: Iterable[Item], total: int, bar: ProgressBar) -> Iterator[Item]:
+    """Yield the items, scans or what makes them, until it is asked to end, and show how many are done."""
+    with bar:
         bar.show(0, total, 0)
         for done, item in enumerate(items):
             bar.show(done, total, done)
             yield item
-        bar.show(total, total, total)
+            bar.done = done + 1
+            if end_is_asked():
+                break
+        else:
+            bar.show(total, total, total)

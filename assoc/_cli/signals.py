@@ -1,6 +1,8 @@
 """How programs end on Ctrl-C, a termination signal or a lost terminal: at once, or in order.
 
-In both ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
+Or work is cut short in order: loops over scans end early, what is finished is written (`EarlyEnd`).
+
+In all ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
 that solves returns, which can take minutes, and some MIP solvers put a handler of their own in its place. The
 exit code is the shell's own: 128 and the number of the signal.
 """
@@ -18,6 +20,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from assoc._system import temporary
+from assoc._system.interrupts import ask_to_end
 
 _CLEAN_UP_SECONDS = 5.0
 
@@ -123,6 +126,85 @@ class Interruption:
             print(self.line(), file=sys.stderr)
             sys.stderr.flush()
             raise SystemExit(self.code or 128 + signal.SIGINT) from None
+
+
+class EarlyEnd:
+    """Lets a signal end a program's work early, so that what is finished is written; a second one ends it at once.
+
+    Outside `work` a signal ends the program at once.
+
+    Parameters
+    ----------
+    name : str
+        Of the program.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        # the handler may come while the main thread holds it
+        self._lock = threading.RLock()
+        self._working = False
+        self._patience = 0.0
+        self._signal = 0
+
+    def on_signals(self) -> None:
+        """Begin to listen."""
+        ending = ending_signals()
+        words = {number: f"{self._name}: {word}\n" for number, word in ending.items()}
+
+        def leave(number: int) -> None:
+            for child in multiprocessing.active_children():
+                child.kill()
+            temporary.end_process(128 + number, words[number])
+
+        def end(number: int, frame: object = None) -> None:
+            with self._lock:
+                if self._signal or not self._working:
+                    leave(number)
+                self._signal = number
+                ask_to_end()
+            timer = threading.Timer(self._patience, self._insist)
+            timer.daemon = True
+            timer.start()
+
+        def wait(number: int) -> None:
+            end(number)
+            leave(signal.sigwait(ending))
+
+        # the handler is for signals that a library lets through
+        _wait_for_signals(ending, handler=end, waiter=wait)
+
+    def _insist(self) -> None:
+        with self._lock:
+            if self._working:
+                _thread.interrupt_main()
+
+    @contextmanager
+    def work(self, patience: float) -> Iterator[None]:
+        """Let a signal end this block: by `ask_to_end`, and if that is not heard in so many seconds by interruption."""
+        self._patience = patience
+        with self._lock:
+            self._working = True
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.say("")
+            raise
+        finally:
+            with self._lock:
+                self._working = False
+
+    @property
+    def asked(self) -> bool:
+        """Whether there was a signal."""
+        return self._signal != 0
+
+    def say(self, kept: str) -> None:
+        """Leave with what is said of the signal, and of what is kept, if there was a signal."""
+        if self._signal:
+            line = "; ".join(filter(None, [f"{self._name}: {ending_signals()[self._signal]}", kept]))
+            print(line, file=sys.stderr, flush=True)
+            raise SystemExit(128 + self._signal)
 
 
 def _wait_for_signals(

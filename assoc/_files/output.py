@@ -139,7 +139,7 @@ def write_json(path: FilePath, content: Mapping[str, Any]) -> None:
 def _status(path: FilePath) -> os.stat_result | None:
     """What is at a path, or at the end of a link; None if nothing is."""
     try:
-        return os.stat(path)
+        return os.stat(os.fspath(path))
     except FileNotFoundError:
         return None
     except NotADirectoryError:

@@ -126,6 +126,17 @@ def search_njit(function: Callable[..., Any]) -> Any:
     return njit(function, small=SMALL_SEARCH)
 
 
+def is_kept(kernel: Any) -> bool:
+    """Whether compiled code of a kernel, for whatever arguments, is in this process, on disk, or came along."""
+    if _CONFIG.DISABLE_JIT or kernel.signatures or shipped.FOLDER.is_dir():
+        return True
+    try:
+        return bool(kernel._cache._cache_file._load_index())
+    except Exception:
+        # no cache at all, or one that cannot be read
+        return False
+
+
 class _Loads(event.Listener):
     """Counts how often the compiler was asked, for code to compile or to load from the cache, and how long it took."""
 

@@ -51,6 +51,16 @@ def compiled_only() -> Iterator[None]:
         thread.never = before
 
 
+@contextlib.contextmanager
+def interpreted_only() -> Iterator[None]:
+    """Compile nothing in this thread: for small preparations of what is to be compiled."""
+    before, thread.interpreting = thread.interpreting, True
+    try:
+        yield
+    finally:
+        thread.interpreting = before
+
+
 class _Thread(threading.local):
     """What a thread is at."""
 
@@ -173,6 +183,11 @@ _beside = _Beside()
 def _has_room() -> bool:
     """Whether there is a core for another process."""
     return (os.cpu_count() or 1) > 1
+
+
+def may_use_processes() -> bool:
+    """Whether another process may compile for this thread."""
+    return _switched_on and not thread.never and _has_room()
 
 
 def _compile_beside(function: Any, kinds: Any) -> None:

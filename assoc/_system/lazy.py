@@ -16,8 +16,8 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
     package : str
         Its ``__name__``.
     homes : mapping
-        For each public name the module that defines it, within the package; the name of a subpackage, which has
-        no other home, stands for itself.
+        For each public name the module that defines it, within the package or, with ``assoc.`` before it, in another
+        one; the name of a subpackage, which has no other home, stands for itself.
 
     Returns
     -------
@@ -29,8 +29,9 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
     def load(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module = importlib.import_module(f"{package}.{homes[name]}")
-        content[name] = value = module if homes[name] == name else getattr(module, name)
+        home = homes[name]
+        module = importlib.import_module(home if home.startswith("assoc.") else f"{package}.{home}")
+        content[name] = value = module if home == name else getattr(module, name)
         return value
 
     def names() -> list[str]:

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from assoc._parameters import whole_seed
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.association.association import Association
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
 
+@door
 @interruptible()
 def associate(
     scene: Scene,
     solver: str = "exact",
     *,
-    seed: int = 0,
+    seed: int | None = 0,
     time_limit: float | None = None,
     jobs: int = 1,
     gating: Mapping[str, Any] | None = None,
@@ -30,15 +33,17 @@ def associate(
     scene : Scene
     solver : str, default "exact"
         One of ``assoc.solvers.names()``.
-    seed : int, default 0
-        The same seed gives the same associations, whatever the number of processes.
+    seed : int or None, default 0
+        The same seed gives the same associations, whatever the number of processes; None: a random one, which the
+        result has.
     time_limit : float, optional
         Seconds for each scan; when they are over the best solution found is taken.
     jobs : int, default 1
         Number of processes. A script that asks for more than one must guard its own start by
         ``if __name__ == "__main__"``, because the processes are spawned.
     gating : mapping, optional
-        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``target_density``.
+        Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``speed``, ``target_density``,
+        ``all_tuples``.
     gate_loss : bool, default False
         Whether to bound for each scan what the gates may have cost (``ScanAssociation.gate_loss``): the scan is built
         and solved once more without gates, which takes about three times as long.
@@ -60,5 +65,6 @@ def associate(
 
     if not isinstance(scene, Scene):
         raise InvalidInputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    plan = Plan((scene,), solver, seed, time_limit, parameters, gating or {}, gate_loss=bool(gate_loss))
+    gates = {} if gating is None else gating
+    plan = Plan((scene,), solver, whole_seed(seed), time_limit, parameters, gates, gate_loss=bool(gate_loss))
     return plan.gather(plan.run(plan.items(), jobs))

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._parameters import whole_seed
 from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import ordered_map
+from assoc._text.near import did_you_mean
 from assoc.association.association import Association
 from assoc.association.gate_loss import gate_loss
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
 from assoc.errors import InvalidInputError
+from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import checked_k, kbest
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.solution import Solution
+from assoc.solution import Solution, TracePoint
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
 from assoc.solvers.pheromone_history import PheromoneHistory, pheromone
+
+GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tuples")
+"""What ``assoc.build_problem`` takes beside the scan."""
 
 # tuples whose pheromone is kept
 _NODES = 30
@@ -45,6 +51,8 @@ class Plan:
         Rank the k best associations of each scan (``assoc.kbest``) instead of calling the solver.
     pheromone : bool
         Solver aco: keep the pheromone of every cycle, on the tuples that have the most of it.
+    watch : callable, optional
+        Called with the number of a scan and each TracePoint of its solver, in this process only.
     gate_loss : bool
         Bound for each scan of a scene what the gates may have cost.
     """
@@ -57,11 +65,17 @@ class Plan:
     gating: Mapping[str, Any] = field(default_factory=dict)
     kbest: int | None = None
     pheromone: bool = False
+    watch: Callable[[int, TracePoint], object] | None = None
     gate_loss: bool = False
 
     def __post_init__(self) -> None:
-        if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)) or self.seed < 0:
-            raise InvalidInputError(f"seed: expected a whole number >= 0, got {self.seed!r}")
+        object.__setattr__(self, "seed", whole_seed(self.seed))
+        if not isinstance(self.gating, Mapping):
+            raise InvalidInputError(f"gating: expected a mapping, got {type(self.gating).__name__}")
+        for name in self.gating:
+            if name not in GATING:
+                near = did_you_mean(name, GATING)
+                raise InvalidInputError(f"gating: unknown name {name!r}; {near or 'known: ' + ', '.join(GATING)}")
         if self.kbest is not None:
             checked_k(self.kbest)
         self.all_parameters  # noqa: B018  (refuses what is wrong now, not in the first scan)
@@ -69,7 +83,8 @@ class Plan:
     def __reduce__(self) -> Any:
         # another process knows solvers from elsewhere only if it is told
         names = () if self.kbest is not None else (self.solver,)
-        return _received, (registry.own(names), tuple(getattr(self, one.name) for one in fields(self)))
+        alone = replace(self, watch=None)
+        return _received, (registry.own(names), tuple(getattr(alone, one.name) for one in fields(self)))
 
     @property
     def all_parameters(self) -> dict[str, Any]:
@@ -84,7 +99,7 @@ class Plan:
         source = self.sources[item[0]]
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
-            solutions, history = self._solve(source, self.seed)
+            solutions, history = self._solve(source, self.seed, 0)
             return self._best([_of_problem(source, one) for one in solutions], history, compiled)
         return self.associate(source, source.scan(item[1]))
 
@@ -94,22 +109,35 @@ class Plan:
         # a seed of its own for each scan, whichever process solves it and whatever was solved before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
-        solutions, history = self._solve(problem, seed)
+        solutions, history = self._solve(problem, seed, scan.index)
         best = self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
         if not self.gate_loss:
             return best
         loss = gate_loss(scene, scan, best.solution.cost, self.gating, self.time_limit)
         return replace(best, gate_loss=loss, compile_time=compile_seconds() - compiled)
 
+    def problem(self, item: tuple[int, int]) -> AssignmentProblem:
+        """The assignment problem of scan ``item[1]`` of source ``item[0]``."""
+        source = self.sources[item[0]]
+        if isinstance(source, AssignmentProblem):
+            return source
+        return build_problem(source, source.scan(item[1]), **self.gating)
+
     def _solve(
-        self, problem: AssignmentProblem, seed: int | np.random.SeedSequence
+        self, problem: AssignmentProblem, seed: int | np.random.SeedSequence, scan: int
     ) -> tuple[list[Solution], PheromoneHistory | None]:
         if self.kbest is not None:
             return kbest(problem, self.kbest, time_limit=self.time_limit), None
+        tell: Any = {"seed": seed, "time_limit": self.time_limit, "callback": self._tell(scan)}
         if self.pheromone and self.solver == "aco":
-            history = pheromone(problem, seed=seed, time_limit=self.time_limit, **self.parameters).top(_NODES)
+            history = pheromone(problem, **tell, **self.parameters).top(_NODES)
             return [history.solution], history
-        return [assign(problem, self.solver, seed=seed, time_limit=self.time_limit, **self.parameters)], None
+        return [assign(problem, self.solver, **tell, **self.parameters)], None
+
+    def _tell(self, scan: int) -> Callback | None:
+        """Return what hears of each TracePoint of a scan; its answer, nothing, stops no solver."""
+        watch = self.watch
+        return None if watch is None else lambda point: watch(scan, point) and None
 
     def _best(
         self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float
@@ -132,7 +160,7 @@ class Plan:
     def gather(self, scans: Iterable[ScanAssociation]) -> Association:
         """Put associated scans together."""
         name = self.solver if self.kbest is None else "kbest"
-        return Association(tuple(scans), name, self.all_parameters, int(self.seed))
+        return Association(tuple(scans), name, self.all_parameters, self.seed)
 
 
 def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Plan:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 from assoc._files.npz import format_of
+<<<<<<< HEAD
 from assoc._files.problem_text import is_text
+=======
+from assoc._system.door import door
+>>>>>>> main
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
@@ -12,15 +18,34 @@ from assoc.solvers.doubts import doubts_about_costs
 Source = Scene | AssignmentProblem
 
 
-def load_source(path: str) -> Source:
+@door
+def load(path: str | os.PathLike[str]) -> Source:
     """Load a scene or a problem, whichever the file says it is.
+
+    Parameters
+    ----------
+    path : path-like
+        scene.npz or problem.npz; a problem as plain text ends in .txt.
+
+    Returns
+    -------
+    Scene or AssignmentProblem
 
     Raises
     ------
     InvalidInputError
         It is neither, or cannot be read.
     """
+<<<<<<< HEAD
     if is_text(path):
+=======
+    return load_source(os.fspath(path))
+
+
+def load_source(path: str) -> Source:
+    """Load a scene or a problem from a file; see `load`."""
+    if path.endswith(".txt"):
+>>>>>>> main
         return AssignmentProblem.load(path)
     found = format_of(path)
     if found is None and _is_table(path):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs import positions
@@ -29,6 +30,7 @@ GATE_PROBABILITY = 0.999
 """Default share of true tuples that each chi-square gate lets through."""
 
 
+@door
 @interruptible()
 def build_problem(
     scene: Scene,
@@ -136,6 +138,7 @@ def _whole_grid(
     return AssignmentProblem(tuples, costs, one.sizes)
 
 
+@door
 def tuple_costs(
     scene: Scene,
     scan: int | Scan,
@@ -171,6 +174,7 @@ def tuple_costs(
     return timed_costs(scene, one, tuples, speed)
 
 
+@door
 def positions_and_covariances(
     scene: Scene, scan: int | Scan, tuples: Array, *, speed: float | Sequence[float] = SPEED
 ) -> tuple[Array, Array]:

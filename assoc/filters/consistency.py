@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import State
 from assoc.filters.state import finite
 
 
+@door
 def nees(state: State, truth: Array) -> Array:
     """Normalised estimation error squared of each target, (B,); its mean is n if the filter is right.
 
@@ -27,6 +29,7 @@ def nees(state: State, truth: Array) -> Array:
     return result
 
 
+@door
 def bounds(dim: int, runs: int, probability: float = 0.95) -> tuple[float, float]:
     """Interval that the mean of `runs` chi-square variables of `dim` degrees of freedom hits."""
     from scipy.stats import chi2

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm, logm
 
 from assoc._parameters import positive
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension
@@ -94,6 +95,7 @@ def transition_rates(transition: Array, interval: float) -> Array:
     return np.asarray(off - np.diag(off.sum(axis=1)))
 
 
+@door
 def transition_from_sojourns(seconds: Sequence[float], interval: float = 1.0) -> Array:
     """Transition probabilities of modes that last for these mean times, each change as likely to any other mode.
 

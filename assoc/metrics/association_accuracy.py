@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 
@@ -36,6 +37,7 @@ class AssociationAccuracy:
     targets_recognised: float
 
 
+@door
 def association_accuracy(sources: Array, labels: Array, instants: Array | None = None) -> AssociationAccuracy:
     """Compare groups of measurements with their sources.
 

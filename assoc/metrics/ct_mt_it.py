@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import door
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.plot_identity import identity_after_each
 
 
-@dataclass(frozen=True, eq=False)
-class CtMtIt:
+@dataclass(frozen=True, eq=False, repr=False)
+class CtMtIt(Shown):
     """Rates of each window and their means, in percent.
 
     Attributes
@@ -31,7 +33,11 @@ class CtMtIt:
     windows: Array
     per_window: Array
 
+    def __repr__(self) -> str:
+        return f"CtMtIt(CT {self.ct:.1f} %, MT {self.mt:.1f} %, IT {self.it:.1f} %, {len(self.windows)} windows)"
 
+
+@door
 def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) -> CtMtIt:
     """CT, MT and IT of plots that a tracker has given to tracks.
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.metrics.ospa import check_cutoff, distances, point_sets
 from assoc.metrics.trajectories import Trajectories, epochs
@@ -34,6 +35,7 @@ class Gospa(NamedTuple):
     pairs: Array
 
 
+@door
 def gospa(truth: Array, estimates: Array, cutoff: float, order: float = 2.0) -> Gospa:
     """Generalised optimal subpattern assignment metric, alpha = 2.
 
@@ -78,6 +80,7 @@ def _gospa(between: Array, cutoff: float, order: float) -> Gospa:
     )
 
 
+@door
 def gospa_over_time(
     truth: Trajectories, tracks: Trajectories, cutoff: float, order: float = 2.0
 ) -> tuple[Array, list[Gospa]]:
@@ -100,6 +103,7 @@ def gospa_over_time(
     return np.array(times), values
 
 
+@door
 def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     """Mean over time of GOSPA and of its parts, all in one convention: ``mean(x ** order) ** (1 / order)``, metres.
 
@@ -116,7 +120,7 @@ def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     ----------
     Rahmathullah, Garcia-Fernandez & Svensson, FUSION 2017, section V, where the mean is over runs.
     """
-    if not values:
+    if len(values) == 0:
         return {"distance": 0.0, "localisation": 0.0, "missed": 0.0, "false": 0.0}
     parts = {
         name: float(np.mean([getattr(one, name) for one in values])) for name in ("localisation", "missed", "false")

@@ -9,6 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import check_cutoff, distances
@@ -51,6 +52,7 @@ class Identity:
     targets: int
 
 
+@door
 def identity(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Identity:
     """Follow targets through tracks.
 
@@ -160,6 +162,7 @@ def _idf1(together: dict[tuple[int, int], int], targets: int, tracks: int) -> fl
     return 2.0 * agreed / (targets + tracks)
 
 
+@door
 def label_switches(sources: Array, labels: Array) -> int:
     """Identity switches where the source of each measurement is known: changes of label along each source.
 

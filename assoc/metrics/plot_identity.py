@@ -6,6 +6,7 @@ from collections import Counter, deque
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 
@@ -13,6 +14,7 @@ MEMORY = 6
 """A track's identity is the majority of its last plots, of this many."""
 
 
+@door
 def identity_after_each(sources: Array, tracks: Array) -> Array:
     """Identity of the track that took each plot, after it took it.
 
@@ -50,6 +52,7 @@ def _majority(plots: deque[int]) -> int:
     return next(aircraft for aircraft in reversed(plots) if votes.get(aircraft, 0) == most)
 
 
+@door
 def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> int:
     """How often an aircraft goes over to another track, whole plots gone astray not counted.
 

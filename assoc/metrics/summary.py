@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from assoc._system.door import door
+from assoc._text.shown import Shown
 from assoc.metrics.gospa import gospa_over_time, mean_gospa
 from assoc.metrics.identity import Identity, identity
 from assoc.metrics.ospa import ospa_over_time
@@ -15,7 +17,7 @@ from assoc.metrics.trajectories import Trajectories
 
 
 @dataclass(frozen=True)
-class Summary:
+class Summary(Shown):
     """Averages over all instants, metres, and what the identities did.
 
     Attributes
@@ -45,6 +47,7 @@ class Summary:
         return {**{name: value for name, value in values.items() if name != "identity"}, **values["identity"]}
 
 
+@door
 def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summary:
     """Compare tracks with the truth.
 

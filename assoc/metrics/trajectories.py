@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
@@ -15,8 +17,9 @@ SAME_TIME = 1e-6
 """Two time stamps that differ by less than about this (s) are one epoch."""
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectories:
+class Trajectories(Shown):
     """Targets, or tracks, over time.
 
     Parameters

@@ -1,6 +1,6 @@
 """The form in which all solvers see a problem: weighted columns over rows, sorted by component.
 
-A row is one measurement. With dummies, each row's singleton is taken as the state of rest: a column is a
+A row is one measurement. With dummies, every measurement starts as a false alarm, its singleton: a column is a
 tuple of two or more measurements, its weight the cost of the tuple less the costs of its singletons, and
 every row has *slack* (it may stay uncovered at weight 0). The problem is then a minimum-weight set packing,
 in which only columns of negative weight matter. Without dummies every tuple is a column; rows of the

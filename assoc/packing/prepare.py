@@ -34,7 +34,7 @@ class Prepared:
     packing : Packing
         ``packing.origin`` are rows of ``problem.tuples``, ``packing.row_origin`` global row numbers.
     offset : float
-        Cost of the state of rest: all singletons (0 without dummies).
+        Cost of all measurements as false alarms, all singletons (0 without dummies).
     single : int64 array
         With dummies, the cheapest singleton tuple of each global row; empty without.
     single_cost : float array

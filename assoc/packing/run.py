@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from assoc._parameters import Parameters
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
+from assoc._system.interrupts import end_is_asked
 from assoc.solution import TracePoint
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ Callback = Callable[[TracePoint], object]
 
 # points of a trace at the most
 _TRACE = 100_000
+# seconds after which a bound that rose is worth a point
+_NEWS = 0.5
 
 
 def memory_allows(needed: float) -> bool:
@@ -96,14 +99,20 @@ class Run:
         return np.inf if self.time_limit is None else time.monotonic() + self.remaining()
 
     def should_stop(self) -> bool:
-        """Whether the time is over or the callback asked to stop; ``stopped_by`` says which."""
+        """Whether the time is over, or the callback or the user asked to stop; ``stopped_by`` says which."""
         if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:
             self.stopped_by = "time_limit"
+        elif not self.stopped_by and end_is_asked():
+            self.stopped_by = "interrupted"
         return bool(self.stopped_by)
 
     def memory_allows(self, needed: float) -> bool:
         """Whether so many bytes more may be taken: for searches that grow, and can do without."""
         return memory_allows(needed)
+
+    def is_silent(self) -> bool:
+        """Whether the trace has had no new point for so long that a search should say where it is."""
+        return not self.trace or self.runtime() - self.trace[-1].seconds > _NEWS
 
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array, Floats
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new
@@ -27,6 +28,7 @@ LABELS = {
 """What is said of each measure; their units are those of `FACTORS`."""
 
 
+@door
 def plot_heat_map(
     study: pd.DataFrame, measure: str = "gap", parameters: Sequence[str] | None = None, *, ax: Any = None
 ) -> Any:
@@ -69,7 +71,10 @@ def plot_heat_map(
             texts[place] = f"{value:.3g}\n{low[place]:.3g} .. {high[place]:.3g}"
     known = middle[~np.isnan(middle)]
     image = draw_cells(xs, ys, middle, colour_limits(known), ax=ax, texts=texts)
-    ax.figure.colorbar(image, ax=ax, label=LABELS[measure])
+    if is_constant(known):
+        ax.set_title(f"{LABELS[measure]}: {known[0]:.4g} everywhere", fontsize=10)
+    else:
+        ax.figure.colorbar(image, ax=ax, label=LABELS[measure])
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     return ax
@@ -109,13 +114,18 @@ def cells(
     return xs, ys, middle, low, high
 
 
+def is_constant(known: Floats) -> bool:
+    """Whether values are one and the same, up to rounding: they need no colour scale."""
+    return bool(known.size) and float(np.ptp(known)) <= 1e-9 * float(np.abs(known).max())
+
+
 def colour_limits(known: Floats) -> tuple[float, float]:
     """Ends of the colour scale for the values that are known."""
     if not known.size:
         return 0.0, 1.0
     low, high = float(known.min()), float(known.max())
     # equal values get one colour in all maps
-    return (low, high) if low < high else (low - 0.5, high + 0.5)
+    return (low - 1.0, high + 1.0) if is_constant(known) else (low, high)
 
 
 def draw_cells(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from assoc._system.door import door
 from assoc._system.extras import load_extra
 from assoc.association.association import Association
 from assoc.costs import build_problem
@@ -15,6 +16,7 @@ from assoc.plotting.solution import plot_solution
 from assoc.scene.scene import Scene
 
 
+@door
 def plot_overview(scene: Scene, association: Association, scan: int = 0, *, axes: Any = None) -> Any:
     """Draw the scene, the association of one scan, the costs it chose from, and its convergence.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import VERMILION
@@ -21,6 +22,7 @@ _LABELS = {
 }
 
 
+@door
 def plot_pheromone(history: PheromoneHistory, *, of: str = "pheromone", nodes: int = 25, ax: Any = None) -> Any:
     """Draw how the pheromone increases on some tuples and evaporates from the others.
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import BLACK, BLUE, ORANGE
@@ -23,6 +24,7 @@ def residual_columns(registration: Registration, component: str) -> list[tuple[i
     ]
 
 
+@door
 def plot_residuals(registration: Registration, component: str = "range", *, ax: Any = None) -> Any:
     """Draw the residuals of a component before and after registration, one pair of boxes for each sensor.
 

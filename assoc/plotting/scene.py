@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
@@ -17,6 +18,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, Sensor
 
 
+@door
 def plot_scene(
     scene: Scene,
     scan: int | None = None,

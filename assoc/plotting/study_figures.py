@@ -12,7 +12,8 @@ import numpy as np
 from assoc._files.output import write_atomically
 from assoc._system.extras import load_extra
 from assoc.errors import InvalidInputError
-from assoc.plotting.heat_map import LABELS, cells, colour_limits, draw_cells, short_text
+from assoc.plotting.colours import DASHES, colour
+from assoc.plotting.heat_map import LABELS, cells, colour_limits, draw_cells, is_constant, short_text
 from assoc.sweeps.excess import mean_excess, with_excess
 from assoc.sweeps.frame import load, load_traces
 from assoc.sweeps.summary import FACTORS, measured, summarize, varied
@@ -116,13 +117,20 @@ def heat_maps(frame: pd.DataFrame, figure: Any) -> Any:
     axes = figure.subplots(len(panels), len(groups), squeeze=False)
     for row, measure in zip(axes, panels, strict=True):
         tables = [cells(part, measure, across, up, intervals=False)[:3] for _, part in groups]
-        limits = colour_limits(np.concatenate([values[~np.isnan(values)] for _, _, values in tables]))
+        known = np.concatenate([values[~np.isnan(values)] for _, _, values in tables])
+        limits = colour_limits(known)
         for ax, (label, _), (xs, ys, values) in zip(row, groups, tables, strict=True):
             image = draw_cells(xs, ys, values, limits, ax=ax)
             ax.set_xlabel(across)
             ax.set_ylabel(up)
             ax.set_title(label, fontsize=9)
-        figure.colorbar(image, ax=list(row), label=LABELS[measure])
+        if is_constant(known):
+            row[0].annotate(
+                f"{LABELS[measure]}: {known[0]:.4g} everywhere", (0, 1), (0, 16), xycoords="axes fraction",
+                textcoords="offset points", fontsize=9,
+            )  # fmt: skip
+        else:
+            figure.colorbar(image, ax=list(row), label=LABELS[measure])
     return figure
 
 
@@ -175,7 +183,8 @@ def convergence(frame: pd.DataFrame, traces: pd.DataFrame, figure: Any) -> Any:
             style: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 1}
             if place < _MOST_CURVES:
                 label = setting_title(row, names, several)
-                style = {"color": f"C{place}", "linewidth": 1.6, "zorder": 3, "label": label}
+                look = {"color": colour(place), "linestyle": DASHES[place % len(DASHES)]}
+                style = {**look, "linewidth": 1.6, "zorder": 3, "label": label}
             draw_curve(traces[traces["setting"] == row["setting"]], column, ax=ax, **style)
         if column == "seconds" or traces[column].max() > 30:
             ax.set_xscale("log")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, unit_of
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _NAMED = 12
 
 
+@door
 def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = None) -> Any:
     """Draw tracks, each in its own colour and dashes, over the paths of the targets.
 

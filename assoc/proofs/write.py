@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc import check
 from assoc._files.output import FilePath, check_writable, write_text
+from assoc._system.door import door
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.packing.bounds.dual_ascent import component_bounds, dual_bound
@@ -26,6 +27,7 @@ _NODES = 100_000
 _CLOSED = 1e-9
 
 
+@door
 def write_proof(path: FilePath, problem: AssignmentProblem, solution: Solution, *, nodes: int = _NODES) -> float:
     """Write a proof of how far a solution can be from the optimum; ``python -m assoc.check`` replays it.
 

@@ -84,7 +84,7 @@ def price_all_columns(problem: AssignmentProblem, run: Run) -> AllColumns:
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
     own = dual_bound(packing, run=run)
-    hard_pass(packing, own, np.empty(packing.num_columns), 1)
+    hard_pass(packing, own)
     duals[packing.row_origin] = own
     return priced(rows, weights, origin, slack, duals, prepared.offset, prepared.single)
 

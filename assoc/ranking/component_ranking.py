@@ -1,9 +1,9 @@
 """The k lightest solutions of one component or of many: enumeration where it is quick, else branching first.
 
 Enumeration (enumeration.py) is quick where the multipliers' bound is near the optimum. Where it is not, the
-component is branched as in packing/branching (are two measurements of the same source or not?), the
-multipliers are improved at every node, and what is left of a node is enumerated as soon as a small budget
-suffices. The two answers exclude each other, so that every solution is in exactly one leaf.
+component is branched as in packing/branching (are two measurements of the same source or not?): the linear program of
+every node gives the best multipliers there are for it, and what its reduced costs leave of a node is enumerated as soon
+as a small budget suffices. The two answers exclude each other, so that every solution is in exactly one leaf.
 """
 
 from __future__ import annotations
@@ -17,24 +17,32 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
-from assoc.packing.branching.doubtful_pairs import doubtful_pairs, new_doubts
-from assoc.packing.branching.nodes import (
-    CLOSED,
-    LEVELS,
-    OVER,
-    NodeArrays,
-    OpenNodes,
-    has_room,
-    index_by_row,
-    new_node,
-    next_temperature,
-    push_children,
-    raise_bound,
-    soften,
-    take_node,
+from assoc.packing.branching.node import (
+    Work,
+    allowed_at,
+    branch,
+    drop,
+    keep_side,
+    new_work,
+    open_node,
+    relax,
+    work_memory,
 )
+from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room, push_node
+from assoc.packing.branching.pairs import (
+    NEITHER,
+    TOGETHER,
+    any_open_pair,
+    certain_pairs,
+    decide,
+    doubtful_pairs,
+    part_certain,
+)
+from assoc.packing.branching.root import plain_root
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import memory_allows
+from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
+from assoc.packing.simplex.program import Allowed, reduced_cost
 from assoc.ranking.enumeration import (
     NOT_COMPLETE,
     PricedColumns,
@@ -89,7 +97,9 @@ class ComponentRanking:
         self._memory_allows = memory_allows
         self._wanted = Wanted(k, limit, tolerance, budget + packing.num_rows, deadline)
         self._store = new_store(packing.num_rows)
-        self._open = OpenNodes(packing, duals)
+        self._root = plain_root(packing, duals)
+        self._open = OpenNodes(self._root)
+        self._work: Work | None = None
         self.nodes = 0
 
     @property
@@ -117,17 +127,23 @@ class ComponentRanking:
         """Search until ``nodes`` more nodes are done or nothing is left."""
         target = self.nodes + nodes
         while not self.done and self.nodes < target and not is_over(self._deadline):
+            if self._work is None and not self._begin():
+                return
             self._open.count, done, self._store = _rank(
-                self._packing.arrays,
-                self._open.arrays,
-                self._open.count,
-                self._wanted,
-                self._store,
-                target - self.nodes,
+                self._work, self._open.arrays, self._open.count, self._wanted, self._store, target - self.nodes
             )
             self.nodes += done
             if not self.done and self.nodes < target and not is_over(self._deadline):
                 self._open.grow(self._memory_allows)
+
+    def _begin(self) -> bool:
+        """Make room for the search; without memory for it the root is given up."""
+        packing = self._packing
+        if not self._memory_allows(work_memory(packing.num_rows, packing.num_columns)):
+            self._open.give_up()
+            return False
+        self._work = new_work(packing.arrays, self._root.program, self._root.slack)
+        return True
 
 
 @njit
@@ -141,66 +157,112 @@ def _sorted_store(store: Store) -> Any:
     return weights, columns
 
 
+@njit
+def _priced(work: Work, num: int) -> PricedColumns:
+    """The columns of the node at work with its multipliers, indexed by row."""
+    cols, active = work.cols, work.node.active
+    num_sensors = cols.shape[1]
+    own_cols = np.empty((num, num_sensors), np.int32)
+    reduced = np.empty(num)
+    row_ptr = np.zeros(work.trial.size + 1, np.int64)
+    for a in range(num):
+        own_cols[a] = cols[active[a]]
+        reduced[a] = reduced_cost(work.program, work.duals, active[a])
+        for s in range(num_sensors):
+            if own_cols[a, s] >= 0:
+                row_ptr[own_cols[a, s] + 1] += 1
+    for r in range(work.trial.size):
+        row_ptr[r + 1] += row_ptr[r]
+    row_cols = np.empty(row_ptr[-1], np.int32)
+    place = row_ptr[:-1].copy()
+    for a in range(num):
+        for s in range(num_sensors):
+            r = own_cols[a, s]
+            if r >= 0:
+                row_cols[place[r]] = a
+                place[r] += 1
+    return PricedColumns(
+        own_cols, active[:num].copy(), reduced, work.node.slack, work.duals, row_ptr, row_cols, np.empty(num, np.int32)
+    )
+
+
+@njit
+def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
+    """The pair to branch on, what is to be done with it (`decide`), and whether it is likelier together."""
+    program, cols, basis, trials = work.program, work.cols, work.basis, work.trials
+    if status == OPTIMAL:
+        count = doubtful_pairs(cols, basis, trials)
+        if count > 0:
+            which, verdict = decide(program, cols, allowed, basis, trials, count, effort)
+            return (trials.pairs[which, 0], trials.pairs[which, 1]), verdict, trials.values[which] >= 0.5
+        which, verdict = -1, NEITHER
+        count = certain_pairs(cols, allowed, basis, trials, work.trial)
+        if count > 0:
+            which, verdict = part_certain(program, cols, allowed, basis, trials, count, effort)
+        if which >= 0:
+            return (trials.pairs[which, 0], trials.pairs[which, 1]), verdict, True
+    one, two = any_open_pair(cols, allowed, work.trial)
+    if one < 0:
+        # no column shares a row with another one: whether it is used is the question
+        for j in allowed.active:
+            for s in range(cols.shape[1]):
+                for t in range(s + 1, cols.shape[1]):
+                    if cols[j, s] >= 0 and cols[j, t] >= 0 and (allowed.slack[cols[j, s]] or allowed.slack[cols[j, t]]):
+                        one, two = int(cols[j, s]), int(cols[j, t])
+    return (np.int32(one), np.int32(two)), NEITHER, True
+
+
 @search_njit
-def _rank(
-    packing: PackingArrays, stack: NodeArrays, num_open: int, wanted: Wanted, store: Store, node_limit: int
-) -> Any:
+def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store, node_limit: int) -> Any:
     """Search depth first; the number of open nodes, the nodes done, and the store.
 
     Stops early with nodes open when there is no room left for two children, or time is over.
     """
-    tolerance, deadline = wanted.tolerance, wanted.deadline
-    node = new_node(packing, stack, num_open)
-    num_rows = node.duals.size
-    own_cols = np.empty((node.active.size, packing.cols.shape[1]), np.int32)
-    blocked = np.empty(node.active.size, np.int32)
-    doubts = new_doubts(1, num_rows)
+    deadline = wanted.deadline
     nodes = 0
+    # the node whose basis is at work
+    at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
-        if not has_room(stack, top):
+        if not has_room(stack, top) or is_over(deadline):
             break
-        num_open = top
-        cut = cut_of(store, wanted)
+        cut = min(cut_of(store, wanted), work.limit)
         lower = stack.bound[top]
         if lower >= cut:
+            num_open = top
             continue
-        nodes += 1
-        num = take_node(stack, top, node)
-        kept = num
-        temperature = 0.0
-        for level in range(LEVELS):
-            kept, bound, lower = raise_bound(packing, node, num, lower, temperature, cut, cut, deadline)
-            if kept < 0:
-                break
-            if level == 0 or kept < num:
-                index_by_row(packing.cols, node, kept)
-                for a in range(kept):
-                    own_cols[a] = packing.cols[node.active[a]]
-                columns = PricedColumns(
-                    own_cols, node.active, node.reduced[:kept], node.slack, node.duals, node.row_ptr, node.row_cols,
-                    blocked,
-                )  # fmt: skip
-                steps, store = enumerate_solutions(columns, 0, num_rows, bound, wanted, True, store)
-                if steps != NOT_COMPLETE:
-                    kept = CLOSED
-                    break
-                cut = cut_of(store, wanted)
-            num = kept
-            gap = cut - lower if cut < np.inf else max(0.1 * abs(lower), 1e3 * tolerance)
-            temperature = next_temperature(gap, level, tolerance)
-        if kept == OVER:
-            # the node's columns and multipliers are as they were; what it listed already is known again
-            num_open = top + 1
-            nodes -= 1
+        num = open_node(work, stack, top, at_work)
+        at_work = -1
+        status, bound = relax(work, num, cut, deadline)
+        if status == STOPPED and is_over(deadline):
             break
-        if kept == CLOSED or lower >= cut:
+        lower = max(lower, bound)
+        if lower < cut:
+            num = drop(work, num, bound, cut)
+            base = 0.0
+            for r in range(work.trial.size):
+                base += work.duals[r]
+            steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, base, wanted, True, store)
+            cut = min(cut_of(store, wanted), work.limit)
+            if steps == NOT_COMPLETE and is_over(deadline):
+                # the node is as it was on the stack; what it has listed already is known again
+                break
+            if steps != NOT_COMPLETE:
+                lower = cut
+        num_open = top
+        nodes += 1
+        if lower >= cut:
             continue
-        soften(packing, node, num, node.best_duals, temperature, deadline)
-        # with distinct columns there always is one: without an open question enumeration would have been complete
-        doubtful_pairs(packing.cols, node, doubts)
-        pair = doubts.pairs[0, 0], doubts.pairs[0, 1], doubts.values[0]
-        num_open = push_children(packing, stack, top, node, num, pair, lower, node.best_duals)
+        num = drop(work, num, bound, cut)
+        allowed = allowed_at(work, num)
+        pair, verdict, likely = _question(work, allowed, status, Effort(cut, 0, deadline))
+        if verdict == NEITHER:
+            num_open = branch(work, stack, top, num, pair, likely, lower)
+        else:
+            num = keep_side(work, num, pair, verdict == TOGETHER)
+            push_node(stack, top, allowed_at(work, num), work.basis, lower)
+            num_open = top + 1
+        at_work = num_open - 1
     return num_open, nodes, store
 
 

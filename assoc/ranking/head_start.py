@@ -1,8 +1,8 @@
-"""A good solution before the ranking begins: where time is limited and enumeration is not enough.
+"""A good solution before the ranking begins: where enumeration is not enough.
 
 A ranking meets its first solution late, when the excess that it allows has grown to that of the optimum. The exact
-solver's heuristics are near the optimum in a fraction of that time. What they find is returned when nothing better is
-proved, and its excess is where the ranking goes on: all that is less is contained in it.
+solver is there in a fraction of that time. What it finds is returned when nothing better is proved, and its excess is
+where the ranking goes on: all that is less is contained in it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from assoc.packing.run import Run
 from assoc.solvers.exact.proof import prove
 from assoc.solvers.greedy.fallback import better_of
 
-# share of the time that is left
+# share of the time that is left, where it is limited
 _SHARE = 0.3
 # nodes and patience of the exact solver
 _NODES, _PATIENCE = 100_000_000, 10
 
 
 class HeadStart:
-    """What the exact solver knows of a packing after a share of a run's time.
+    """What the exact solver knows of a packing, after a share of a run's time at the most.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class HeadStart:
     bound : float
         No solution weighs less.
     taken : bool
-        Whether that has been done; without a time limit it never is.
+        Whether that has been done.
     """
 
     def __init__(self, packing: Packing, run: Run) -> None:
@@ -39,15 +39,16 @@ class HeadStart:
         self._run = run
         self.weight = np.inf
         self.bound = -np.inf
-        self.taken = run.time_limit is None
+        self.taken = False
 
     def take(self) -> None:
-        """Spend a share of the time that is left, once."""
+        """Solve the packing, or spend a share of the time that is left; once."""
         self.taken = True
         run, packing = self._run, self._packing
         if run.should_stop() or packing.num_columns == 0:
             return
-        ahead = Run(0, time_limit=run.elapsed() + _SHARE * run.remaining(), started=run.started)
+        limit = None if run.time_limit is None else run.elapsed() + _SHARE * run.remaining()
+        ahead = Run(0, time_limit=limit, started=run.started)
         ahead.fallback = run.fallback
         try:
             outcome = prove(packing, _NODES, _PATIENCE, ahead)

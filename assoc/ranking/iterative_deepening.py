@@ -19,6 +19,9 @@ from assoc.ranking.merging import merge
 
 Columns = NDArray[np.int32]
 
+# excess of a round, as a multiple of that of the best solution known
+_AHEAD = 1.1
+
 
 @dataclass(slots=True)
 class Found:
@@ -112,7 +115,8 @@ class Deepening:
         if place >= steps.size:
             return np.inf
         known = self._ahead.weight - self._columns.bound + 4.0 * self._tolerance
-        return max(float(steps[place]), known) if known < np.inf else float(steps[place])
+        # a little more than that of one solution: the others should not take a round of their own
+        return max(float(steps[place]), _AHEAD * known) if known < np.inf else float(steps[place])
 
     def _round(self, excess: float) -> Found:
         """Rank all solutions of at most this excess; fewer than k if there are fewer."""
@@ -183,10 +187,10 @@ class Deepening:
 
     def _branch(self, packing: Packing, duals: Floats, c: int, limit: float, lists: _Lists) -> None:
         """Rank a component that was too much for enumeration; the lists are filled in."""
-        piece = packing.component(c)
+        component = packing.component(c)
         own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
         ranking = ComponentRanking(
-            piece,
+            component,
             own_duals,
             self._k,
             limit,
@@ -195,7 +199,7 @@ class Deepening:
             memory_allows=self._run.memory_allows,
         )
         # about ten milliseconds of work between two looks at the clock
-        turn = max(1, 100_000 // max(piece.num_columns, 1))
+        turn = max(1, 100_000 // max(component.num_columns, 1))
         while not ranking.done and not self._run.should_stop():
             ranking.run(turn)
         self._nodes += ranking.nodes

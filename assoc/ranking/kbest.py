@@ -17,7 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._parameters import checked_time_limit
 from assoc._system import memory
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
@@ -29,7 +31,6 @@ from assoc.ranking.head_start import HeadStart
 from assoc.ranking.iterative_deepening import Deepening
 from assoc.ranking.two_sensors import rank_two_sensors
 from assoc.solution import Solution
-from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.parameters import GreedyParameters
@@ -39,6 +40,7 @@ from assoc.solvers.greedy.solve import greedy_choice
 _SOLUTION, _MEASUREMENT = 2_000, 130
 
 
+@door
 def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None) -> list[Solution]:
     """Return the k best solutions, truly ranked.
 

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._parameters import checked_time_limit
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
+from assoc._text.shown import Shown
 from assoc._types import Floats
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.prepare import prepare
@@ -19,7 +22,6 @@ from assoc.ranking.clusters import clusters_of, distinct, numbered
 from assoc.ranking.columns import AllColumns
 from assoc.ranking.kbest import checked_k, rank
 from assoc.ranking.partition_function import log_partition
-from assoc.solvers.assign import checked_time_limit
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 
@@ -35,8 +37,8 @@ _ROUNDING = 1e-12
 _FAR = 4000.0
 
 
-@dataclass(frozen=True, slots=True)
-class Marginals:
+@dataclass(frozen=True, slots=True, repr=False)
+class Marginals(Shown):
     """Probability of each tuple to be an association.
 
     Attributes
@@ -69,7 +71,11 @@ class Marginals:
         frame = pd.DataFrame({**columns, "probability": self.probability, "lower": self.lower, "upper": self.upper})
         return frame[frame["upper"] > 0.0].reset_index(drop=True)
 
+    def __repr__(self) -> str:
+        return f"Marginals({len(self.tuples)} tuples, {self.listed} solutions listed, unseen weight {self.unseen:.3g})"
 
+
+@door
 @interruptible()
 def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | None = None) -> Marginals:
     """Return the association probability of every tuple, from the k best solutions.

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.recordings.windows import Window, windows_of
 
 
+@door
 def irregular_groups(
     recording: Recording, rng: np.random.Generator, mean: float = 6.2, shape: float = 2.0
 ) -> list[Window]:
@@ -49,6 +51,7 @@ def irregular_groups(
     return windows_of(recording, np.searchsorted(np.array(edges), recording.times, side="right"))
 
 
+@door
 def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
     """Group plots by intervals of one length that is not the antenna's, from the first plot on."""
     if not 0 < seconds < math.inf:
@@ -58,6 +61,7 @@ def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
     return windows_of(recording, np.floor((recording.times - recording.times[0]) / seconds).astype(np.int64))
 
 
+@door
 def groups_of_sizes(recording: Recording, sizes: Sequence[int]) -> list[Window]:
     """Group plots by given numbers of plots, in the order of time.
 

@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 from assoc.sensors.radar import Radar2D
 
 
+@door
 def radar_of(
     recording: Recording,
     *,

@@ -12,6 +12,7 @@ from typing import IO
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
@@ -26,6 +27,7 @@ MOST_PLOTS = 20_000_000
 _FARTHEST = 1e7
 
 
+@door
 def read_plots(
     path: str | os.PathLike[str],
     *,

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array, wrap_angle
@@ -17,8 +19,9 @@ UNDECODED = 0
 """The identity (Mode 3) of a plot whose transponder answer was not decoded."""
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording:
+class Recording(Shown):
     """Plots of a radar, in the order of time.
 
     Parameters

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -20,6 +21,7 @@ _MOST = 20_000
 _LEAST_COHERENCE = 0.5
 
 
+@door
 def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest: float = LONGEST) -> float:
     """Estimate the rotation time of the antenna.
 

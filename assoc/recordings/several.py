@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -21,6 +22,7 @@ FULL_TURN = 2.0 * math.pi
 MOST_SCANS = 1_000_000
 
 
+@door
 def scene_of_radars(
     recordings: Sequence[Recording],
     radars: Sequence[Radar2D],

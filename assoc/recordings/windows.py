@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
@@ -67,6 +68,7 @@ class Window:
         return f"Window({self.number}, {len(self)} plots{span})"
 
 
+@door
 def clustering_time_window(
     recording: Recording, rotation: float | None = None, *, by: Literal["antenna", "time"] = "antenna"
 ) -> list[Window]:

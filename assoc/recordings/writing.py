@@ -10,11 +10,13 @@ import os
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import Recording
 
 
+@door
 def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     """Write plots so that `read_plots` reads them back.
 
@@ -43,6 +45,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
     write_text(path, text.getvalue())
 
 
+@door
 def write_tracks(
     path: str | os.PathLike[str], ids: Array, times: Array, positions: Array, velocities: Array
 ) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.registration.terms import AXES, Term
 from assoc.scene.scene import Scene
@@ -87,6 +88,7 @@ def pointed_at(sensor: Sensor, z: Array) -> Array:
     return sensor.position + np.stack(along, axis=1)
 
 
+@door
 def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     """Give the measurements of a scene biases, for experiments and tests; those of clocks are not known here.
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.correction import corrected_measurements, own_biases
@@ -30,6 +31,7 @@ _MOST_KEPT = 32
 """Scans that are kept at the beginning, and estimated together."""
 
 
+@doors
 class OnlineRegistration:
     """Biases that are estimated while measurements come in.
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_json
+from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.registration.correction import own_biases, without_biases
@@ -45,8 +47,9 @@ class Residuals:
     after: Array
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False)
-class Registration:
+class Registration(Shown):
     """Biases of sensors: what a sensor states, less what is true.
 
     Attributes

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from assoc._parameters import is_whole
+from assoc._system.door import doors
 from assoc._text.html import escape, table
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
@@ -26,6 +28,7 @@ from assoc.sensors.base import ANGLES, finite_array
 _DEFAULT_HEIGHT = 20_000.0
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """Sensors and their measurements over a number of scans.
@@ -211,6 +214,28 @@ class Scene:
             truth_positions=None if truth is None else truth.positions[k],
             times=None if self.measurement_times is None else tuple(self.measurement_times[k]),
             sectors=None if self.sectors is None else self.sectors[k],
+        )
+
+    def part(self, start: int, stop: int) -> Scene:
+        """Return scans ``start`` to ``stop`` - 1, with their truth, as a scene.
+
+        Raises
+        ------
+        InvalidInputError
+            There are no such scans.
+        """
+        if not (is_whole(start, 0) and is_whole(stop, start + 1, self.num_scans)):
+            raise InvalidInputError(
+                f"part: expected whole numbers 0 <= start < stop <= {self.num_scans}, got {start!r} and {stop!r}"
+            )
+        which, truth = slice(start, stop), self.truth
+        return replace(
+            self,
+            times=self.times[which],
+            measurements=self.measurements[which],
+            measurement_times=None if self.measurement_times is None else self.measurement_times[which],
+            sectors=None if self.sectors is None else self.sectors[which],
+            truth=None if truth is None else truth.part(which),
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array
@@ -26,6 +27,7 @@ def integers(value: object, what: str, length: int) -> Array:
     return array
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth:
     """The true targets.
@@ -83,6 +85,11 @@ class Truth:
     def name_of(self, target: int) -> str:
         """What a target is called: its name, or its id where it has none."""
         return self.names.get(int(target), str(int(target)))
+
+    def part(self, scans: slice) -> Truth:
+        """Return the truth of some scans."""
+        sources = None if self.sources is None else self.sources[scans]
+        return replace(self, target_ids=self.target_ids[scans], positions=self.positions[scans], sources=sources)
 
     def __repr__(self) -> str:
         targets = len({int(i) for one in self.target_ids for i in one})

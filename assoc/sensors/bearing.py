@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 from assoc.sensors.radar import NEAREST
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BearingSensor(Sensor):
     """A sensor that measures azimuth (rad) from +x towards +y, and neither range nor height.

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.sensors.base import Sensor
 
 
+@doors
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PositionSensor(Sensor):
     """A sensor that reports x, y or x, y, z (m) in the scene's own frame, whatever its place.

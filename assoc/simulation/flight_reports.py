@@ -32,6 +32,9 @@ MOTION = {"updated": "lastposupdate", "speed": "velocity", "heading": "heading",
 
 ALTITUDE_UNITS = {"m": 1.0, "ft": 0.3048}
 
+SPEED_UNITS = {"m/s": (1.0, 1.0), "kt": (1852.0 / 3600.0, 0.3048 / 60.0)}
+"""Of the speed over ground, and of the climb that is told beside it: where speeds are in knots, feet per minute."""
+
 HIGH = 18_000.0
 """Metres that aircraft seldom fly at: where a tenth of all reports lies above, feet were taken for metres."""
 
@@ -58,7 +61,9 @@ class FlightReports:
     notes: Mapping[str, int] = field(default_factory=dict)
 
 
-def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_unit: str = "m") -> FlightReports:
+def read_flight_reports(
+    path: str, named: Mapping[str, str | None], altitude_unit: str = "m", speed_unit: str = "m/s"
+) -> FlightReports:
     """Read a file; rows without a time, an identity or a place are left out and counted.
 
     Parameters
@@ -69,6 +74,8 @@ def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_uni
         Columns by meaning (`COLUMNS`), where they are not the usual ones.
     altitude_unit : str
         One of `ALTITUDE_UNITS`.
+    speed_unit : str
+        One of `SPEED_UNITS`: "m/s", or "kt" for speeds in knots and climbs in feet per minute.
 
     Raises
     ------
@@ -122,6 +129,8 @@ def read_flight_reports(path: str, named: Mapping[str, str | None], altitude_uni
         "rows left out, second report of an aircraft at one instant": int((~first).sum()),
     }
     updated, velocity = _motion(table, chosen)
+    over_ground, climbing = SPEED_UNITS[speed_unit]
+    velocity = velocity * [over_ground, over_ground, climbing]
     calls = table[chosen["name"]][known] if "name" in chosen else None
     return FlightReports(
         time[order],

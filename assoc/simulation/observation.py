@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
@@ -13,6 +14,7 @@ from assoc.sensors.base import Sensor, wrap_angle
 from assoc.simulation.memory import require_scene_memory
 
 
+@door
 def observe(
     sensors: Sequence[Sensor],
     times: Array,

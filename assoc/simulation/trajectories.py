@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors.base import finite_array
@@ -26,6 +27,7 @@ class Manoeuvre:
             raise InvalidInputError(f"manoeuvre: expected start < end, got {self.start}, {self.end}")
 
 
+@doors
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """Motion of one target.

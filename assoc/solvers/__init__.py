@@ -7,10 +7,10 @@ compiler.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from assoc._parameters import Parameters
+from assoc._system.lazy import lazy_names
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.registry import names, parameters, register
 
@@ -21,22 +21,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "parameters", "pheromone", "register"]
 
-_HOME = {
-    "Cover": "assoc.packing.neighbourhoods.cover",
-    "Packing": "assoc.packing.packing",
-    "pheromone": "assoc.solvers.pheromone_history",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home on first use (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'assoc.solvers' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    """The public names, loaded or not."""
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "Cover": "assoc.packing.neighbourhoods.cover",
+        "Packing": "assoc.packing.packing",
+        "pheromone": "pheromone_history",
+    },
+)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._files.output import FilePath, check_writable
+from assoc._parameters import checked_time_limit, whole_seed
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
+from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
@@ -28,11 +29,12 @@ from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.start import start_columns
 
 
+@door
 def assign(
     problem: AssignmentProblem,
     solver: str = "exact",
     *,
-    seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    seed: int | np.random.SeedSequence | np.random.Generator | None = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
     start: Solution | None = None,
@@ -49,8 +51,8 @@ def assign(
         What to solve.
     solver : str, default "exact"
         One of ``assoc.solvers.names()``.
-    seed : int, SeedSequence or Generator, default 0
-        Source of all randomness: the same seed gives the same solution.
+    seed : int, SeedSequence, Generator or None, default 0
+        Source of all randomness: the same seed gives the same solution; None: a random one.
     time_limit : float, optional
         Seconds; when they are over the best solution found is returned.
     callback : callable, optional
@@ -91,6 +93,9 @@ def assign(
     chosen = registry.make_parameters(solver, parameters)
     solve = registry.solver(solver)
     limit = checked_time_limit(time_limit)
+    for name, function in (("callback", callback), ("watch", watch)):
+        if function is not None and not callable(function):
+            raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
     if proof is not None:
         check_writable(proof)
     run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
@@ -121,8 +126,8 @@ def assign(
             from assoc.proofs import write_proof  # loads what few calls need
 
             write_proof(proof, problem, solution)
-    # only where nothing was found is it worth a look why
-    if advise and problem.dummy and not (np.count_nonzero(solution.tuples, axis=1) > 1).any():
+    # only where nothing was found is it worth a look why: every column of a problem with dummies is a target
+    if advise and problem.dummy and not len(outcome.columns):
         for line in doubts_about_costs(problem):
             warn(line)
     return solution
@@ -133,7 +138,7 @@ def _checked(outcome: object, solver: str) -> Outcome:
     if not isinstance(outcome, Outcome):
         raise InvalidInputError(f"solver {solver!r}: expected it to return an Outcome, got {type(outcome).__name__}")
     columns = np.asarray(outcome.columns)
-    if columns.ndim != 1 or not (columns.size == 0 or np.issubdtype(columns.dtype, np.integer)):
+    if columns.ndim != 1 or not (columns.size == 0 or columns.dtype.kind in "iu"):
         raise InvalidInputError(
             f"solver {solver!r}: expected the columns of its Outcome to be a list of whole numbers, got an array of "
             f"shape {columns.shape} and type {columns.dtype}"
@@ -159,15 +164,4 @@ def _lighter(packing: Packing, outcome: Outcome, other: NDArray[np.integer], run
 def _seed(seed: object) -> int | np.random.SeedSequence | np.random.Generator:
     if isinstance(seed, (np.random.Generator, np.random.SeedSequence)):
         return seed
-    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0:
-        return int(seed)
-    raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
-
-
-def checked_time_limit(time_limit: object) -> float | None:
-    """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
-    if time_limit is None:
-        return None
-    if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:
-        return float(time_limit)
-    raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    return whole_seed(seed)

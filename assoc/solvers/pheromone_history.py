@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system import memory
+from assoc._system.door import door
+from assoc._text.shown import Shown
 from assoc._types import Floats
 from assoc.packing.packing import Packing
 from assoc.packing.prepare import prepare
@@ -21,8 +23,8 @@ from assoc.solvers.aco.paper import nodes_of
 from assoc.solvers.assign import assign
 
 
-@dataclass(frozen=True, eq=False)
-class PheromoneHistory:
+@dataclass(frozen=True, eq=False, repr=False)
+class PheromoneHistory(Shown):
     """What the ants left on the nodes, and how they saw them.
 
     Attributes
@@ -53,6 +55,9 @@ class PheromoneHistory:
     chosen: NDArray[np.bool_]
     solution: Solution
 
+    def __repr__(self) -> str:
+        return f"PheromoneHistory({len(self.cycles)} cycles, {len(self.tuples)} tuples, {self.solution!r})"
+
     def top(self, nodes: int) -> PheromoneHistory:
         """Return the history of so many nodes: what was chosen, then what has the most pheromone in the end."""
         last = self.pheromone[-1] if len(self.pheromone) else np.zeros(len(self.tuples))
@@ -69,10 +74,11 @@ class PheromoneHistory:
         )
 
 
+@door
 def pheromone(
     problem: AssignmentProblem,
     *,
-    seed: int | np.random.SeedSequence | np.random.Generator = 0,
+    seed: int | np.random.SeedSequence | np.random.Generator | None = 0,
     time_limit: float | None = None,
     callback: Callback | None = None,
     watch: Callable[[Cycle], object] | None = None,

@@ -7,7 +7,7 @@ imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the funct
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
@@ -15,6 +15,7 @@ from typing import Any
 
 from assoc._parameters import Parameters
 from assoc._system.compile_time import loading
+from assoc._system.door import door
 from assoc._text.near import did_you_mean
 from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
@@ -27,11 +28,13 @@ Own = tuple[str, type[Parameters], SolveFunction]
 """Name, parameters and function of a solver from elsewhere."""
 
 
+@door
 def names() -> list[str]:
     """Names of all solvers, the package's own first."""
     return [*_NAMES, *_REGISTERED]
 
 
+@door
 def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> None:
     """Add a solver of your own under a new name.
 
@@ -47,8 +50,14 @@ def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> N
     Raises
     ------
     InvalidInputError
-        The name is taken.
+        The name is taken, or an argument is not as described.
     """
+    if not isinstance(name, str) or not name:
+        raise InvalidInputError(f"name: expected text, got {name!r}")
+    if not (isinstance(parameters, type) and issubclass(parameters, Parameters) and is_dataclass(parameters)):
+        raise InvalidInputError(f"parameters: expected a dataclass, child of Parameters, got {parameters!r:.80}")
+    if not callable(solve):
+        raise InvalidInputError(f"solve: expected a function, got {type(solve).__name__}")
     if name in names():
         raise InvalidInputError(f"solver: the name {name!r} is taken")
     _REGISTERED[name] = (parameters, solve)
@@ -65,6 +74,7 @@ def restore(solvers: Iterable[Own]) -> None:
         _REGISTERED.setdefault(name, (kind, solve))
 
 
+@door
 def parameters(name: str) -> type[Parameters]:
     """Return the parameter dataclass of a solver; its fields' metadata have a "help" text.
 
@@ -75,8 +85,7 @@ def parameters(name: str) -> type[Parameters]:
     """
     if name in _REGISTERED:
         return _REGISTERED[name][0]
-    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
-    return kind
+    return _kind(name)
 
 
 def solver(name: str) -> SolveFunction:
@@ -110,6 +119,12 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
         return kind(**values)
     except TypeError as error:
         raise InvalidInputError(f"parameters of solver {name!r}: {error}") from None
+
+
+@cache
+def _kind(name: str) -> type[Parameters]:
+    kind: type[Parameters] = getattr(_module(name, "parameters"), f"{name.capitalize()}Parameters")
+    return kind
 
 
 @cache

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
 from assoc.packing.kernels.sorting import ascending
@@ -35,6 +36,7 @@ _LIMITS = {"patience": 12, "nodes": 60}
 _HEURISTICS = ("tabu", "genetic", "aco")
 
 
+@door
 def warm_up(solvers: Iterable[str] | None = None) -> float:
     """Compile the kernels of solvers, or load them, so that no later call of ``assign`` has to.
 

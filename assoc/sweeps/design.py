@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from assoc._parameters import whole_seed
+from assoc._system.door import door
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.solvers import registry
 from assoc.sweeps.setting import Setting, parameter
@@ -18,6 +20,7 @@ MOST_SETTINGS = 1_000_000
 """A design of more settings is refused: it is a typing error."""
 
 
+@door
 def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     """Every combination of the values of some parameters of a solver.
 
@@ -43,7 +46,8 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     return _combinations(solver, _spaces(solver, space or {}), "grid")
 
 
-def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int = 0) -> list[Setting]:
+@door
+def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int | None = 0) -> list[Setting]:
     """Settings drawn at random; the first n of a longer design are the design of length n.
 
     Parameters
@@ -53,14 +57,15 @@ def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int
         For each parameter a list of values or ``{"low": .., "high": .., "log": True}``.
     count : int
         How many.
-    seed : int, default 0
+    seed : int or None, default 0
+        None: a random one.
 
     Returns
     -------
     list of Setting
         At most ``count``: a setting that was drawn twice is there once.
     """
-    return _drawn(solver, _spaces(solver, space), count, seed)
+    return _drawn(solver, _spaces(solver, space), count, whole_seed(seed))
 
 
 def _spaces(solver: str, space: Mapping[str, Any]) -> dict[str, Space]:
@@ -146,6 +151,7 @@ def _owners(name: str, solvers: list[str], label: str) -> list[str]:
     return owners
 
 
+@door
 def settings_from(
     tables: Mapping[str, Any], random: int | None = None, seed: int = 0, label: str = ""
 ) -> list[Setting]:

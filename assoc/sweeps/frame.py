@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.sweeps.store import COLUMNS, Manifest, read_log, read_manifest, run_keys
 
@@ -33,6 +34,7 @@ RESULTS = (
 """Columns of the table after ``solver`` and the parameters."""
 
 
+@door
 def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read the runs of a study; also of one that is still running.
 
@@ -96,6 +98,7 @@ def column_of(parameter: str) -> str:
     return f"parameter_{parameter}" if parameter in RESULTS else parameter
 
 
+@door
 def load_traces(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read how the runs of a study converged.
 

@@ -11,10 +11,12 @@ from types import MappingProxyType
 from typing import Any
 
 from assoc._parameters import Option, options
+from assoc._system.door import doors
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 
 
+@doors
 @dataclass(frozen=True)
 class Setting:
     """One solver and its parameters.

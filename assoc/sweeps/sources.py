@@ -7,11 +7,13 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from assoc.association.source import Source, load_source
 from assoc.errors import InvalidInputError
+from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 
 
@@ -87,3 +89,30 @@ def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[Stu
             raise InvalidInputError(f"{file}: is the same as {seen[source.fingerprint]}; give it once")
         seen[source.fingerprint] = file
     return sources
+
+
+def study_sources(given: Any) -> tuple[StudySource, ...]:
+    """Scenes and problems, one or several, with or without names, as sources; unnamed ones are numbered.
+
+    Raises
+    ------
+    InvalidInputError
+        There are none, or something is neither a scene nor a problem.
+    """
+    every = (given,) if isinstance(given, (StudySource, Scene, AssignmentProblem)) else tuple(given)
+    if not every:
+        raise InvalidInputError("the study has no scenes and no problems")
+    found = []
+    for number, one in enumerate(every, start=1):
+        if isinstance(one, (Scene, AssignmentProblem)):
+            kind = "scene" if isinstance(one, Scene) else "problem"
+            one = StudySource(one, getattr(one, "name", "") or f"{kind} {number}")
+        if not isinstance(one, StudySource):
+            raise InvalidInputError(f"sources: expected scenes or problems, got a {type(one).__name__}")
+        found.append(one)
+    names = [one.name for one in found]
+    # tables tell sources apart by their names
+    return tuple(
+        replace(one, name=f"{one.name} ({number})") if names.count(one.name) > 1 else one
+        for number, one in enumerate(found, start=1)
+    )

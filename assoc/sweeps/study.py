@@ -7,12 +7,15 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from assoc._parameters import checked_time_limit, is_whole, whole_seed
+from assoc._system.door import doors
+from assoc._text.shown import Shown
 from assoc._version import __version__
 from assoc.errors import InvalidInputError
 from assoc.sweeps.backends.batches import Batches, RunNumbers
 from assoc.sweeps.code_digest import code_digest
 from assoc.sweeps.setting import Setting
-from assoc.sweeps.sources import StudySource
+from assoc.sweeps.sources import study_sources
 from assoc.sweeps.store import Manifest, RunKey, Store
 from assoc.sweeps.worker import Job, Result
 
@@ -46,19 +49,21 @@ class Counts:
         return self.before + self.new
 
 
-@dataclass(frozen=True)
-class Study:
+@doors
+@dataclass(frozen=True, repr=False)
+class Study(Shown):
     """Settings to run on scenes and problems.
 
     Parameters
     ----------
-    sources : sequence of StudySource
-        Scenes and problems. Each scan is a run of its own.
-    settings : sequence of Setting
+    sources : Scene, AssignmentProblem, or sequence of them
+        Each scan is a run of its own. Sources that are given with a name (`StudySource`) keep it.
+    settings : Setting or sequence of Setting
+        As from `grid`.
     repeats : int, or range
         Number of runs of each setting on each scan, each with its own seed; or which ones.
-    seed : int, default 0
-        All seeds derive from it and from what a run is.
+    seed : int or None, default 0
+        All seeds derive from it and from what a run is; None: a random one.
     time_limit : float, optional
         Seconds for each run.
     gating : mapping
@@ -72,32 +77,39 @@ class Study:
         No settings or no sources, or numbers out of range.
     """
 
-    sources: Sequence[StudySource]
-    settings: Sequence[Setting]
+    sources: Any
+    settings: Any
     repeats: int | range = 1
-    seed: int = 0
+    seed: int | None = 0
     time_limit: float | None = None
     gating: Mapping[str, Any] = field(default_factory=dict)
     scans: Sequence[Sequence[int]] | None = None
 
     def __post_init__(self) -> None:
-        if not self.settings:
-            raise InvalidInputError("the design is empty: no settings to run")
-        if not self.sources:
-            raise InvalidInputError("the study has no scenes and no problems")
-        if isinstance(self.repeats, int):
-            if self.repeats < 1:
+        put = object.__setattr__
+        put(self, "settings", _settings(self.settings))
+        put(self, "sources", study_sources(self.sources))
+        put(self, "seed", whole_seed(self.seed))
+        if not isinstance(self.repeats, range):
+            if not is_whole(self.repeats, 1):
                 raise InvalidInputError(f"repeats: expected a whole number >= 1, got {self.repeats!r}")
-            object.__setattr__(self, "repeats", range(self.repeats))
+            put(self, "repeats", range(self.repeats))
+        put(self, "time_limit", checked_time_limit(self.time_limit))
         if self.scans is None:
-            object.__setattr__(self, "scans", [range(source.num_scans) for source in self.sources])
-        object.__setattr__(self, "settings", tuple(dict.fromkeys(self.settings)))
+            put(self, "scans", [range(source.num_scans) for source in self.sources])
+        if not all(isinstance(one, Sequence) and all(map(is_whole, one)) for one in self.scans or ()):
+            raise InvalidInputError("scans: expected the numbers of the scans of each source, as ranges")
+        if not isinstance(self.gating, Mapping):
+            raise InvalidInputError(f"gating: expected a mapping, got {type(self.gating).__name__}")
+
+    def __repr__(self) -> str:
+        return f"Study({len(self.settings)} settings, {len(self.sources)} sources, {self.size} runs)"
 
     @property
     def manifest(self) -> Manifest:
         """What a folder must say to hold this study."""
         names = {source.fingerprint: source.name for source in self.sources}
-        return Manifest(__version__, self.seed, names, self.time_limit, dict(self.gating), code_digest())
+        return Manifest(__version__, whole_seed(self.seed), names, self.time_limit, dict(self.gating), code_digest())
 
     @property
     def size(self) -> int:
@@ -180,7 +192,7 @@ class Study:
             progress(counts)
         if missing == 0:
             return counts
-        job = Job(tuple(self.sources), self.seed, self.time_limit, self.gating, __version__, code_digest())
+        job = Job(tuple(self.sources), whole_seed(self.seed), self.time_limit, self.gating, __version__, code_digest())
         seconds = local.SECONDS_OF_A_BATCH if scheduler is None else dask.SECONDS_OF_A_BATCH
         batches = Batches(self.settings, self.missing(store), seconds)
         results: Generator[Result]
@@ -202,3 +214,16 @@ class Study:
         finally:
             results.close()
         return counts
+
+
+def _settings(given: Any) -> tuple[Setting, ...]:
+    """All settings, each once."""
+    if isinstance(given, Setting):
+        return (given,)
+    for one in given:
+        if not isinstance(one, Setting):
+            raise InvalidInputError(f"settings: expected settings as from grid, got a {type(one).__name__}")
+    found = tuple(dict.fromkeys(given))
+    if not found:
+        raise InvalidInputError("the design is empty: no settings to run")
+    return found

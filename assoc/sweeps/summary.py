@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval, weighted_mean
 from assoc.sweeps.frame import RESULTS, load
@@ -26,6 +27,7 @@ FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
 """What measures are multiplied by where people read them: per cent, milliseconds."""
 
 
+@door
 def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
     """Average the runs of each setting.
 

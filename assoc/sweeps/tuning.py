@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._system.door import door
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
 from assoc.solution import OPTIMALITY_TOLERANCE
@@ -19,7 +20,7 @@ from assoc.solvers import registry
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.frame import load
 from assoc.sweeps.setting import Setting, parameter
-from assoc.sweeps.sources import StudySource
+from assoc.sweeps.sources import StudySource, study_sources
 from assoc.sweeps.space import Range, Space, Values
 from assoc.sweeps.store import REPORT, RunKey, Store, read_log, read_manifest, run_keys
 from assoc.sweeps.study import Counts, Study
@@ -69,6 +70,7 @@ class Report:
     held_out: str
 
 
+@door
 def tune(
     folder: str | os.PathLike[str],
     sources: Sequence[StudySource],
@@ -93,7 +95,7 @@ def tune(
     Parameters
     ----------
     folder : path-like
-    sources : sequence of StudySource
+    sources : Scene, AssignmentProblem, or sequence of them
     solver : str
     space : mapping, optional
         Values or range of each parameter; without it the solver's numbers from a quarter of their default to
@@ -125,6 +127,7 @@ def tune(
     ranges = dict(space) if space else default_space(solver)
     if not any(isinstance(one, Range) or len(one.values) > 1 for one in ranges.values()):
         raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
+    sources = study_sources(sources)
     every = [list(one) for one in scans] if scans is not None else [list(range(one.num_scans)) for one in sources]
     training, test, words = _split(every, repeats)
 

@@ -1,4 +1,4 @@
-"""A tracker's state in a file: saved, checked, restored.
+"""A tracker's state, in memory before a step and in a file: saved, checked, restored.
 
 What is read is checked before it is used: kernels do not check indices.
 """
@@ -12,7 +12,7 @@ import os
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -159,6 +159,45 @@ def described(thing: object) -> str:
         return f"{type(thing).__name__}({', '.join(inside)})"
     plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
     return repr(thing) if plain else type(thing).__name__
+
+
+class Memory(NamedTuple):
+    """A tracker as it was once. Steps replace arrays and do not write to them, so that nothing need be copied."""
+
+    values: dict[str, Any]
+    rng: Any
+
+    @classmethod
+    def of(cls, tracker: Any) -> Memory:
+        """Remember a tracker."""
+        rng = getattr(tracker.filter, "rng", None)
+        return cls(_with_own_lists(vars(tracker)), None if rng is None else rng.bit_generator.state)
+
+    def restore(self, tracker: Any) -> None:
+        """Make the tracker what it was; the memory stays good for another time."""
+        vars(tracker).update(_with_own_lists(self.values))
+        if self.rng is not None:
+            tracker.filter.rng.bit_generator.state = self.rng
+
+    @property
+    def time(self) -> float | None:
+        """Time of the last step before, seconds."""
+        when: float | None = self.values["_time"]
+        return when
+
+    @property
+    def next_id(self) -> int:
+        """Tracks that began later have this id or a larger one."""
+        return int(self.values["_next_id"])
+
+    @property
+    def track_ids(self) -> set[int]:
+        """Ids of the tracks that lived."""
+        return set(self.values["_batch"].track_id.tolist())
+
+
+def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
 class Checkpoint(ABC):

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
@@ -63,6 +64,7 @@ class PairProbabilities:
     upper: Array
 
 
+@doors
 class JointProbabilisticTracker(Tracker):
     """Joint integrated probabilistic data association, with certified probabilities.
 
@@ -174,7 +176,7 @@ class JointProbabilisticTracker(Tracker):
     def _begin(self, s: int, z: Array, taken: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array]:
         """New tracks of measurements that are rather no track's, and their numbers."""
         free = np.flatnonzero(taken < 0.5)
-        states, fit, positions, score = self._singles(s, z[free])
+        states, fit, positions, score = self._new_tracks.singles(s, z[free])
         free = free[fit]
         when = np.full(len(free), time) if stamps is None else stamps[free]
         order = np.lexsort((*positions.T, when))

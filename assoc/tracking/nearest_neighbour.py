@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.own_times import score_costs
 from assoc.costs.tracks.scores import doubted_gain
@@ -21,6 +22,7 @@ from assoc.tracking.tracker import Tracker
 Rule = Literal["greedy", "assignment"]
 
 
+@doors
 class NearestNeighbourTracker(Tracker):
     """The plain tracker that others are measured against.
 
@@ -67,7 +69,7 @@ class NearestNeighbourTracker(Tracker):
             chosen = self._choose(pairs.track, pairs.measurement, gain, missed, batch.score, len(z))
             batch, hit, ids = self._take_in(batch, pairs, chosen, s, len(z), time)
             free = np.flatnonzero(ids == 0)
-            states, fit, positions, score = self._singles(s, z[free])
+            states, fit, positions, score = self._new_tracks.singles(s, z[free])
             free = free[fit]
             order = np.lexsort(positions.T)
             new = self._new_ids(len(free))

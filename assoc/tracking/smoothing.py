@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.costs.positions import positions_and_covariances
 from assoc.errors import InvalidInputError
@@ -24,6 +25,7 @@ from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
 
 
+@door
 def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> TrackTable:
     """Smooth the confirmed tracks of a scene.
 

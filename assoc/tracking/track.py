@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from assoc._text.shown import Shown
 from assoc._types import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Track:
+class Track(Shown):
     """One target as a tracker sees it at one time.
 
     Attributes
@@ -65,8 +66,8 @@ class Track:
         return f"Track({self.track_id}, {kind}, ({place}) m at {self.time:g} s, score {self.score:.4g})"
 
 
-@dataclass(frozen=True, eq=False)
-class Decision:
+@dataclass(frozen=True, eq=False, repr=False)
+class Decision(Shown):
     """Which track each measurement of one scan went to.
 
     Attributes
@@ -86,10 +87,15 @@ class Decision:
     assigned: tuple[Array, ...]
     confirmed: tuple[Array, ...]
 
+    def __repr__(self) -> str:
+        sizes = " + ".join(str(len(one)) for one in self.assigned)
+        tracks = len({int(one) for ids in self.assigned for one in ids if one > 0})
+        return f"{type(self).__name__}(scan {self.scan}, t = {self.time:g} s: {sizes} measurements, {tracks} tracks)"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Step(Decision):
-    """What one step of a tracker did; for a tracker that defers decisions, its opinion so far.
+    """What one step of a tracker did; for a tracker that defers decisions, what it would decide now.
 
     Attributes
     ----------

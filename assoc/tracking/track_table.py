@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door, doors
+from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
@@ -31,7 +33,8 @@ of the filter's estimate and not from plot to plot), the heading in degrees, clo
 compass heading."""
 
 
-class TrackTable:
+@doors
+class TrackTable(Shown):
     """Collects tracks of scan after scan.
 
     It grows with what it is given; trackers do not. Write parts of it away where a recording never ends.
@@ -47,6 +50,9 @@ class TrackTable:
     targets : dict of int to str
         Name of the target that a track followed most, where the truth has names: column target.
     """
+
+    def __repr__(self) -> str:
+        return f"TrackTable({len({row[0] for row in self._rows})} tracks, {len(self._rows)} rows)"
 
     def __init__(self, origin: Origin | None = None) -> None:
         self.origin = origin
@@ -142,6 +148,7 @@ class TrackTable:
         return times, ids, np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
 
 
+@door
 def track_scene(
     tracker: Tracker, scene: Scene, *, confirmed: bool = True, scans: Iterable[int] | None = None
 ) -> tuple[TrackTable, list[Decision]]:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from assoc._parameters import whole_seed
+from assoc._system.door import doors
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
-from assoc.costs.positions import positions_and_covariances, single_positions
-from assoc.costs.tracks.own_times import Places, TimedScan
-from assoc.costs.tracks.scores import log_birth, score_terms
+from assoc.costs.tracks.own_times import TimedScan
+from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter, predict_each
 from assoc.filters.state import Gaussian
@@ -29,11 +30,12 @@ from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.checking import checked_measurements
-from assoc.tracking.checkpoint import Checkpoint
+from assoc.tracking.checkpoint import Checkpoint, Memory
 from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.initiation import Initiation
-from assoc.tracking.joint_starts import Crossings, crossings
+from assoc.tracking.joint_starts import Crossings
 from assoc.tracking.life_cycle import LifeCycle
+from assoc.tracking.new_tracks import NewTracks
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch, empty_batch
 
@@ -45,33 +47,7 @@ _FORGETTING = 0.05
 _LEAST_TURN = 1e-3
 
 
-class Memory(NamedTuple):
-    """A tracker as it was once. Steps replace arrays and do not write to them, so that nothing need be copied."""
-
-    values: dict[str, Any]
-    rng: Any
-
-    @property
-    def time(self) -> float | None:
-        """Time of the last step before, seconds."""
-        when: float | None = self.values["_time"]
-        return when
-
-    @property
-    def next_id(self) -> int:
-        """Tracks that began later have this id or a larger one."""
-        return int(self.values["_next_id"])
-
-    @property
-    def track_ids(self) -> set[int]:
-        """Ids of the tracks that lived."""
-        return set(self.values["_batch"].track_id.tolist())
-
-
-def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: list(value) if isinstance(value, list) else value for name, value in values.items()}
-
-
+@doors
 class Tracker(Checkpoint):
     """A tracker: call `step` for each scan in turn; memory does not grow with the number of scans.
 
@@ -118,7 +94,7 @@ class Tracker(Checkpoint):
         region: Array | None = None,
         solver: str = "exact",
         solver_parameters: Mapping[str, Any] | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         time_limit: float | None = None,
         life_cycle: LifeCycle | None = None,
         initiation: Initiation | None = None,
@@ -139,9 +115,7 @@ class Tracker(Checkpoint):
         self.solver = solver
         self.solver_parameters = dict(solver_parameters or {})
         make_parameters(solver, self.solver_parameters)
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
-        self.seed = int(seed)
+        self.seed = whole_seed(seed)
         self.time_limit = time_limit
         good = isinstance(gate_probability, (int, float, np.floating)) and not isinstance(gate_probability, bool)
         if not good or not 0 < gate_probability < 1:
@@ -154,9 +128,7 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
         self.registration = registration
         self.terms = score_terms(self.sensors)
-        # a target that appears with a sensor's measurement was missed by the sensors before it
-        self._appears = self.terms.birth + np.cumsum(self.terms.miss) - self.terms.miss
-        self._widest = self.initiation.widest * float(np.linalg.norm(np.diff(self._place.region, axis=1)))
+        self._new_tracks = NewTracks(self._place, self.filter, self.initiation, self.terms)
         self._time: float | None = None
         self._pace = 0.0
         self._turns = np.ones(len(self.sensors))
@@ -303,14 +275,11 @@ class Tracker(Checkpoint):
 
     def remember(self) -> Memory:
         """What a step may change, for `go_back`; costs next to nothing."""
-        rng = getattr(self.filter, "rng", None)
-        return Memory(_with_own_lists(vars(self)), None if rng is None else rng.bit_generator.state)
+        return Memory.of(self)
 
     def go_back(self, memory: Memory) -> None:
         """Be again as when `remember` was called; the memory stays good for another time."""
-        vars(self).update(_with_own_lists(memory.values))
-        if memory.rng is not None:
-            self.filter.rng.bit_generator.state = memory.rng  # type: ignore[attr-defined]
+        memory.restore(self)
 
     @abstractmethod
     def _step(self, scan: Scan) -> Step:
@@ -342,21 +311,13 @@ class Tracker(Checkpoint):
 
     def _timed(self, scan: Scan) -> TimedScan:
         """The tracks and a scan whose measurements have times of their own."""
-        positions, covariances, fit, births = [], [], [], []
-        for s, z in enumerate(scan.measurements):
-            where, spread = single_positions(self._place, s, z)
-            positions.append(where)
-            covariances.append(np.asarray(spread))
-            fit.append(self._narrow(covariances[s]))
-            births.append(self.terms.birth[s] + self._log_birth(covariances[s]))
-
         def start(where: Array, spread: Array, lag: Array) -> Any:
             return self.initiation.start(self.filter, where, spread, lag)
 
         before = scan.time if self._time is None else self._time
         return TimedScan(
             self.filter, self._batch.states, before, scan.measurements, scan.own_times(), self.sensors,
-            Places(positions, covariances, fit, births), start, scan.sectors, self.gate_probability,
+            self._new_tracks.places(scan.measurements), start, scan.sectors, self.gate_probability,
             scan.time,
         )  # fmt: skip
 
@@ -403,59 +364,13 @@ class Tracker(Checkpoint):
         patience = self.life_cycle.patience(self.terms.miss * (self._turns / most), self._pace / most)
         return batch.to_delete(self.life_cycle, time, patience)
 
-    def _fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
-        """Positions, covariances, and which of them are narrow enough to start a track."""
-        positions, covariances = positions_and_covariances(self._place, scan, tuples)
-        return positions, covariances, self._narrow(covariances)
-
-    def _narrow(self, covariances: Array) -> Array:
-        # heights are the scene's own where radars do not tell them: they do not forbid a track
-        limit = self._widest**2
-        if len(self.filter.motion.position) == 1:
-            return np.asarray(covariances[:, 0, 0] <= limit)
-        return np.asarray((covariances[:, 0, 0] <= limit) & (covariances[:, 1, 1] <= limit))
-
-    def _log_birth(self, covariances: Array) -> Array:
-        """What new targets add to the score of their measurements, by the covariances of their positions."""
-        return log_birth(covariances, self._place.region, self.initiation.birth_rate)
-
-    def _new_scores(self, rows: Array, costs: Array, covariances: Array) -> Array:
-        """Scores of tuples (K, S) as new targets, by their costs and the covariances of their positions."""
-        seen = rows > 0
-        # to `tuple_costs` a single measurement is a false alarm
-        alone = seen @ self.terms.birth + ~seen @ self.terms.miss
-        return np.asarray(np.where(seen.sum(axis=1) == 1, alone, -costs) + self._log_birth(covariances))
-
-    def _singles(self, s: int, measured: Array) -> tuple[Any, Array, Array, Array]:
-        """New tracks of single measurements (n, d) of sensor s: states, which can start one, where, and scores."""
-        positions, covariances = single_positions(self._place, s, measured)
-        fit = self._narrow(covariances)
-        if not fit.all():
-            positions, covariances = positions[fit], covariances[fit]
-        scores = self._appears[s] + self._log_birth(covariances)
-        return self.initiation.start(self.filter, positions, covariances), fit, positions, scores
-
     def __repr__(self) -> str:
         when = "not started" if self._time is None else f"{self._scan} scans, {self._time:g} s"
         return f"{type(self).__name__}({len(self.sensors)} sensors, {self.solver}, {when})"
 
     def _crossings(self, scan: Scan, free: Sequence[Array]) -> tuple[Crossings, Array] | None:
-        """Tuples that may start tracks where all sensors measure angles alone, and their scores as new targets.
-
-        `free` are masks over the measurements of each sensor; see `assoc.tracking.joint_starts`.
-        """
-        # angles alone tell no distance
-        if not all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors):
-            return None
-        found = crossings(
-            self._place, scan, free, gate_probability=self.gate_probability, max_tuples=self.max_tuples,
-            speed=self.initiation.speed,
-        )  # fmt: skip
-        if found is None:
-            return None
-        fit = self._narrow(found.covariances)
-        kept = Crossings(*(one[fit] for one in found))
-        return kept, self._new_scores(kept.rows, kept.costs, kept.covariances)
+        options = {"gate_probability": self.gate_probability, "max_tuples": self.max_tuples}
+        return self._new_tracks.crossings(scan, free, **options)
 
     def _crossed(self, scan: Scan, assigned: list[Array]) -> TrackBatch:
         """New tracks of what is left over of sensors that start none alone; their ids are put into `assigned`."""

@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,9 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 TABLE, QUICK_TABLE, README = Path("docs/benchmarks.csv"), Path("docs/benchmarks-quick.csv"), Path("README.md")
-FAMILIES = ("paper", "gated", "ghost", "known optimum", "random axial", "planted", "scale", "kbest")
+# what a brief run gives other solvers, in seconds
+_BRIEF_LIMIT = 5.0
+FAMILIES = ("paper", "gated", "ghost", "wide gap", "known optimum", "random axial", "planted", "scale", "kbest")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -35,7 +38,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
     parser.add_argument("--solvers", nargs="+", metavar="NAME", help="only these solvers, ours and others")
     parser.add_argument(
-        "--seeds", type=int, metavar="N", help="number of seeds for each size (default: each family's own)"
+        "--seeds", type=int, metavar="N", help="seeds of each size at the most (default: each family's own number)"
+    )
+    parser.add_argument(
+        "--peer-limit", type=float, metavar="S", help="time limit of other solvers at the most, in seconds"
+    )
+    parser.add_argument(
+        "--brief",
+        action="store_true",
+        help="everything in some 25 minutes: two seeds (ghosts up to ten), and other solvers get 5 s",
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help=f"the rows (default {TABLE})")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
@@ -59,6 +70,8 @@ def main(argv: list[str] | None = None) -> int:
             parser.error(f"--families: unknown {name!r}; known: {', '.join(FAMILIES)}")
     if options.seeds is not None and options.seeds < 1:
         parser.error(f"--seeds: expected at least 1, got {options.seeds}")
+    if options.peer_limit is not None and not options.peer_limit > 0:
+        parser.error(f"--peer-limit: expected more than 0 seconds, got {options.peer_limit:g}")
     table: Path = options.csv or (QUICK_TABLE if options.quick else TABLE)
     report: Path = options.markdown or table.with_suffix(".md")
     if options.report_only and not table.exists():
@@ -69,7 +82,7 @@ def main(argv: list[str] | None = None) -> int:
     from experiments.benchmarks import rows as storage
 
     def write(minutes: float | None) -> None:
-        command = "make bench-quick" if options.quick else "make bench"
+        command = _command(options)
         storage.save(table, rows)
         write_text(report, reporting.render(rows, minutes, command, options.remark))
         if table == TABLE and README.exists():
@@ -94,6 +107,19 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the same run."""
+    words = ["python -m experiments.benchmarks"]
+    words += ["--quick"] if options.quick else []
+    words += ["--brief"] if options.brief else []
+    for name in ("families", "sizes", "solvers"):
+        if getattr(options, name):
+            words += [f"--{name}", *(value.replace(" ", "_") for value in getattr(options, name))]
+    words += [f"--seeds {options.seeds}"] if options.seeds else []
+    words += [f"--peer-limit {options.peer_limit:g}"] if options.peer_limit else []
+    return " ".join(words)
+
+
 def _to_run(what: Row | Case, families: list[str], sizes: list[str] | None) -> bool:
     return what.family in families and (sizes is None or what.size in sizes)
 
@@ -113,6 +139,11 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
         print(text, file=sys.stderr, flush=True)
 
     chosen = [case for case in cases(options.quick) if _to_run(case, families, options.sizes)]
+    if options.brief:
+        chosen = [replace(case, seeds=case.brief, chosen=case.chosen[: case.brief]) for case in chosen]
+        options.peer_limit = options.peer_limit or _BRIEF_LIMIT
+    if options.peer_limit is not None:
+        chosen = [case.with_peers_within(options.peer_limit) for case in chosen]
     if options.solvers:
         chosen = [case.restricted_to(options.solvers) for case in chosen]
     run.warm_up(
@@ -122,9 +153,9 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
     for case in chosen:
         yield run.run_case(case, options.seeds, log)
     if "scale" in families:
-        yield scale.run(options.quick, options.seeds, log)
+        yield scale.run(options.quick, 2 if options.brief else options.seeds, log)
     if "kbest" in families:
-        yield ranking.run(options.quick, options.seeds, log)
+        yield ranking.run(options.quick, 2 if options.brief else options.seeds, log)
 
 
 if __name__ == "__main__":

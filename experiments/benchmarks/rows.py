@@ -37,6 +37,8 @@ class Row:
         (``-inf``: none).
     seconds : float
         Wall time from the tuples to the answer.
+    cpu : float
+        Processor time of that, all threads together; 0: not measured.
     status : str
         "optimal" where the solver itself proves it, "feasible", or "none".
     reference : float
@@ -44,7 +46,8 @@ class Row:
     proven : bool
         Whether the reference is the optimum.
     extra : float
-        Peak memory in MB (family scale), solutions ranked (family kbest); 0 elsewhere.
+        Peak memory in MB (family scale), solutions ranked (family kbest), share of the optimum by which the linear
+        program's bound is below it (families of ghosts); 0 elsewhere.
     """
 
     family: str
@@ -62,6 +65,7 @@ class Row:
     reference: float = math.nan
     proven: bool = False
     extra: float = 0.0
+    cpu: float = 0.0
 
     @property
     def gap(self) -> float:
@@ -115,7 +119,7 @@ def load(path: Path) -> list[Row]:
         for record in csv.DictReader(file):
             values: dict[str, object] = {}
             for field in fields(Row):
-                text = record[field.name]
+                text = record.get(field.name) or "0"
                 if field.type == "bool":
                     values[field.name] = text == "True"
                 else:

@@ -17,12 +17,15 @@ from assoc.solution import TracePoint
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import HEURISTICS, Case, Entry, Instance
 from experiments.benchmarks.rows import Row
+from experiments.benchmarks.wide_gaps import linear_bound
 from experiments.common import peers
 from experiments.common.checking import check_answer
 from experiments.common.instances import scenes, synthetic
 
 PROVING = ("exact", "milp")
 UNLIMITED = 1_000_000_000
+# families whose rows tell the gap of the linear program
+GHOSTS = ("ghost", "wide gap")
 
 
 @contextlib.contextmanager
@@ -64,12 +67,13 @@ def run_case(
     case : Case
         What to run.
     seeds : int, optional
-        Number of seeds instead of the case's own.
+        Number of seeds at the most; by default all of the case.
     log : callable
         Told what was done, line by line.
     """
     rows: list[Row] = []
-    for seed in range(FIRST_SEED, FIRST_SEED + (seeds or case.seeds)):
+    every = case.chosen or range(FIRST_SEED, FIRST_SEED + case.seeds)
+    for seed in every[:seeds]:
         for item, instance in enumerate(case.make(seed)):
             found = _run_instance(case, instance, seed, item)
             rows += found
@@ -97,7 +101,8 @@ def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[
         optimum = _proven_optimum(rows)
     rows += [_run_ours(entry, problem, blank, optimum) for entry in case.ours if entry not in first]
     reference = optimum if optimum is not None else min(row.cost for row in rows)
-    return [replace(row, reference=reference, proven=optimum is not None) for row in rows]
+    gap = (reference - linear_bound(problem)) / max(1.0, abs(reference)) if case.family in GHOSTS else 0.0
+    return [replace(row, reference=reference, proven=optimum is not None, extra=gap) for row in rows]
 
 
 def _proven_optimum(rows: list[Row]) -> float | None:
@@ -107,7 +112,9 @@ def _proven_optimum(rows: list[Row]) -> float | None:
 
 
 def _run_peer(entry: Entry, problem: AssignmentProblem, blank: Row) -> Row:
+    before = time.process_time()
     answer = peers.PEERS[entry.solver](problem, entry.limit)
+    cpu = time.process_time() - before
     status = "optimal" if answer.proven else "feasible" if math.isfinite(answer.cost) else "none"
     return replace(
         blank,
@@ -118,6 +125,7 @@ def _run_peer(entry: Entry, problem: AssignmentProblem, blank: Row) -> Row:
         bound=-math.inf if answer.bound is None else answer.bound,
         seconds=answer.seconds,
         status=status,
+        cpu=cpu,
     )
 
 
@@ -133,7 +141,7 @@ def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: flo
     # what a limit gives them they use: by default they leave a part that has not become better for a while
     options = {"patience": UNLIMITED, "iterations": UNLIMITED} if entry.solver in HEURISTICS else {}
     with one_core():
-        start = time.perf_counter()
+        start, before = time.perf_counter(), time.process_time()
         try:
             # A new problem each time: nothing that an earlier solver prepared may be left in it.
             fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
@@ -141,7 +149,7 @@ def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: flo
         except InfeasibleError:
             seconds = time.perf_counter() - start
             return replace(blank, solver=entry.label, limit=entry.limit, seconds=seconds, status="none")
-        seconds = time.perf_counter() - start
+        seconds, cpu = time.perf_counter() - start, time.process_time() - before
     cost = check_answer(problem, solution.tuples)
     if abs(cost - solution.cost) > 1e-7 * max(1.0, abs(cost)):
         raise AssertionError(f"{entry.solver}: says {solution.cost}, its tuples cost {cost}")
@@ -155,4 +163,5 @@ def _run_ours(entry: Entry, problem: AssignmentProblem, blank: Row, optimum: flo
         bound=solution.lower_bound,
         seconds=seconds,
         status=solution.status,
+        cpu=cpu,
     )

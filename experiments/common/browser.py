@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Any
 
 import pytest
 
+_UNPACKING = """return document.getElementById('packed') && !document.documentElement.dataset.ready
+  && document.getElementById('failure').hidden"""
 DESKTOP, PHONE = (1280, 900), (390, 844)
 
 
@@ -55,6 +58,10 @@ def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment:
     browser.get_log("browser")  # what an earlier page said
     browser.get("about:blank")
     browser.get(page.resolve().as_uri() + fragment)
+    # the script of a report is unpacked when the page is there
+    last = time.monotonic() + 60.0
+    while browser.execute_script(_UNPACKING) and time.monotonic() < last:
+        time.sleep(0.02)
 
 
 def complaints(browser: Any) -> list[str]:

@@ -10,6 +10,10 @@ computed by `experiments.common.checking`, not by the peer.
 ``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
 ``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
 ``nrl_tracker``         PyPI ``nrl-tracker``: relaxation on a dense axial tensor (small problems only)
+``chils``               CHILS, local search for the heaviest independent set (packing_peers.py)
+``branch_reduce``       KaMIS's branch and reduce for it
+``mmwis``               KaMIS's memetic algorithm for it
+``kap``                 PyPI ``kap``: multiple Hungarian method on the costs of pairs
 ======================  ==========================================================================
 """
 
@@ -23,12 +27,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
+from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csc_array
 
 from assoc.problem import AssignmentProblem
+from experiments.common import packing_peers
 from experiments.common.checking import check_answer
+from experiments.common.sequential import assign_in_turn
 
+PACKING_PEERS = ("chils", "branch_reduce", "mmwis", "kap")
 CP_SAT_SCALE = 1e6
 DENSE_LIMIT = 8_000_000
 
@@ -167,81 +174,6 @@ def _highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
     return np.flatnonzero(result.x > 0.5), bound, result.status == 0
 
 
-def _sequential(problem: AssignmentProblem, time_limit: float) -> Chosen:
-    """Assign sensor after sensor to the clusters so far; a cluster's cost is its tuple over the sensors seen.
-
-    With dummies a cluster costs what its tuple with all later sensors missed costs, and one that is not
-    listed cannot be formed: this is what a tracker knows when it goes from sensor to sensor. An axial
-    problem has no such tuples; there a cluster is scored by its best completion.
-    """
-    tuples, costs = problem.tuples, problem.costs
-    num_sensors = problem.num_sensors
-    group = np.arange(problem.sizes[0]) + 1
-    clusters = group[:, None].astype(np.int32)
-    for sensor in range(1, num_sensors):
-        size = int(problem.sizes[sensor])
-        whole = ~tuples[:, sensor + 1 :].any(axis=1) if problem.dummy else np.ones(len(tuples), dtype=bool)
-        price = _prefix_costs(tuples[whole, : sensor + 1], costs[whole])
-        now = np.array([price.get((*row, 0), np.inf) for row in clusters.tolist()])
-        alone = np.array([price.get((*([0] * sensor), j + 1), np.inf) for j in range(size)])
-        matrix = np.full((len(clusters), size), np.inf)
-        where = {tuple(row): i for i, row in enumerate(clusters.tolist())}
-        for key, cost in price.items():
-            i = where.get(key[:-1])
-            if i is not None and key[-1]:
-                matrix[i, key[-1] - 1] = cost
-        clusters = _extend(clusters, matrix, now, alone, must_pair=not problem.dummy)
-    listed: dict[tuple[int, ...], int] = {}
-    for i in np.argsort(-costs, kind="stable"):
-        listed[tuple(tuples[i].tolist())] = int(i)
-    chosen: list[int] = []
-    for row in clusters.tolist():
-        if tuple(row) in listed:
-            chosen.append(listed[tuple(row)])
-        elif all(row) or problem.dummy:
-            return None, None, False
-    return np.array(chosen, dtype=np.intp), None, False
-
-
-def _prefix_costs(prefixes: NDArray[np.int32], costs: NDArray[np.float64]) -> dict[tuple[int, ...], float]:
-    """Return the least cost of any listed tuple that begins with each prefix."""
-    keys, inverse = np.unique(prefixes, axis=0, return_inverse=True)
-    least = np.full(len(keys), np.inf)
-    np.minimum.at(least, inverse.ravel(), costs)
-    return {tuple(key): cost for key, cost in zip(keys.tolist(), least.tolist(), strict=True)}
-
-
-def _extend(
-    clusters: NDArray[np.int32],
-    matrix: NDArray[np.float64],
-    now: NDArray[np.float64],
-    alone: NDArray[np.float64],
-    *,
-    must_pair: bool,
-) -> NDArray[np.int32]:
-    """Solve one 2-D assignment of clusters to measurements and append its column."""
-    num, size = matrix.shape
-    large = 1e6
-    if must_pair:
-        square = np.where(np.isfinite(matrix), matrix, large)
-    else:
-        # What pairing gains over leaving both apart; each cluster has a private "missed" column.
-        apart = np.where(np.isfinite(now), now, 0.0)[:, None] + np.where(np.isfinite(alone), alone, 0.0)
-        square = np.full((num, size + num), large)
-        square[:, :size] = np.where(np.isfinite(matrix), matrix - apart, large)
-        square[np.arange(num), size + np.arange(num)] = 0.0
-    row, column = linear_sum_assignment(square)
-    paired = (column < size) & (square[row, column] < large / 2)
-    extended = np.concatenate([clusters, np.zeros((num, 1), dtype=np.int32)], axis=1)
-    extended[row[paired], -1] = column[paired] + 1
-    if must_pair:
-        return extended
-    left = np.setdiff1d(np.arange(size), column[paired])
-    new = np.zeros((len(left), extended.shape[1]), dtype=np.int32)
-    new[:, -1] = left + 1
-    return np.concatenate([extended, new])
-
-
 def dense_elements(problem: AssignmentProblem) -> float:
     """Return the elements of the dense axial tensor that ``nrl_tracker`` needs.
 
@@ -318,7 +250,7 @@ def highs(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
 
 def sequential(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     """Two-dimensional assignments sensor by sensor, first to last; no bound."""
-    return _answer(_sequential, problem, time_limit)
+    return _answer(assign_in_turn, problem, time_limit)
 
 
 def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
@@ -334,6 +266,10 @@ def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     return _answer(_nrl_tracker, problem, time_limit)
 
 
+def _packing_peer(solve: Callable[[AssignmentProblem, float], Chosen]) -> Peer:
+    return lambda problem, time_limit: _answer(solve, problem, time_limit)
+
+
 PEERS: dict[str, Peer] = {
     "cp_sat": cp_sat,
     "scip": scip,
@@ -341,6 +277,7 @@ PEERS: dict[str, Peer] = {
     "highs": highs,
     "sequential": sequential,
     "nrl_tracker": nrl_tracker,
+    **{name: _packing_peer(getattr(packing_peers, name)) for name in PACKING_PEERS},
 }
 
 
@@ -356,4 +293,6 @@ def available(name: str, problem: AssignmentProblem) -> bool:
     """Whether a peer is installed and can take this problem."""
     if name == "nrl_tracker":
         return importlib.util.find_spec("pytcl") is not None and dense_elements(problem) <= DENSE_LIMIT
+    if name in PACKING_PEERS:
+        return packing_peers.available(name, problem)
     return name in PEERS

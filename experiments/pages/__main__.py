@@ -1,4 +1,4 @@
-"""Write the tables of the pages (papers, filters, recordings, sweeps in docs) from the published results.
+"""Write the tables of the pages (papers, filters, solvers and others in docs) from the published results.
 
     python -m experiments.pages [--check]
 
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.pages import coverage, measured
+from experiments.pages import coverage, measured, metaheuristics
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TABLES: dict[str, dict[str, Callable[[], str]]] = {
@@ -21,6 +21,8 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "filters.md": measured.FILTERS,
     "recordings.md": measured.RECORDINGS,
     "sweeps.md": measured.SWEEPS,
+    "solvers.md": metaheuristics.SOLVERS,
+    "ant_colony.md": metaheuristics.ANT_COLONY,
 }
 """Page -> name of the table -> what makes it."""
 

@@ -11,6 +11,7 @@ from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene import Scene
 from assoc.sensors import PositionSensor
 from tests.costs.reference import all_tuples, constant, freedom, make_scene, measures_positions
+from tests.sizes import sample
 
 
 def expected_candidates(scene, probability):
@@ -50,7 +51,7 @@ def found_candidates(problem):
 
 
 @pytest.mark.parametrize("brute", [True, False])
-@pytest.mark.parametrize("probability", [0.9, 0.999, 1.0])
+@sample("probability", [0.9, 0.999, 1.0], every=3)
 @pytest.mark.parametrize(
     "kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb"]
 )

@@ -17,12 +17,13 @@ from tests.costs.reference import (
     measures_positions,
     residuals,
 )
+from tests.sizes import sample
 
 MIXES = ["RRR", "PPP", "ppp", "bbb", "rrr", "RrP", "RPb", "PbP", "pRb", "bbbb", "rrrb"]
 
 
 @pytest.mark.parametrize("kinds", MIXES)
-@pytest.mark.parametrize("seed", range(3))
+@sample("seed", range(3), every=3)
 def test_costs_are_equation_5_at_the_position_scipy_finds(kinds, seed):
     scene, truth = make_scene(kinds, seed)
     tuples = all_tuples(scene)

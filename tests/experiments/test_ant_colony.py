@@ -56,6 +56,7 @@ def test_equal_settings_confirm_nothing():
     assert found["mode paper: mean cycles over all settings"].holds is False
 
 
+@pytest.mark.slow
 def test_a_small_run(tmp_path, capsys):
     words = [
         "--scans",
@@ -81,6 +82,7 @@ def test_a_small_run(tmp_path, capsys):
     assert (tmp_path / "o" / "table_1.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_walk_written_twice_takes_as_many_cycles():
     # equations 7 to 11 once compiled in the solver, once in plain numpy: the same mean over many seeds
     scene = simulate("three-radar", seed=0, scans=10)

@@ -147,6 +147,7 @@ def test_wilsons_interval():
     assert pairs.wilson([True] * 10)[1] == 100.0
 
 
+@pytest.mark.slow
 def test_the_program(tmp_path, monkeypatch, capsys):
     # every method on one short recording
     monkeypatch.setattr(traffic, "judge", lambda *_, judge=traffic.judge: judge(1, 1, np.random.default_rng(0), 150.0))

@@ -17,6 +17,7 @@ from experiments.papers.modified_ekf import __main__ as modified_ekf
 from tests.sizes import few_or_all
 
 
+@pytest.mark.slow
 @few_or_all("module", modified_ekf, dubins_enkf)
 def test_programs_whose_claims_hold(module, tmp_path, capsys):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
@@ -48,6 +49,7 @@ def test_beta_of_b1():
     assert Setting().beta == pytest.approx(100e3 * 0.0261799**2 / 30, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_fuzzy_experiment(tmp_path, monkeypatch):
     monkeypatch.setattr(fuzzy_ekf, "SCENARIOS", {"C": manoeuvres.SCENARIOS["C"]})
     monkeypatch.setattr(fuzzy_ekf, "NEW_SCENARIOS", {})

@@ -57,6 +57,7 @@ def test_dense_dummy_problem_has_the_right_number_of_solutions() -> None:
     assert len(oracles.all_solutions(two)) == expected
 
 
+@pytest.mark.slow
 def test_oracles_agree_and_answers_check() -> None:
     shapes, infeasible = set(), 0
     for problem in oracles.small_problems(250, seed=1):

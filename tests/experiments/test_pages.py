@@ -12,7 +12,7 @@ from experiments.__main__ import EXPERIMENTS
 from experiments.common.results import RESULTS, Results, number
 from experiments.pages.__main__ import DOCS, TABLES, insert, main
 
-PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md")
+PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md", "solvers.md", "ant_colony.md")
 ROOT = Path(__file__).parents[2]
 NAMES = {one.name for one in EXPERIMENTS}
 # files of parameters that experiments write with their scores

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assoc.problem import AssignmentProblem
-from experiments.common import oracles, peers
+from experiments.common import oracles, packing_peers, peers
 from experiments.common.instances import synthetic
 
 EXACT = ["cp_sat", "scip", "scip_1", "highs"]
@@ -69,3 +69,41 @@ def test_limits() -> None:
     assert not peers.available("nrl_tracker", dense)
     with pytest.raises(MemoryError):
         peers.nrl_tracker(dense, 1.0)
+
+
+@pytest.mark.parametrize("name", ["chils", "mmwis", "branch_reduce"])
+def test_independent_sets_are_associations(name: str) -> None:
+    pytest.importorskip("chszlablib")
+    rng = np.random.default_rng(5)
+    for sizes in ((4, 4, 3), (3, 2, 3, 2), (5, 4)):
+        problem = oracles.gated_problem(rng, sizes, 0.6, "mixed", listed_singletons=0.3)
+        answer = peers.PEERS[name](problem, 0.5)
+        # a graph of some ten vertices: each of them finds its heaviest set, to the rounding of weights
+        assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-4)
+
+
+def test_conflict_graph() -> None:
+    tuples = [[1, 1], [1, 2], [2, 2], [2, 1], [1, 0], [0, 1]]
+    problem = AssignmentProblem(tuples, [-3.0, -1.0, -2.0, 4.0, -0.5, 0.25], [2, 2])
+    vertices, weights, graph = packing_peers.conflict_graph(problem)
+    # what a tuple saves against its false alarms: -0.25 + 3, -0.5 + 1, 2, and nothing
+    chosen = problem.tuples[vertices].tolist()
+    saved = dict(zip(map(tuple, chosen), weights / 1e6, strict=True))
+    assert saved == pytest.approx({(1, 1): 2.75, (1, 2): 0.5, (2, 2): 2.0}, abs=2e-6)
+    place = {tuple(row): i for i, row in enumerate(chosen)}
+    joined = {(i, j) for i, j in zip(*graph.nonzero(), strict=True)}
+    assert joined == {
+        (place[1, 1], place[1, 2]), (place[1, 2], place[1, 1]), (place[1, 2], place[2, 2]), (place[2, 2], place[1, 2]),
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="dummies"):
+        packing_peers.conflict_graph(synthetic.axial_random(3, 0))
+    assert not peers.available("chils", synthetic.axial_random(3, 0))
+
+
+def test_pairs_of_two_sensors_are_matched_exactly() -> None:
+    pytest.importorskip("kap")
+    rng = np.random.default_rng(6)
+    for _ in range(10):
+        problem = oracles.gated_problem(rng, (5, 4), 0.8, "mixed", listed_singletons=0.3)
+        answer = peers.PEERS["kap"](problem, 1.0)
+        assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-9)

@@ -18,6 +18,7 @@ def small(monkeypatch):
     monkeypatch.setattr(fusion, "CLUTTER", 1.0)
 
 
+@pytest.mark.slow
 def test_program(small, tmp_path):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert fusion.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0

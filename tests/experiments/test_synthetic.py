@@ -25,7 +25,7 @@ def test_axial_known_optimum_is_unique() -> None:
         assert ranked[0].cost == optimum < ranked[1].cost
 
 
-@pytest.mark.parametrize("sensors", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("sensors", [2, 3, 4, 5, pytest.param(6, marks=pytest.mark.slow)])
 def test_planted(sensors: int) -> None:
     for seed in range(2):
         problem, optimum = synthetic.planted(sensors, seed, targets=4)

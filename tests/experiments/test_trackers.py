@@ -12,6 +12,7 @@ from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
 
 
+@pytest.mark.slow
 def test_comparison_as_a_program(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(comparison, "NAMES", ("oracle", "multi-sensor", "static", "mht", "nearest-neighbour"))
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]

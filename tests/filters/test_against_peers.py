@@ -20,6 +20,7 @@ from assoc.filters import (
 )
 from assoc.sensors import Radar3D
 from tests.filters.common import PLACE
+from tests.sizes import sample
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -96,7 +97,7 @@ def test_filterpy_unscented():
         np.testing.assert_allclose(done.covariance[0], theirs.S, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["kalman", "ekf", "ukf"])
+@sample("kind", ["kalman", "ekf", "ukf"], every=3)
 def test_stone_soup(kind):
     from stonesoup.models.measurement.linear import LinearGaussian
     from stonesoup.models.measurement.nonlinear import CartesianToElevationBearingRange

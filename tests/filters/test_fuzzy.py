@@ -210,6 +210,7 @@ def test_an_alarm_that_watches_the_turn_rate_lets_a_steady_turn_be():
         Alarm(3, [], watches="turn rate")
 
 
+@pytest.mark.slow
 def test_a_turn_alarm_of_a_model_without_a_turn_rate_says_nothing():
     """Nothing is measured of the last component: no division by zero, and no alarm."""
     rules = growing(1.0, 9.0, [0.0, 30.0])

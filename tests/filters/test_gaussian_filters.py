@@ -94,6 +94,7 @@ def test_a_batch_is_its_targets_one_by_one():
     assert len(Gaussian.concatenate([state, state[:2]])) == 9
 
 
+@pytest.mark.slow
 def test_users_models_are_as_good_as_ours():
     rng = np.random.default_rng(3)
     state = random_state(5, rng)
@@ -130,6 +131,7 @@ def test_position_across_the_cut_of_the_azimuth():
     assert abs(enkf.update(enkf.start(state), z, RADAR).state.mean[0, 1] + 200) < 30
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*radians are expected")
 @pytest.mark.parametrize("noise", [1e-3, 1.0, 1e3])
 def test_covariances_stay_positive_definite_for_1e5_steps(noise):

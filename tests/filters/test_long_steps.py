@@ -200,6 +200,7 @@ def test_covariances_stay_positive_definite_for_many_steps(name):
     assert least.min() > 1e-12 and asymmetry.max() < 1e-12 and deviation.max() < 300
 
 
+@pytest.mark.slow
 def test_without_the_compiler_it_is_the_same():
     code = "import json; from tests.filters.test_long_steps import results; print(json.dumps(results()))"
     done = subprocess.run(

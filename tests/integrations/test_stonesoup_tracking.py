@@ -177,6 +177,7 @@ def test_false_alarms_are_dropped_and_empty_scans_pass():
     assert [(time, len(found)) for time, found in feeder] == [(ZERO, 0), (later, 0)]
 
 
+@pytest.mark.slow
 def test_another_hash_order_changes_no_bit():
     script = Path(__file__).with_name("hash_order.py")
     outputs = []

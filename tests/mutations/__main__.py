@@ -9,15 +9,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.mutations.faults import FAULTS, Fault
 
 _ROOT = Path(__file__).parents[2]
-# what tests of one fault may take; a fault may also show by never ending
-_LIMIT = 300.0
+# a fault may also show by never ending: tests may take so many times what they take without it, and this many seconds
+_LONGER, _LEAST = 5.0, 60.0
+# what the tests of one room may take without a fault
+_MOST = 1800.0
 
 
 class _Copy:
@@ -32,28 +34,28 @@ class _Copy:
         self._environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
         self._environment["PYTHONDONTWRITEBYTECODE"] = "1"
 
-    def passes(self, tests: Sequence[str]) -> tuple[bool, str]:
-        """Whether these test files pass, and pytest's last line."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
+    def passes(self, test: str, limit: float = _MOST) -> tuple[bool, str]:
+        """Whether a test file passes within so many seconds, and pytest's last line."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", test]
         try:
             done = subprocess.run(
-                command, cwd=self.folder, env=self._environment, capture_output=True, text=True, timeout=_LIMIT
+                command, cwd=self.folder, env=self._environment, capture_output=True, text=True, timeout=limit
             )
         except subprocess.TimeoutExpired:
             return False, "it did not end"
         lines = done.stdout.strip().splitlines()
         failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
         if done.returncode not in (0, 1):
-            raise RuntimeError(f"pytest could not run {' '.join(tests)}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+            raise RuntimeError(f"pytest could not run {test}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
         return done.returncode == 0, (failed or lines or [""])[-1].split(" - ")[0]
 
-    def try_fault(self, fault: Fault) -> tuple[bool, str]:
+    def try_fault(self, fault: Fault, limit: float) -> tuple[bool, str]:
         """Whether the tests notice a fault, and which."""
         path = self.folder / fault.file
         text = path.read_text(encoding="utf-8")
         path.write_text(put_in(fault, text), encoding="utf-8")
         try:
-            passed, said = self.passes([fault.test])
+            passed, said = self.passes(fault.test, limit)
         finally:
             path.write_text(text, encoding="utf-8")
         return not passed, said
@@ -85,21 +87,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="assoc-mutants-") as folder:
         copies = [_Copy(Path(folder) / str(number)) for number in range(max(parsed.processes, 1))]
-        tests = sorted({fault.test for fault in chosen})
-        passed, said = copies[0].passes(tests)
-        if not passed:
-            print(f"without any fault the tests fail: {said}", file=sys.stderr)
-            return 1
         missed = 0
         with ThreadPoolExecutor(len(copies)) as pool:
             free = list(copies)
 
-            def one(fault: Fault) -> tuple[bool, str]:
-                copy = free.pop()
+            def in_a_copy(act: Callable[[_Copy], tuple[bool, str]]) -> tuple[tuple[bool, str], float]:
+                copy, begin = free.pop(), time.monotonic()
                 try:
-                    return copy.try_fault(fault)
+                    return act(copy), time.monotonic() - begin
                 finally:
                     free.append(copy)
+
+            limits: dict[str, float] = {}
+            tests = sorted({fault.test for fault in chosen})
+            for test, ((passed, said), seconds) in zip(
+                tests, pool.map(lambda test: in_a_copy(lambda copy: copy.passes(test)), tests), strict=True
+            ):
+                if not passed:
+                    print(f"without any fault {test} fails: {said}", file=sys.stderr)
+                    return 1
+                limits[test] = max(_LONGER * seconds, _LEAST)
+
+            def one(fault: Fault) -> tuple[bool, str]:
+                return in_a_copy(lambda copy: copy.try_fault(fault, limits[fault.test]))[0]
 
             for fault, (noticed, said) in zip(chosen, pool.map(one, chosen), strict=True):
                 missed += not noticed

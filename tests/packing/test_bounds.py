@@ -9,7 +9,7 @@ from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 from tests.solvers.test_against_brute_force import installed
 
 
@@ -101,7 +101,7 @@ def test_against_linear_program(kind):
     assert max(shortfall) < 0.1
 
 
-@pytest.mark.parametrize("name", installed())
+@sample("name", installed(), every=3)
 @few_or_all("count", 20, 90)
 def test_duals_of_solutions_prove_their_bound(count, name):
     proved = 0

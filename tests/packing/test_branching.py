@@ -6,8 +6,8 @@ import pytest
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import first_solution
-from assoc.packing.branching.nodes import OpenNodes, new_node, push_children, take_node
-from assoc.packing.branching.open_nodes import OpenNodes as OpenBases
+from assoc.packing.branching.node import branch, new_work, open_node
+from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import (
     NEITHER,
     TOGETHER,
@@ -18,6 +18,7 @@ from assoc.packing.branching.pairs import (
     is_dropped,
     new_trials,
 )
+from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
@@ -94,11 +95,10 @@ def test_only_better_solutions_are_looked_for():
 
 def test_without_memory_the_deepest_node_is_given_up():
     packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
-    for kind in (OpenNodes, OpenBases):
-        nodes = kind(packing, np.zeros(packing.num_rows))
-        nodes.arrays.bound[0] = -7.0
-        nodes.grow(lambda needed: False)
-        assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
+    nodes = OpenNodes(plain_root(packing, np.zeros(packing.num_rows)))
+    nodes.arrays.bound[0] = -7.0
+    nodes.grow(lambda needed: False)
+    assert nodes.count == 0 and nodes.given_up == nodes.least_bound == -7.0
 
 
 def test_without_memory_for_its_tables_a_search_gives_up_its_root():
@@ -108,6 +108,7 @@ def test_without_memory_for_its_tables_a_search_gives_up_its_root():
     assert search.done and search.out_of_memory and search.nodes == 0 and search.lower_bound == -np.inf
 
 
+@pytest.mark.slow
 def test_the_two_children_of_a_node_partition_its_solutions():
     """Two rows of different sensors are together in one child, apart in the other: no solution is lost or twice."""
     for problem, _ in feasible(30, 75):
@@ -117,11 +118,12 @@ def test_the_two_children_of_a_node_partition_its_solutions():
         if not pairs:
             continue
         one, two = pairs[len(pairs) // 2]
-        stack = OpenNodes(packing, dual_bound(packing)).arrays
-        node = new_node(packing.arrays, stack, 1)
-        num = take_node(stack, 0, node)
+        root = plain_root(packing, dual_bound(packing))
+        stack = OpenNodes(root).arrays
+        work = new_work(packing.arrays, root.program, root.slack)
+        num = open_node(work, stack, 0, -1)
         assert num == packing.num_columns
-        assert push_children(packing.arrays, stack, 0, node, num, (one, two, 0.7), -5.0, node.duals) == 2
+        assert branch(work, stack, 0, num, (one, two), True, -5.0) == 2
         children = [set(stack.arena[stack.first[t] : stack.first[t] + stack.size[t]].tolist()) for t in range(2)]
         # the likelier one is on top
         for columns, joined in zip(children, (False, True), strict=True):
@@ -161,7 +163,7 @@ def test_a_verdict_on_a_pair_is_true():
         program, allowed, basis = relaxed(packing)
         primal = np.zeros(packing.num_columns)
         primal_values(program, basis, primal)
-        trials = new_trials(program)
+        trials = new_trials(program, packing.num_rows)
         count = doubtful_pairs(packing.cols, basis, trials)
         doubts = trials.values[:count] * (1.0 - trials.values[:count])
         assert (np.diff(doubts) <= 1e-12).all() and not trials.mass.any()

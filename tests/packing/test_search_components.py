@@ -15,6 +15,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.simulation import simulate
 from experiments.common.oracles import gated_problem
+from tests.sizes import sample
 from tests.solvers.pieces import component, problems
 
 PROBLEM = gated_problem(np.random.default_rng(12), (8, 8, 7), 0.5, "mixed")
@@ -126,7 +127,24 @@ def test_workers_exchange_their_best(lucky):
     assert len({draw for member in members for draw in member.draws}) == 15
 
 
-@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_workers_refine_covers_of_their_own():
+    """In place and at the same time: one array for all would be spoiled."""
+    one = component(PROBLEM, "full")
+    one.offer_greedy()
+    seen = []
+
+    class Keeping(Idle):
+        def iterate(self, part, rng):
+            seen.append(part.best)
+
+    with ThreadPoolExecutor(3) as pool:
+        Team(lambda *_: Keeping(), one, Run(4), 10, 3, pool).iterate()
+    covers = [*seen, one.best]
+    for i, first in enumerate(covers):
+        assert not any(np.shares_memory(first, other) for other in covers[i + 1 :])
+
+
+@sample("solver", ["aco", "genetic", "tabu"], every=3)
 def test_the_same_seed_and_workers_give_the_same_search(solver):
     """To the last bit, whichever thread was quicker."""
     found = []
@@ -137,3 +155,13 @@ def test_the_same_seed_and_workers_give_the_same_search(solver):
         assert solution.cost == pytest.approx(problem.costs[solution.indices].sum())
     assert found[1] == found[2]
     assert len({str(one) for one in found}) > 1
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_small_components_are_bounded_before_they_are_searched(solver):
+    # any two of these share a measurement: the linear program takes half of each, and bounds by 3 where 2 is all
+    problem = assoc.AssignmentProblem([[1, 1, 0], [1, 0, 1], [0, 1, 1]], [-2.0, -2.0, -2.0], [1, 1, 1])
+    solution = assoc.assign(problem, solver)
+    assert (solution.cost, solution.status) == (-2.0, "optimal") and solution.lower_bound == pytest.approx(-2.0)
+    # the first cover and one iteration: without the proof it would search on until its patience is over
+    assert solution.iterations == 2

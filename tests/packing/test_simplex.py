@@ -62,7 +62,7 @@ def close(packing, bound, expected):
     return bound == expected or abs(bound - expected) <= 1e-9 * max(scale, abs(expected))
 
 
-@few_or_all("count", 80, 1000)
+@few_or_all("count", 80, 10_000)
 def test_the_bound_is_that_of_highs(count):
     """From no multipliers, poor, good and arbitrary ones; the primal values are a solution of the same weight."""
     rng = np.random.default_rng(81)
@@ -116,6 +116,62 @@ def test_warm_from_the_basis_at_hand(count):
         again = program.solve()
         assert again.exchanges == 0 and close(packing, again.bound, first.bound)
     assert warm < 0.6 * cold and none
+
+
+def test_norms_that_are_no_lengths_hide_nothing():
+    """What rounding could make of the norms costs steps; an optimum that is none it must not give."""
+    rng = np.random.default_rng(85)
+    for spoiled in (np.nan, np.inf, 0.0):
+        for number in range(10):
+            packing = random_packing(rng, number)
+            expected = optimum(packing)
+            program = program_of(packing.arrays)
+            allowed = all_allowed(program, packing.slack)
+            basis, duals = new_basis(program), np.zeros(packing.num_rows)
+            make_feasible(program, allowed, duals)
+            begin_from_duals(program, allowed, duals, basis)
+            basis.norms[:] = spoiled
+            with np.errstate(all="ignore"):
+                solve_dual(program, allowed, basis, Effort(weight_limit(program), 10_000, np.inf))
+            duals = basis.duals.copy()
+            make_feasible(program, allowed, duals)
+            bound = certified(program, allowed, duals)
+            assert close(packing, np.inf if bound >= weight_limit(program) else bound, expected)
+
+
+@few_or_all("count", 25, 1000)
+def test_dives_end_nowhere_else_than_at_an_optimum(count):
+    """Chains of hundreds of short calls on one basis: what is called optimal is feasible and as light as its bound."""
+    rng = np.random.default_rng(86)
+    solves = 0
+    for number in range(count):
+        packing = random_packing(rng, number)
+        if not packing.num_columns:
+            continue
+        program = LinearProgram(packing)
+        root = program.solve(duals=dual_bound(packing))
+        program.mark()
+        matrix = matrix_of(packing)
+        for _ in range(5):
+            program.back()
+            relaxed, columns, slack = root, np.ones(packing.num_columns, dtype=bool), packing.slack.copy()
+            while relaxed.status == OPTIMAL:
+                covered = matrix @ relaxed.primal
+                assert relaxed.primal[~columns].max(initial=0.0) <= 1e-7 and covered.max(initial=0.0) <= 1.0 + 1e-7
+                assert covered[~slack].min(initial=1.0) >= 1.0 - 1e-7
+                assert close(packing, float(packing.weights @ relaxed.primal), relaxed.bound)
+                left = np.flatnonzero(columns & (relaxed.primal < 1.0 - 1e-7))
+                if not left.size:
+                    break
+                j = rng.choice(left, p=(relaxed.primal[left] + 0.01) / (relaxed.primal[left] + 0.01).sum())
+                rows = packing.cols[j][packing.cols[j] >= 0]
+                if rng.random() < 0.7:
+                    columns[np.unique(matrix[rows].indices)] = False
+                    slack[rows] = False
+                columns[j] = not columns[j]
+                relaxed = program.solve(columns=columns, slack=slack)
+                solves += 1
+    assert solves > 15 * count
 
 
 def test_many_columns_are_looked_at_in_rounds():

@@ -81,6 +81,7 @@ def test_slider_table_and_pictures_follow_one_another(browser, page):
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_a_target_shows_its_tuple_cost_and_residuals(browser, page, pictures):
     show(browser, page, fragment="#scan-7")
     assert browser.execute_script("return document.getElementById('slider').value") == "7"
@@ -98,6 +99,7 @@ def test_a_target_shows_its_tuple_cost_and_residuals(browser, page, pictures):
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_the_scene_in_space(browser, page, pictures):
     show(browser, page)
     press(browser, browser.find_element("id", "space"))
@@ -108,6 +110,7 @@ def test_the_scene_in_space(browser, page, pictures):
     assert [one for one in complaints(browser) if "willReadFrequently" not in one] == []
 
 
+@pytest.mark.slow
 def test_it_is_there_in_three_seconds(browser, page):
     """Seconds of the processor, not of the clock: the machine may have other work."""
 
@@ -123,6 +126,7 @@ def test_it_is_there_in_three_seconds(browser, page):
     assert 0.0 < spent() - before < 3.0
 
 
+@pytest.mark.slow
 def test_names_from_files_show_as_text(browser, tmp_path):
     view = [[0, 1e4], [-3, 3], [0, 1]]
     sensors = [
@@ -143,6 +147,7 @@ def test_names_from_files_show_as_text(browser, tmp_path):
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_a_script_that_slips_through_does_not_run(browser, page, tmp_path):
     """The policy of the page is the second wall; see that it stands."""
     broken = tmp_path / "broken.html"
@@ -152,6 +157,7 @@ def test_a_script_that_slips_through_does_not_run(browser, page, tmp_path):
     assert any("Content Security Policy" in one for one in complaints(browser))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["paper", "mmas"])
 def test_the_ants_over_their_cycles(browser, tmp_path, pictures, mode):
     """A slider over the cycles: the bars are the history's, and a scan that no ant walked says so."""
@@ -184,6 +190,7 @@ def test_the_ants_over_their_cycles(browser, tmp_path, pictures, mode):
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_dark_pages_phones_and_crowds(browser, tmp_path, pictures):
     scene = simulate("crowd", 0, targets=60)
     path = tmp_path / "crowd.html"

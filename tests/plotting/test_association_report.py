@@ -199,6 +199,7 @@ def test_without_plotly_it_is_said_before_the_work(tmp_path, scene, association,
     assert not (tmp_path / "out.html").exists() and not (tmp_path / "out.csv").exists()
 
 
+@pytest.mark.slow
 def test_the_program_writes_it(tmp_path, scene):
     scene.save(tmp_path / "scene.npz")
     words = ["scene.npz", "--solver", "greedy", "--scans", "2:5", "--report", "out.html"]
@@ -216,3 +217,28 @@ def test_compiling_is_told_apart_from_solving(scene, association, tmp_path):
         write_association_report(tmp_path / name, replace(association, scans=content), scene)
     assert "12.5 s" in parsed(tmp_path / "cold.html").text
     assert "Compiling" not in parsed(tmp_path / "warm.html").text
+
+
+def test_scenes_on_the_earth_show_coordinates(tmp_path):
+    """Hovers tell latitude and longitude where a scene has an origin, of targets and of tracks."""
+    from dataclasses import replace
+
+    from assoc.plotting.report import write_tracking_report
+    from assoc.scene.geodesy import geodetic
+    from assoc.tracking import MultiSensorTracker, track_scene
+
+    scene = replace(simulate("three-radar", 2, scans=4), origin=(0.82, 0.15, 400.0))
+    association = assoc.associate(scene)
+    write_association_report(tmp_path / "a.html", association, scene)
+    view = data_of(tmp_path / "a.html")["scans"][0]["view"]
+    expected = np.degrees(geodetic(association.scans[0].positions, scene.origin)[:, :2])
+    np.testing.assert_allclose(view["degrees"], expected, atol=1e-5)
+    table, _ = track_scene(MultiSensorTracker.for_scene(scene), scene)
+    write_tracking_report(tmp_path / "t.html", table.to_frame(), scene)
+    first = data_of(tmp_path / "t.html")["tracks"][0]
+    row = table.to_frame().query(f"track_id == {first['id']}").iloc[0]
+    assert first["lat"][0] == pytest.approx(row["latitude"], abs=1e-5)
+    assert first["lon"][0] == pytest.approx(row["longitude"], abs=1e-5)
+    # elsewhere there are none
+    write_association_report(tmp_path / "b.html", association, replace(scene, origin=None))
+    assert "degrees" not in data_of(tmp_path / "b.html")["scans"][0]["view"]

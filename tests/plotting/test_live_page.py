@@ -9,12 +9,13 @@ import time
 import numpy as np
 import pytest
 
-from assoc._cli.live import replayed
+from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot
+from tests.sizes import sample
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def wait_for(browser, script, seconds=60.0):
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@sample("dark", [False, True], every=2)
 def test_the_picture_moves(browser, scene, film, pictures, size, dark):
     page = LivePage(scene, 0, "<b>Radars</b>")
     metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}

@@ -57,6 +57,7 @@ def test_picture(found):
         plot_residuals(found, "x")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_it_works_in_a_browser(browser, page, pictures, size):
     show(browser, page, size)

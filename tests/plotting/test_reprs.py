@@ -72,3 +72,50 @@ def test_empty_things_can_be_shown():
     problem = assoc.AssignmentProblem(np.zeros((0, 2), int), [], [0, 0])
     for thing in (problem, assoc.assign(problem), assoc.Association((), "exact")):
         Strict(thing._repr_html_())
+
+
+def results(scene):
+    """One of everything that calls answer with."""
+    from assoc import metrics, recordings, simulation, solvers, sweeps, tracking
+    from assoc.registration import register
+
+    problem = assoc.build_problem(scene, 0)
+    tracker = tracking.MultiSensorTracker.for_scene(scene)
+    table, decisions = tracking.track_scene(tracker, scene)
+    truth = metrics.Trajectories.from_scene(scene)
+    plots = simulation.simulate_recording("rotating-radar", 0, aircraft=4, duration=40.0).recording
+    windows = recordings.clustering_time_window(plots)
+    number = np.repeat(np.arange(len(windows)), [len(window) for window in windows])
+    known = plots.aircraft[np.concatenate([window.rows for window in windows])]
+    return [
+        scene, scene.truth, problem, assoc.assign(problem), assoc.associate(scene), assoc.associate(scene).scans[0],
+        assoc.marginals(problem), table, decisions[0], tracker.tracks[0], truth, windows[0], plots,
+        metrics.summarise(truth, metrics.Trajectories(*table.arrays()), 1000.0),
+        metrics.ct_mt_it(number, known, known, known >= 0),
+        sweeps.Study(scene, sweeps.grid("greedy", {})), solvers.pheromone(problem), register(scene),
+    ]  # fmt: skip
+
+
+def test_every_result_shows_itself(scene):
+    for thing in results(scene):
+        assert repr(thing).startswith(type(thing).__name__) and "\n" not in repr(thing) and len(repr(thing)) < 400
+        if hasattr(thing, "_repr_html_"):
+            assert type(thing).__name__ in Strict(thing._repr_html_()).text or "scans" in thing._repr_html_()
+    assert sum(hasattr(thing, "_repr_html_") for thing in results(scene)) >= 15
+
+
+def test_names_in_tables_of_results_are_text(scene):
+    """A target's call sign, as read from a file, is in the table of tracks."""
+    from assoc.tracking import TrackTable
+
+    evil = "<script>alert(1)</script>"
+
+    class Named(TrackTable):
+        def to_frame(self):
+            import pandas as pd
+
+            return pd.DataFrame({"target": [evil], evil: [1.0]})
+
+    shown = Named()._repr_html_()
+    assert "<script" not in shown and "&lt;script&gt;" in shown
+    assert Strict(shown).tags == {"p", "table", "thead", "tbody", "tr", "th", "td"}

@@ -74,6 +74,7 @@ def test_studies_without_maps_and_without_runs(tmp_path):
     assert "no runs yet" in " ".join(parsed(tmp_path / "none.html").text)
 
 
+@pytest.mark.slow
 def test_the_program_writes_it(folder, tmp_path):
     command = [sys.executable, "-W", "error", "-m", "assoc.sweep", "--summary", str(folder), "--report", "s.html"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
@@ -84,7 +85,7 @@ def test_the_program_writes_it(folder, tmp_path):
     assert (done.returncode, done.stdout) == (2, "") and "does not exist" in done.stderr
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("size", [DESKTOP, pytest.param(PHONE, marks=pytest.mark.slow)], ids=["desktop", "phone"])
 def test_it_works_in_a_browser(browser, page, pictures, size):
     show(browser, page, size)
     assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"

@@ -80,6 +80,7 @@ def test_long_recordings_are_thinned(tmp_path):
     assert data_of(tmp_path / "long.html")["tracks"][7]["t"][-1] == pytest.approx(frame["time"][count - 50 + 7])
 
 
+@pytest.mark.slow
 def test_the_program_writes_it(tmp_path):
     simulate("three-radar", 2, scans=6).save(tmp_path / "scene.npz")
     words = ["scene.npz", "-o", "tracks.csv", "--report", "tracks.html"]
@@ -92,7 +93,7 @@ def test_the_program_writes_it(tmp_path):
     assert "python -m assoc.track " + " ".join(words) in " ".join(parsed(tmp_path / "tracks.html").text)
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("size", [DESKTOP, pytest.param(PHONE, marks=pytest.mark.slow)], ids=["desktop", "phone"])
 def test_it_works_in_a_browser(browser, page, pictures, size):
     show(browser, page, size)
     assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"

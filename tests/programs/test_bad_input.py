@@ -185,6 +185,7 @@ def test_bad_options(run, tmp_path, scene_fields, words, message):
     check(done, tmp_path, message, before)
 
 
+@pytest.mark.slow
 def test_limits_and_infeasible_problems_leave_with_3(run, tmp_path, scene_fields):
     np.savez(tmp_path / "s.npz", **scene_fields)
     assoc.AssignmentProblem([[1, 1], [2, 1]], [1.0, 2.0], [2, 2], dummy=False).save(tmp_path / "p.npz")

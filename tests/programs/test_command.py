@@ -23,6 +23,7 @@ from assoc.errors import MissingExtraError
 from assoc.recordings import write_plots
 from assoc.simulation import simulate_recording
 from assoc.solvers import registry
+from tests.sizes import sample
 
 OWN = """
 from dataclasses import dataclass, field
@@ -93,7 +94,8 @@ def test_the_command_shows_itself_in_usage(here, monkeypatch, capsys):
     assert main(["nonsense"]) == 2
 
 
-@pytest.mark.parametrize("option", ["--json", "--csv"])
+@pytest.mark.slow
+@sample("option", ["--json", "--csv"], every=2)
 def test_data_alone_go_to_stdout(run, here, option):
     done = run("assoc.solve", "s.npz", option, "-")
     assert done.returncode == 0 and "scans certified optimal" in done.stderr
@@ -109,6 +111,7 @@ def test_data_alone_go_to_stdout(run, here, option):
     assert not (here / "-").exists()
 
 
+@pytest.mark.slow
 def test_tracks_scenes_and_plots_go_to_stdout(run, here):
     done = run("assoc.track", "s.npz", "-o", "-")
     assert done.returncode == 0 and pd.read_csv(io.StringIO(done.stdout)).track_id.nunique() == 3
@@ -210,6 +213,7 @@ def test_a_table_is_told_where_it_can_go(here, capsys):
     assert solve.main(["damaged.npz"]) == 2 and "is a table" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_solvers_of_the_users_own(run, here):
     words = ["s.npz", "--import", "mine", "--solver", "first", "--tries", "7", "--csv", "-"]
     one, two = (pd.read_csv(io.StringIO(run("assoc", "solve", *words, "--jobs", n).stdout)) for n in (1, 2))
@@ -278,6 +282,7 @@ def test_bash_completes(run, tmp_path):
         assert (done.stdout.split(), done.stderr) == (expected, ""), words
 
 
+@pytest.mark.slow
 def test_fish_completes(run, tmp_path):
     fish = shutil.which("fish") or pytest.skip("fish is not installed")
     script = run("assoc", "completion", "fish").stdout
@@ -288,6 +293,7 @@ def test_fish_completes(run, tmp_path):
         assert found == expected and done.stderr == "", (words, found)
 
 
+@pytest.mark.slow
 def test_other_shells(run, tmp_path):
     done = run("assoc", "completion", "zsh")
     assert done.returncode == 0 and "compdef _assoc assoc" in done.stdout

@@ -13,7 +13,8 @@ import sys
 import pandas as pd
 import pytest
 
-from assoc._cli.live import parse_line, replayed
+from assoc import track
+from assoc._cli.track.plot_lines import parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
@@ -75,6 +76,7 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     assert out.read_text() == done.stdout
 
 
+@pytest.mark.slow
 def test_datagrams_on_loopback_until_a_signal(scene_file):
     scene = Scene.load(scene_file)
     program = subprocess.Popen(words(scene_file, "--udp", 0), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -96,7 +98,7 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
     assert rest == "" or rest.endswith("\n")
 
 
-def test_bad_options(run, scene_file, tmp_path):
+def test_bad_options(scene_file, tmp_path, capsys):
     for more, line in [
         (["--live", "--udp", "99999"], "--udp: port 99999 cannot be used"),
         (["--live", "--turns", "4,5"], "turns: expected one for each of 3 sensors"),
@@ -106,8 +108,12 @@ def test_bad_options(run, scene_file, tmp_path):
         (["--page", "0", "-o", tmp_path / "x.csv"], "--page: is only for --live"),
         ([], "the following arguments are required: -o/--output"),
     ]:
-        done = run("assoc.track", scene_file, *more)
-        assert done.returncode == 2 and line in done.stderr and len(done.stderr.strip().splitlines()) == 1, done.stderr
+        try:
+            code = track.main([*map(str, [scene_file, *more])])
+        except SystemExit as end:
+            code = end.code
+        said = capsys.readouterr().err
+        assert code == 2 and line in said and len(said.strip().splitlines()) == 1, said
     assert not (tmp_path / "x.csv").exists()
 
 

@@ -16,6 +16,7 @@ def biased(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_as_a_program(run, biased, tmp_path):
     output = tmp_path / "registered.npz"
     done = run("assoc.register", biased, "-o", output, "--json", tmp_path / "biases.json", "--report")

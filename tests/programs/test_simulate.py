@@ -9,7 +9,7 @@ from assoc.recordings import read_plots
 from tests.sizes import sample
 
 
-@pytest.mark.parametrize("scenario", ["three-radar", "crowd", "bearing-only"])
+@sample("scenario", ["three-radar", "crowd", "bearing-only"], every=3)
 def test_same_seed_same_bytes(run, tmp_path, scenario):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         done = run("assoc.simulate", scenario, "-o", tmp_path / f"{name}.npz", "--seed", seed, "--scans", 2)

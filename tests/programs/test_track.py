@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from assoc import track
+from assoc._cli.track import options as track_options
 from assoc.recordings import Recording, write_plots
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, MultiSensorTracker
@@ -80,7 +81,7 @@ def test_every_tracker(name, scene_file, tmp_path, capsys):
     assert f"{name}, {asked}: " in capsys.readouterr().out
     table = pd.read_csv(tmp_path / "tracks.csv")
     assert table[table.confirmed].track_id.nunique() >= 3
-    assert set(track.TRACKERS) == set(TRACKERS)
+    assert set(track_options.TRACKERS) == set(TRACKERS)
 
 
 def test_the_rule_of_nearest_neighbours_asks_the_solver(scene_file, tmp_path, capsys):

@@ -62,6 +62,7 @@ def check(problem, k):
     return len(found)
 
 
+@pytest.mark.slow
 def test_small_problems():
     """Two to six sensors, ties, duplicates, empty sensors, clusters, infeasible ones; k beyond their number."""
     found = []

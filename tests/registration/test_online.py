@@ -9,6 +9,7 @@ from assoc.errors import InvalidInputError
 from assoc.registration import OnlineRegistration, RegistrationParameters, register, with_biases
 from assoc.tracking import MultiSensorTracker
 from tests.registration.common import BIASES, REGION, biased_scene, radars, scene_of
+from tests.sizes import sample
 
 
 def went_through(online, scene):
@@ -17,6 +18,7 @@ def went_through(online, scene):
     return online
 
 
+@pytest.mark.slow
 def test_as_good_as_all_at_once():
     scene = biased_scene(scans=40)
     online = went_through(OnlineRegistration(scene.sensors, REGION, RegistrationParameters(drift=0.0)), scene)
@@ -34,6 +36,7 @@ def test_what_it_knew_stays_as_it_was():
     assert all(a is b for a, b in zip(before.correct(z), z, strict=True))
 
 
+@pytest.mark.slow
 def test_drift_is_followed():
     """Range of one radar, 0 to 150 m in 100 scans of 36 s: the last scans' biases, not the mean of all."""
     plain = scene_of(radars(), 2, 100)
@@ -45,7 +48,7 @@ def test_drift_is_followed():
     assert online._kept == ()
 
 
-@pytest.mark.parametrize("saved_after", [3, 40])
+@sample("saved_after", [3, 40], every=2)
 def test_tracker_saved_and_restored(tmp_path, saved_after):
     scene = biased_scene(scans=saved_after + 3)
     one = MultiSensorTracker.for_scene(scene, registration="online")
@@ -70,6 +73,7 @@ def test_tracker_saved_and_restored(tmp_path, saved_after):
         other.restore(tmp_path / "spoiled.npz")
 
 
+@pytest.mark.slow
 def test_tracker_with_biases_tracks_as_without():
     plain = scene_of(radars(), 4, 25)
     wrong = with_biases(plain, BIASES)

@@ -44,6 +44,7 @@ def test_residuals_before_and_after(found):
         assert np.abs(own.before[:, 0].mean()) > 3.0 * np.abs(own.after[:, 0].mean()) + 5.0
 
 
+@pytest.mark.slow
 def test_errors_agree_with_the_covariance():
     """Normalised squared errors over seeds: their mean is 1, and 99 % of such means lie in this interval."""
     squares, n = [], 0
@@ -141,6 +142,7 @@ def test_a_radar_alone():
     assert (result.biases == 0).all() and "no bias can be observed" in result.summary()
 
 
+@pytest.mark.slow
 def test_clocks_only_by_their_differences():
     clocks = (0.5, -0.7, 0.2)
     scene = late_scene(radars(), clocks, scans=20)

@@ -11,8 +11,6 @@ used, too: a problem is solved, a scene's first scan associated. A smaller part 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import multiprocessing
 import os
 import resource
@@ -25,8 +23,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,156 +31,10 @@ import numpy as np
 
 from assoc.errors import AssocError, AssocWarning, InfeasibleError
 from tests.reliability.mutations import MARKER, bombs, spoil
+from tests.reliability.readers import ROOMS, Room
 
 SECONDS = 5
 MEMORY = 1 << 30
-
-
-@dataclass(frozen=True)
-class Room:
-    """A kind of file: a valid one, and what reads it.
-
-    Attributes
-    ----------
-    name : str
-    kind : str
-        How it is spoiled: "npz", "text" or "log".
-    make : callable
-        Writes valid files into a folder; returns those to be spoiled.
-    read : callable
-        Reads the file, and uses it.
-    """
-
-    name: str
-    kind: str
-    make: Callable[[Path], list[Path]]
-    read: Callable[[Path], object]
-
-
-# --- valid files --------------------------------------------------------------------------------------------
-
-
-def _scenes(folder: Path) -> list[Path]:
-    from assoc.simulation import simulate
-
-    simulate("three-radar", 1, scans=2).save(folder / "radars.npz")
-    simulate("bearing-only", 2, scans=2).save(folder / "bearings.npz")
-    return [folder / "radars.npz", folder / "bearings.npz"]
-
-
-def _problems(folder: Path) -> list[Path]:
-    from experiments.common.oracles import small_problems
-
-    paths = []
-    for number, problem in enumerate(small_problems(6, seed=3)):
-        paths.append(folder / f"problem{number}.npz")
-        problem.save(paths[-1])
-    return paths
-
-
-def _tracks(folder: Path) -> list[Path]:
-    rows = ["time,icao24,lat,lon,geoaltitude,velocity"]
-    rows += [f"{t},{name},{45 + 0.01 * t / 10},{7 + 0.01 * i},{1000.0 + i},200" for t in range(0, 50, 10)
-             for i, name in enumerate(("abc123", "00ff00"))]  # fmt: skip
-    (folder / "tracks.csv").write_text("\n".join(rows) + "\n")
-    return [folder / "tracks.csv"]
-
-
-def _plots(folder: Path) -> list[Path]:
-    rows = ["time,range_nmi,bearing,mode3,altitude"]
-    rows += [f"12:{t:02d}:0{t % 10},{20 + t},{(t * 37) % 360},{1200 + t},{300 + t}" for t in range(30)]
-    (folder / "plots.csv").write_text("\n".join(rows) + "\n")
-    return [folder / "plots.csv"]
-
-
-def _solver_config(folder: Path) -> list[Path]:
-    text = 'solver = "aco"\nseed = 3\ntime-limit = 2.5\nscans = "0:1"\ngate_probability = 0.99\nmax_tuples = 1000\n'
-    text += '[aco]\nants = 4\nmode = "mmas"\nalpha = 1.5\n[milp]\nbackend = "highs"\n'
-    (folder / "solve.toml").write_text(text)
-    return [folder / "solve.toml"]
-
-
-def _design(folder: Path) -> list[Path]:
-    text = 'solver = "aco"\nrepeats = 2\nseed = 1\n[aco]\nalpha = [1.0, 2.0]\nants = [5, 15]\nrho = [0.1, 0.9]\n'
-    (folder / "design.toml").write_text(text)
-    return [folder / "design.toml"]
-
-
-def _study(folder: Path) -> list[Path]:
-    """A finished study; the log and the manifest are spoiled in place."""
-    from experiments.common.oracles import small_problems
-
-    next(iter(small_problems(1, seed=3, dummy=True))).save(folder / "p.npz")
-    command = [sys.executable, "-m", "assoc.sweep", str(folder / "p.npz"), "--solver", "aco"]
-    command += ["--grid", "alpha=1,2", "ants=2,3", "--repeats", "2", "-o", str(folder / "study")]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-    return [folder / "study"]
-
-
-# --- readers ------------------------------------------------------------------------------------------------
-
-
-def _use_scene(path: Path) -> None:
-    from assoc.association import associate
-    from assoc.scene import Scene
-
-    scene = Scene.load(path)
-    if sum(len(z) for z in scene.measurements[0]) < 200 and len(scene.sensors) < 6:
-        one = Scene(scene.sensors, scene.times[:1], scene.measurements[:1], region=scene.region)
-        associate(one, "greedy", gating={"max_tuples": 20_000}, time_limit=1.0)
-
-
-def _use_problem(path: Path) -> None:
-    from assoc.problem import AssignmentProblem
-    from assoc.solvers.assign import assign
-
-    problem = AssignmentProblem.load(path)
-    assert np.isfinite(assign(problem, "exact", time_limit=2.0).cost)
-
-
-def _use_tracks(path: Path) -> None:
-    from assoc.simulation.flight_reports import read_flight_reports
-
-    read_flight_reports(str(path), {})
-
-
-def _use_plots(path: Path) -> None:
-    from assoc.recordings import read_plots
-
-    read_plots(path)
-
-
-def _use_solver_config(path: Path) -> None:
-    from assoc import solve
-
-    solve._solver({"solver": None, "config": str(path)})
-
-
-def _use_design(path: Path) -> None:
-    from assoc.sweep import main
-
-    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
-        # without a file to solve the program reads its design and complains; nothing else may happen
-        code = main(["--config", str(path), "-o", "nowhere"])
-    if code not in (2, 3) or said.getvalue().count("\n") != 1:
-        raise AssertionError(f"exit code {code}: {said.getvalue()[-200:]!r}")
-
-
-def _use_study(path: Path) -> None:
-    from assoc.sweeps.frame import load
-
-    load(path)
-
-
-ROOMS = [
-    Room("scene.npz", "npz", _scenes, _use_scene),
-    Room("problem.npz", "npz", _problems, _use_problem),
-    Room("tracks.csv", "text", _tracks, _use_tracks),
-    Room("plots.csv", "text", _plots, _use_plots),
-    Room("solve.toml", "text", _solver_config, _use_solver_config),
-    Room("design.toml", "text", _design, _use_design),
-    Room("study", "log", _study, _use_study),
-]
 
 
 # --- one case -----------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from assoc._files.output import write_atomically
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
+from tests.sizes import sample
 
 PYTHON = [sys.executable, "-W", "error", "-m"]
 
@@ -41,7 +42,7 @@ def small_files(size=2000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-@pytest.mark.parametrize("option", ["--json", "--csv"])
+@sample("option", ["--json", "--csv"], every=2)
 def test_a_full_disk_leaves_the_old_result(scene_file, tmp_path, option):
     output = tmp_path / "out"
     output.write_text("old")

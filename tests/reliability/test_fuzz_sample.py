@@ -12,8 +12,9 @@ import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
-from tests.reliability.fuzzing import ROOMS, Room, _bomb, judge, prepare, run_case, warm_up
+from tests.reliability.fuzzing import _bomb, judge, prepare, run_case, warm_up
 from tests.reliability.mutations import bombs
+from tests.reliability.readers import ROOMS, Room
 from tests.sizes import few_or_all
 
 
@@ -32,6 +33,7 @@ def test_hundreds_of_spoiled_files(count, made, tmp_path, monkeypatch):
     assert [fault for fault in faults if fault] == []
 
 
+@pytest.mark.slow
 def test_bombs_are_refused_before_they_go_off(made, tmp_path):
     room = next(one for one in ROOMS if one.name == "problem.npz")
     for path in bombs(tmp_path, made["problem.npz"][0].read_bytes(), 300_000_000):

@@ -11,6 +11,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
+from tests.sizes import sample
 
 _CALLS = """
 import numpy as np
@@ -41,7 +42,7 @@ def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.Complete
     return done
 
 
-@pytest.mark.parametrize(
+@sample(
     "code",
     [
         # small calls leave the compiler to another process, which is asked once
@@ -52,16 +53,18 @@ def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.Complete
         "interpreted.PATIENCE = -1.0\nassert call(5) == 1 and not asked",
         "with interpreted.compiled_only():\n    assert call(5) == 1",
     ],
+    every=4,
 )
 def test_what_is_interpreted(code, tmp_path):
     run(_CALLS + code, tmp_path)
 
 
+@pytest.mark.slow
 def test_switched_off(tmp_path):
     run(_CALLS + "assert call(5) == 1 and not asked", tmp_path, switch="0")
 
 
-@pytest.mark.parametrize("solver", ["exact", "aco", "greedy", "lagrangian", "genetic", "tabu"])
+@sample("solver", ["exact", "greedy", "lagrangian", "aco", "genetic", "tabu"], every=6)
 def test_the_same_answers_with_and_without_compiled_kernels(solver, tmp_path):
     scene = tmp_path / "s.npz"
     simulate("three-radar", seed=5, scans=4).save(scene)
@@ -91,6 +94,7 @@ for sizes in ((4, 4, 4), (7, 8), (3, 3, 3, 3)):
 """
 
 
+@pytest.mark.slow
 def test_the_same_ranking_with_and_without_compiled_kernels(tmp_path):
     # many solutions of equal cost: which comes first hangs on the order of equal numbers
     assert run(_RANKING, tmp_path / "cold").stdout == run(_RANKING, None, switch="0").stdout

@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 LIBRARY = """
 import _thread, json, os, signal, sys, threading, time
 import numpy as np
@@ -46,6 +48,32 @@ os._exit(0)
 """
 
 
+CONVERTING = """
+import os, signal, threading
+import assoc
+from tests.reliability.big import ghosts
+
+problem = ghosts(60, 60_000)
+assoc.assign(problem, "exact", time_limit=0.3)
+heard = 0
+for delay in (0.02, 0.03, 0.05, 0.08, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35):
+    threading.Timer(delay, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    try:
+        assoc.assign(problem, "exact", time_limit=5.0)
+    except KeyboardInterrupt:
+        heard += 1
+print(heard, flush=True)
+os._exit(0)
+"""
+
+
+def test_while_a_result_is_converted():
+    # a signal that comes during a kernel is heard when its result is converted: a record's class is then missing
+    done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout.strip()) == (0, "10"), done.stderr
+
+
+@pytest.mark.slow
 def test_in_the_library():
     names = ["exact", "aco", "tabu", "genetic", "milp", "kbest"]
     done = subprocess.run(

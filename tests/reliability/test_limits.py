@@ -25,6 +25,7 @@ from assoc.solvers.greedy.solve import greedy_choice
 from experiments.common.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
 from tests.reliability.limits import WAYS, lateness
+from tests.sizes import sample
 
 LIMIT = 0.1
 # seconds; without a limit each of these ways takes 8 s or more, or never ends (milp alone ends by itself)
@@ -58,7 +59,8 @@ def fresh(problem):
     return AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
 
 
-@pytest.mark.parametrize("way", [name for name in WAYS if name not in ("greedy", "marginals")])
+@pytest.mark.slow
+@sample("way", [name for name in WAYS if name not in ("greedy", "marginals")], every=3)
 def test_limit_is_kept_and_the_best_so_far_is_returned(way, problem, greedy_cost, least):
     WAYS[way](fresh(problem), LIMIT)
     found, late = lateness(lambda: WAYS[way](fresh(problem), LIMIT), LIMIT)
@@ -72,6 +74,7 @@ def test_limit_is_kept_and_the_best_so_far_is_returned(way, problem, greedy_cost
     assert answer.cost >= least - 1e-6 * abs(least)
 
 
+@pytest.mark.slow
 def test_marginals_keep_the_limit_and_say_what_is_not_known(problem):
     WAYS["marginals"](fresh(problem), LIMIT)
     found, late = lateness(lambda: WAYS["marginals"](fresh(problem), LIMIT), LIMIT)
@@ -83,6 +86,7 @@ def test_marginals_keep_the_limit_and_say_what_is_not_known(problem):
         assert share == pytest.approx(np.ones(n))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["exact", "kbest"])
 def test_limit_is_kept_in_another_thread(way, problem):
     with ThreadPoolExecutor(1) as pool:

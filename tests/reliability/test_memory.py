@@ -33,6 +33,7 @@ from assoc.solvers.assign import assign
 from experiments.common.oracles import gated_problem
 from tests.reliability.big import axial, ghosts
 from tests.reliability.memory import peak_of
+from tests.sizes import sample
 
 linux = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux how much memory there is")
 
@@ -104,7 +105,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 @linux
-@pytest.mark.parametrize("case", REFUSED)
+@sample("case", REFUSED, every=4)
 def test_refused_before_memory_is_taken(case: str) -> None:
     """What no machine has room for is refused, by one line, and nothing is taken for it."""
     work, advice = REFUSED[case]
@@ -159,6 +160,7 @@ def test_repeats_are_not_written_down() -> None:
     assert list(itertools.islice(study.all_runs(), 3)) == [(0, 0, 0, 0), (0, 0, 1, 0), (0, 0, 2, 0)]
 
 
+@pytest.mark.slow
 def test_wide_gates_of_many_tracks() -> None:
     """Tracks that know nothing have too many pairs with thousands of plots; a wide gate alone is no pair."""
     many = 6_000
@@ -179,6 +181,7 @@ def test_thousands_of_sensors() -> None:
     assert peak < 100e6
 
 
+@pytest.mark.slow
 def test_identities_of_a_long_run() -> None:
     """IDF1 of 12,000 identities, each of which met a few: one dense matrix of them would have 1.2 GB."""
     rng = np.random.default_rng(0)
@@ -260,16 +263,15 @@ def test_a_trace_stays_short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @linux
-@pytest.mark.parametrize(
-    ("name", "parameters"),
+@sample(
+    "name, parameters",
     [
         ("three-radar", {"scans": 1500}),
         ("three-radar", {"scans": 3, "false_alarms": 200_000.0}),
         ("crowd", {"targets": 100_000}),
         ("dubins-uav", {"interval": 0.05, "obstacles": 0}),
         ("rotating-radar", {"aircraft": 1, "false_plots": 2000.0}),
-    ],
-)
+    ], every=5)
 def test_estimates_of_scenes(name: str, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """What was asked for is what was taken, or up to five times that."""
     make: Callable[..., Any] = simulate_recording if name == "rotating-radar" else simulate
@@ -291,7 +293,7 @@ program's, which is solved up to 200,000 tuples. 20 MB are for what is fixed."""
 
 
 @linux
-@pytest.mark.parametrize("way", PER_TUPLE)
+@sample("way", PER_TUPLE, every=4)
 def test_solvers_take_what_is_said(way: str) -> None:
     from tests.reliability.limits import WAYS
 

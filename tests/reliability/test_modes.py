@@ -6,12 +6,14 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.reliability.answers import answers, differences
-from tests.sizes import few_or_all
 
 
-@few_or_all("parts", ["rankings", "costs"], ["solutions", "rankings", "costs", "tracks"])
-def test_answers_without_the_compiler(parts):
+@pytest.mark.slow
+def test_answers_without_the_compiler():
+    parts = ["solutions", "rankings", "costs", "tracks"]
     command = [sys.executable, "-W", "error", "-m", "tests.reliability.answers", "--only", ",".join(parts)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)

@@ -21,7 +21,7 @@ from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from assoc.tracking import MultiSensorTracker
 from experiments.common.oracles import gated_problem, small_problems
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute
 KERNEL = """
@@ -41,17 +41,18 @@ def answer(item):
     return found.tuples.tolist(), found.cost, found.lower_bound, found.iterations
 
 
-def work():
+def work(problems):
     names = ("exact", "greedy", "aco", "genetic", "tabu", "lagrangian")
-    return [(name, number) for number in range(6) for name in names]
+    return [(name, number) for number in range(problems) for name in names]
 
 
 @few_or_all("rounds", 1, 3)
 def test_eight_threads_answer_like_one(rounds):
-    alone = [answer(item) for item in work()]
+    items = work(2 * rounds)
+    alone = [answer(item) for item in items]
     with ThreadPoolExecutor(8) as pool:
         for _ in range(rounds):
-            assert list(pool.map(answer, work())) == alone
+            assert list(pool.map(answer, items)) == alone
 
 
 def test_threads_share_one_problem():
@@ -89,9 +90,9 @@ def test_threads_rank_track_and_weigh_alone():
             assert list(pool.map(work, range(8))) == alone
 
 
-@pytest.mark.parametrize("method", ["spawn", "forkserver"])
+@sample("method", ["spawn", "forkserver"], every=2)
 def test_pools_of_processes(method):
-    items = work()[:6]
+    items = work(1)
     with ProcessPoolExecutor(2, mp_context=get_context(method)) as pool:
         assert list(pool.map(answer, items)) == [answer(item) for item in items]
 
@@ -118,24 +119,25 @@ def first_run(folder: Path, script: str = "", **environment: str) -> subprocess.
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_two_first_runs_at_once(tmp_path):
     folder = copied(tmp_path)
-    runs = [first_run(folder) for _ in range(4)]
-    assert [(one.communicate(timeout=120)[1], one.returncode) for one in runs] == [("", 0)] * 4
+    runs = [first_run(folder) for _ in range(3)]
+    assert [(one.communicate(timeout=120)[1], one.returncode) for one in runs] == [("", 0)] * 3
     assert list((folder / "assoc" / "__pycache__").glob("*.nbc"))
     again = first_run(folder, "assert sum(double.stats.cache_hits.values()) == 1")
     assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
 
 
-def test_a_cache_cut_short_is_made_anew(tmp_path):
+@sample("suffix", ["*.nbc", "*.nbi"], every=2)
+def test_a_cache_cut_short_is_made_anew(tmp_path, suffix):
     folder = copied(tmp_path)
     first_run(folder).communicate(timeout=60)
-    for suffix in ("*.nbc", "*.nbi"):
-        for kept in (folder / "assoc" / "__pycache__").glob(suffix):
-            kept.write_bytes(kept.read_bytes()[:100])
-        for script in ("", "assert sum(double.stats.cache_hits.values()) == 1"):
-            again = first_run(folder, script)
-            assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
+    for kept in (folder / "assoc" / "__pycache__").glob(suffix):
+        kept.write_bytes(kept.read_bytes()[:100])
+    for script in ("", "assert sum(double.stats.cache_hits.values()) == 1"):
+        again = first_run(folder, script)
+        assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
 
 
 def test_a_cache_on_a_full_disk(tmp_path):
@@ -151,6 +153,7 @@ def test_a_cache_on_a_full_disk(tmp_path):
     assert (full.communicate(timeout=60)[1], full.returncode) == ("", 0)
 
 
+@pytest.mark.slow
 def test_an_installation_that_cannot_be_written(tmp_path):
     """Neither the package nor the home can be written: the cache is temporary, shared with workers, and goes."""
     folder, temporary = copied(tmp_path / "site"), tmp_path / "tmp"

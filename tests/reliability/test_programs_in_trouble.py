@@ -14,6 +14,7 @@ import pytest
 
 from assoc.simulation import simulate
 from tests.reliability.test_faults import PYTHON, children
+from tests.sizes import sample
 
 UNREADABLE = os.fsdecode(b"\xff \n-.npz")
 """A name that is no text, with a blank, a line break and a dash."""
@@ -108,6 +109,7 @@ def closed(*numbers):
     return close
 
 
+@pytest.mark.slow
 def test_closed_streams(work):
     """What is closed stays silent, and no file of ours gets its number and is printed into."""
     for numbers in [(0, 1, 2), (1,)]:
@@ -127,7 +129,7 @@ def test_nobody_reads_the_list_of_programs():
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL", "SIGINT"])
+@sample("name", ["SIGTERM", "SIGKILL", "SIGINT"], every=3)
 def test_no_process_and_no_file_stays_behind(tmp_path, name):
     simulate("three-radar", 2, scans=400).save(tmp_path / "long.npz")
     (tmp_path / "tmp").mkdir()

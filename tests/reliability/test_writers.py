@@ -55,6 +55,7 @@ def fill(folder):
             file.write(bytes(4096))
 
 
+@pytest.mark.slow
 def test_files_that_may_not_grow(tmp_path):
     """The limit of a process does what a full disk does, for everyone and not only the superuser."""
     done = subprocess.run(

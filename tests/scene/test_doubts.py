@@ -21,6 +21,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import names, recording_names, simulate, simulate_recording
 from assoc.tracking import MultiSensorTracker, TrackOrientedMHT, track_scene
 from assoc.tracking.plots.plot_windows import step_windows
+from tests.sizes import sample
 
 FLIGHTS = "time,icao24,lat,lon,geoaltitude\n" + "".join(
     f"{t},{who},{47.0 + 0.02 * k + 0.001 * t},{8.0 + 0.03 * k},{9000 + 300 * k}\n"
@@ -46,7 +47,7 @@ def test_the_list_of_scenarios_is_whole():
 
 
 @pytest.mark.parametrize(("name", "values"), SCENARIOS, ids=lambda one: one if isinstance(one, str) else "")
-@pytest.mark.parametrize("seed", range(4))
+@sample("seed", range(4), every=4)
 def test_no_warning_on_any_scenario(name, values, seed, tmp_path):
     if name == "from-tracks":
         (tmp_path / "flights.csv").write_text(FLIGHTS)
@@ -182,6 +183,7 @@ def test_dates_elsewhere_are_refused():
         BearingSensor(position=np.zeros(3, "datetime64[s]"), noise=[0.1])
 
 
+@pytest.mark.slow
 def test_programs_say_it_in_a_line(tmp_path):
     with pytest.warns(AssocWarning):
         changed(simulate("three-radar", scans=6), [0.001, 1.0, 1.0]).save(tmp_path / "km.npz")

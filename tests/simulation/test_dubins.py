@@ -15,6 +15,7 @@ from assoc.simulation.dubins.kernels import WORDS
 from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose, Segment, path, paths, shortest
 from assoc.simulation.scenarios.dubins_uav import DubinsParameters, no_fly_zones
+from tests.sizes import sample
 
 FIRST, LAST = Pose(-500.0, 100.0, math.pi / 3), Pose(0.0, 200.0, 0.0)
 poses = st.builds(Pose, st.floats(-3, 3), st.floats(-3, 3), st.floats(-7, 7))
@@ -73,6 +74,7 @@ def test_shortest_is_unchanged_by_symmetries_and_obeys_the_triangle(start, goal)
     assert shortest(start, halfway, 1.0).length <= 0.5 * length + 1e-6
 
 
+@pytest.mark.slow
 def test_no_feasible_polyline_is_shorter():
     """A search over turns and straights in small steps cannot beat the formula."""
     start, goal = Pose(0, 0, 0), Pose(0.5, 1.5, 2.5)
@@ -90,6 +92,7 @@ def test_no_feasible_polyline_is_shorter():
         assert near > 0.01
 
 
+@pytest.mark.slow
 @given(poses, st.sampled_from([-1.0, 0.0, 0.4, 1.0]), st.floats(0.01, 6), st.floats(-4, 4), st.floats(-4, 4))
 @settings(max_examples=100)
 def test_distance_from_a_piece(start, curvature, length, x, y):
@@ -140,7 +143,7 @@ def test_nothing_in_the_way_gives_the_shortest_path():
         assert around(FIRST, LAST, 100.0, obstacles).length == pytest.approx(shortest(FIRST, LAST, 100.0).length)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@sample("seed", range(4), every=3)
 def test_several_obstacles(seed):
     rng = np.random.default_rng(seed)
     start, goal = Pose(-8, 0, rng.uniform(-3, 3)), Pose(8, 0, rng.uniform(-3, 3))

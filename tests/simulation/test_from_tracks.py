@@ -144,3 +144,24 @@ def test_missing_file_folder_and_too_many_scans(tmp_path, tracks):
         simulate("from-tracks", file=str(tmp_path))
     with pytest.raises(LimitExceededError, match="raise --interval"):
         simulate("from-tracks", file=tracks, interval=1e-5)
+
+
+def test_speeds_in_knots(tmp_path):
+    """Knots and feet per minute, and the same in metres per second, are the same flight."""
+    rows = ["icao24,time,lat,lon,altitude,velocity,heading,vertrate"]
+    knots = list(rows)
+    for k in range(12):
+        place = f"a,{10 * k},{47 + 0.009 * k},8.0"
+        rows.append(f"{place},3000,{200 * 1852 / 3600},0,{600 * 0.3048 / 60}")
+        knots.append(f"{place},3000,200,0,600")
+    (tmp_path / "si.csv").write_text("\n".join(rows))
+    (tmp_path / "kt.csv").write_text("\n".join(knots))
+    one = simulate("from-tracks", 1, file=str(tmp_path / "si.csv"), interval=7.0)
+    other = simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), interval=7.0, speed_unit="kt")
+    wrong = simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), interval=7.0)
+    for k in range(one.num_scans):
+        np.testing.assert_allclose(one.truth.positions[k], other.truth.positions[k], atol=1e-6)
+    pairs = zip(one.truth.positions, wrong.truth.positions, strict=True)
+    assert any(np.abs(a - b).max(initial=0.0) > 1.0 for a, b in pairs)
+    with pytest.raises(InvalidInputError, match="speed_unit: expected 'm/s' or 'kt'"):
+        simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), speed_unit="mph")

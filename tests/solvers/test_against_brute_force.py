@@ -11,7 +11,7 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.assign import assign
 from experiments.common.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 # milp has a test file of its own, and its backends take their time
 PROVING = ("exact", "milp")
@@ -112,7 +112,7 @@ def test_exact_on_problems_too_large_for_enumeration(seed):
     assert solution.status == "optimal"
 
 
-@pytest.mark.parametrize("name", installed())
+@sample("name", installed(), every=3)
 @pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e12, 1e150])
 def test_scale_of_costs(name, scale):
     rng = np.random.default_rng(8)

@@ -52,6 +52,19 @@ def reference_child(one, mother, father, scale, mutation, rng):
     return columns_of(owner)
 
 
+def reference_filling(one, child, scale, rng):
+    """Columns that fit, in an order drawn by reduced cost, where they save something or cover what must be covered."""
+    packing = one.packing
+    taken = {r for j in child for r in rows_of(packing, j)}
+    keys = one.reduced / scale - np.log(-np.log(1.0 - rng.random(packing.num_columns)))
+    for j in np.argsort(keys, kind="stable").tolist():
+        rows = set(rows_of(packing, j))
+        if not taken & rows and (packing.weights[j] < 0 or not packing.slack[[*rows]].all()):
+            child = [*child, j]
+            taken |= rows
+    return sorted(child)
+
+
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_crossover_and_mutation(name):
     one = component(PROBLEMS[name])
@@ -117,6 +130,7 @@ class Reference:
                 mother, father = self.parent(), self.parent()
                 scale = temperature(self.one, self.least)
                 child = reference_child(self.one, mother, father, scale, self.p.mutation, self.rng)
+                child = reference_filling(self.one, child, scale, self.rng)
                 cost = self.offer(child)
                 worst = int(np.argmax(self.fitness))
                 new = all(abs(cost - other) > self.one.tolerance for other in self.fitness)

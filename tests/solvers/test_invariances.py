@@ -11,6 +11,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, check_answer, gated_problem
+from tests.sizes import sample
 from tests.solvers.test_against_brute_force import installed
 
 QUICK = [name for name in installed() if name != "milp"]
@@ -145,10 +146,9 @@ def test_callback_stops(name, hard):
     check_answer(hard, solution.tuples)
 
 
-@pytest.mark.parametrize(
-    ("name", "chosen"),
-    [(name, {}) for name in ("aco", "genetic", "tabu", "lagrangian")] + [("aco", {"mode": "paper"})],
-)
+@sample(
+    "name, chosen",
+    [(name, {}) for name in ("aco", "genetic", "tabu", "lagrangian")] + [("aco", {"mode": "paper"})], every=3)
 def test_the_limit_of_iterations_is_named(name, chosen, hard):
     solution = assign(hard, name, iterations=1, time_limit=20.0, **chosen)
     assert solution.stopped_by == "iterations" and solution.iterations >= 1

@@ -19,7 +19,7 @@ from experiments.common.oracles import (
     milp_optimum,
     small_problems,
 )
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 
 SETTINGS = [
     {},
@@ -50,7 +50,7 @@ def test_bound_is_valid_on_small_problems(count):
     assert closed >= 0.99 * solved
 
 
-@pytest.mark.parametrize("number", range(30))
+@sample("number", range(30), every=3)
 def test_bound_is_valid_on_larger_ones(number):
     rng = np.random.default_rng([77, number])
     if number % 3 == 0:

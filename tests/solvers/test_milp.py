@@ -32,6 +32,7 @@ def test_optimal_on_small_problems(backend):
     assert infeasible > 0
 
 
+@pytest.mark.slow
 def test_backends_agree_on_fifty_random_problems():
     rng = np.random.default_rng(5)
     for number in range(50):

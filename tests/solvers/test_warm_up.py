@@ -27,6 +27,7 @@ print(loaded()[0] - before)
 """
 
 
+@pytest.mark.slow
 def test_no_kernel_is_left_to_load():
     done = subprocess.run([sys.executable, "-c", _PROGRAM], capture_output=True, text=True, timeout=600, check=True)
     seconds, more = done.stdout.split()

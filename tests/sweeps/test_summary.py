@@ -69,6 +69,7 @@ def test_the_summary_is_the_mean_of_the_rows(study, tmp_path):
             assert row[f"{name}_low"] <= row[name] + 1e-12 and row[name] <= row[f"{name}_high"] + 1e-12
 
 
+@pytest.mark.slow
 def test_every_kind_of_design_can_be_drawn(study, scene, tmp_path):
     study.run(tmp_path / "a")
     assert [path.name for path in draw_study(tmp_path / "a")] == ["heatmap.png", "convergence.png"]

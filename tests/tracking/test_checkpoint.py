@@ -14,6 +14,7 @@ from assoc.tracking import TRACKERS
 from assoc.tracking.checkpoint import FORMAT, VERSION
 from assoc.tracking.filter_choice import two_speeds
 from tests.reliability.mutations import MARKER, spoil
+from tests.sizes import few_or_all, sample
 
 SCENE = simulation.simulate("three-radar", 4, scans=7)
 SCANS = 5
@@ -33,14 +34,15 @@ def step(tracker):
     return tracker.step(scan.time, scan.measurements)
 
 
+@few_or_all("count", 10, 40)
 @pytest.mark.parametrize("name", sorted(TRACKERS))
-def test_spoiled_files(name, tmp_path, monkeypatch):
+def test_spoiled_files(name, count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     kind = TRACKERS[name]
     saved(kind, "good.npz")
     content, rng = Path("good.npz").read_bytes(), np.random.default_rng(1)
     refused = 0
-    for _ in range(40):
+    for _ in range(count):
         Path("bad.npz").write_bytes(spoil(rng, content, "npz"))
         tracker = kind.for_scene(SCENE)
         try:
@@ -57,7 +59,7 @@ def test_spoiled_files(name, tmp_path, monkeypatch):
             step(tracker)
         except AssocError as error:
             assert "\n" not in str(error)
-    assert refused > 20
+    assert refused > count // 2
     assert not Path(MARKER).exists()
 
 
@@ -96,16 +98,15 @@ OF_HYPOTHESES = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "lies"),
+@sample(
+    "name, lies",
     [
         *((name, LIES) for name in sorted(TRACKERS)),
         ("mht", OF_MHT),
         ("mht-hypothesis", OF_MHT),
         ("mht", OF_TREES),
         ("mht-hypothesis", OF_HYPOTHESES),
-    ],
-)
+    ], every=3)
 def test_each_lie_is_named(name, lies, tmp_path):
     tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
     for field, lie in lies.items():

@@ -3,7 +3,6 @@
 from functools import cache
 
 import numpy as np
-import pytest
 
 from assoc import build_problem
 from assoc.scene import Scan
@@ -12,6 +11,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth
 from assoc.tracking import TRACKERS
 from assoc.tracking.joint_starts import crossings
+from tests.sizes import sample
 
 REGION = np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 100.0]])
 NOISE, TARGETS = 2e-3, 4
@@ -37,7 +37,7 @@ def scene(seed, scans=25):
     return observe(sensors, times, ids, list(paths), rng, region=REGION, velocities=[velocity] * scans)
 
 
-@pytest.mark.parametrize("name", ["mht", "joint-probabilistic", "multi-sensor"])
+@sample("name", ["mht", "joint-probabilistic", "multi-sensor"], every=3)
 def test_three_bearings_start_all_tracks_and_ghosts_die(name):
     one = scene(7)
     tracker = TRACKERS[name].for_scene(one)

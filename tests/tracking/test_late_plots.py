@@ -8,6 +8,7 @@ import pytest
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LatePlots
+from tests.sizes import sample
 
 KINDS = ["multi-sensor", "mht", "nearest-neighbour"]
 
@@ -37,7 +38,7 @@ def states(tracks):
     return {track.track_id: track.mean for track in tracks if track.confirmed}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@sample("kind", KINDS, every=3)
 def test_tracks_are_those_of_measurements_in_order(scene, kind):
     rng = np.random.default_rng(0)
     plain, late = TRACKERS[kind].for_scene(scene), LatePlots(TRACKERS[kind].for_scene(scene))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from assoc._cli.live import replayed
+from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker

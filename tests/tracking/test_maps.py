@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
+from importlib import import_module
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -165,23 +165,25 @@ def test_parquet(tmp_path):
         simulate("from-tracks", 1, file=str(tmp_path / "bad.parquet"))
 
 
-def test_the_programs(tmp_path):
+def test_the_programs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "flights.csv").write_text(FLIGHTS + "5,4b1,SWR1,47,8,\n")
 
-    def run(*words):
-        return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, cwd=tmp_path)
+    def run(program, *words):
+        code = import_module(program).main([*words])
+        return SimpleNamespace(returncode=code, **capsys.readouterr()._asdict())
 
     done = run("assoc.simulate", "from-tracks", "flights.csv", "-o", "scene.npz")
-    assert done.returncode == 0 and "rows left out, without altitude: 1" in done.stdout
+    assert done.returncode == 0 and "rows left out, without altitude: 1" in done.out
     done = run("assoc.track", "scene.npz", "-o", "tracks.csv", "--map", "tracks.kml")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.err
     assert {"latitude", "longitude", "altitude", "target"} <= {*pd.read_csv(tmp_path / "tracks.csv").columns}
     assert "SWR1" in (tmp_path / "tracks.kml").read_text()
     simulate("three-radar", scans=4).save(tmp_path / "nowhere.npz")
     done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--map", "x.geojson")
-    assert done.returncode == 2 and "give --origin LAT,LON" in done.stderr and not (tmp_path / "x.csv").exists()
+    assert done.returncode == 2 and "give --origin LAT,LON" in done.err and not (tmp_path / "x.csv").exists()
     done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--origin", "91,8")
-    assert done.returncode == 2 and "--origin: expected a latitude within" in done.stderr
+    assert done.returncode == 2 and "--origin: expected a latitude within" in done.err
     done = run("assoc.track", "nowhere.npz", "-o", "x.csv", "--origin", "47.4,8.5", "--map", "x.geojson")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.err
     assert pd.read_csv(tmp_path / "x.csv")["latitude"].between(47, 48).all()

@@ -13,6 +13,7 @@ from assoc.sensors import BearingSensor, PositionSensor, Radar3D
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation, LifeCycle, track_scene
 from experiments.trackers.oracle import OracleTracker
+from tests.sizes import sample
 from tests.tracking import plain
 
 KINDS = ["multi-sensor", "static", "mht", "nearest-neighbour"]
@@ -112,7 +113,7 @@ def test_scans_in_which_nobody_looked_do_not_count(kind):
     assert [track.confirmed for track in tracker.tracks if track.hits == 2] == [True]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@sample("kind", KINDS, every=3)
 def test_the_patience_counts_looks_not_scans(kind):
     """Ten scans for a turn: a track lives on though it is seen in one of them only."""
     tracker = make(kind, SENSORS[:1], life_cycle=LifeCycle(false_probability=1e-3))

@@ -1,13 +1,13 @@
 """Range rates: smaller errors of the velocity in all trackers, and crossing targets that keep their tracks."""
 
 import numpy as np
-import pytest
 
 from assoc import simulation
 from assoc.sensors import Radar3D
 from assoc.simulation.observation import observe
 from assoc.simulation.scenarios.three_radar import TRAJECTORIES
 from assoc.tracking import TRACKERS
+from tests.sizes import sample
 
 SCANS = 20
 
@@ -29,7 +29,7 @@ def velocity_errors(name, noise):
     return np.array(errors)
 
 
-@pytest.mark.parametrize("name", TRACKERS)
+@sample("name", TRACKERS, every=6)
 def test_velocities_are_better(name):
     plain, doppler = velocity_errors(name, 0.0), velocity_errors(name, 0.5)
     assert len(doppler) >= 0.95 * len(plain) > 3 * 10
@@ -67,7 +67,7 @@ def kept(doppler, seed, name):
     return wrong / max(total, 1)
 
 
-@pytest.mark.parametrize("name", ["nearest-neighbour", "mht", "multi-sensor"])
+@sample("name", ["nearest-neighbour", "mht", "multi-sensor"], every=3)
 def test_crossing_targets_keep_their_tracks(name):
     plain, doppler = (np.mean([kept(on, seed, name) for seed in range(6)]) for on in (False, True))
     assert doppler < 0.03 and doppler <= plain

@@ -1,6 +1,7 @@
 """Smoothed tracks against one large linear system, and against the truth."""
 
 import numpy as np
+import pytest
 
 from assoc import filters, simulation
 from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
@@ -9,6 +10,7 @@ from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoot
 from tests.tracking import plain
 
 
+@pytest.mark.slow
 def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements():
     rng, sensor = np.random.default_rng(3), plain.sensor()
     times = np.array([0.0, 1.0, 2.5, 3.0, 5.0])

@@ -16,6 +16,7 @@ from assoc.tracking import (
     TrackOrientedMHT,
 )
 from assoc.tracking.life_cycle import count_bits
+from tests.sizes import sample
 
 KINDS = list(TRACKERS.values())
 
@@ -101,7 +102,7 @@ def test_the_order_of_the_measurements_does_not_matter(kind):
         np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@sample("kind", KINDS, every=3)
 def test_memory_does_not_grow(kind):
     one = scene(30)
     tracker = kind.for_scene(one)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
@@ -98,6 +99,7 @@ class SourceRows:
         return list(table[np.argsort(table[:, 0], kind="stable")].T)
 
 
+@door
 def read_asterix(
     path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None
 ) -> AsterixContent:

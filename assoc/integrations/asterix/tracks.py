@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
@@ -24,6 +25,7 @@ _STEPS |= {"vx": (SPEED_STEP, 16), "vy": (SPEED_STEP, 16), "vz": (CLIMB_STEP, 16
 MOST_TRACKS = 65536
 
 
+@door
 def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Source = (0, 1)) -> None:
     """Write a table of tracks as category 062: system positions (x, y), height, velocity, climb, number, status.
 
@@ -74,6 +76,7 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     write_blocks(path, 62, contents)
 
 
+@door
 def read_tracks(path: str | os.PathLike[str]) -> pd.DataFrame:
     """Read tracks of category 062 that have a time, a number and a system position.
 

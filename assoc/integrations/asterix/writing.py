@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from assoc._files.output import write_atomically
+from assoc._system.door import door
 from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import edition
@@ -39,6 +40,7 @@ def write_blocks(path: str | os.PathLike[str], category: int, contents: list[dic
     write_atomically(path, lambda file: file.write(content))
 
 
+@door
 def write_plots(path: str | os.PathLike[str], recording: Recording, source: Source = (0, 1)) -> None:
     """Write a recording as plots of category 048, in the category's steps: 1/128 s, 1/256 nmi, 0.0055 deg, 25 ft.
 

@@ -124,9 +124,9 @@ def _ascend(
     return done
 
 
-def hard_pass(packing: Packing, duals: Floats, reduced: Floats, sweeps: int) -> None:
-    """Fill ``reduced`` from ``duals``, then raise ``duals`` by passes with the hard minimum (eq. above, T -> 0)."""
-    hard_sweeps(packing.arrays, duals, reduced, sweeps)
+def hard_pass(packing: Packing, duals: Floats) -> None:
+    """Raise ``duals`` by one pass with the hard minimum (eq. above, T -> 0)."""
+    hard_sweeps(packing.arrays, duals, np.empty(packing.num_columns), 1)
 
 
 def reduced_costs(packing: Packing, duals: Floats) -> Floats:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import certified_bound, hard_pass, reduced_costs
 from assoc.packing.packing import Packing
@@ -70,5 +68,5 @@ class Priced:
         if not run.memory_allows(LinearProgram.memory(packing.num_columns, packing.num_rows)):
             return
         duals = LinearProgram(packing).solve(duals=self.duals, deadline=run.deadline()).duals
-        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+        hard_pass(packing, duals)
         self.take_over(duals)

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
-from assoc._types import Floats
-from assoc.packing.packing import Packing
+from assoc.packing.branching.root import Root
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Allowed
 
@@ -41,7 +40,7 @@ class OpenNodes:
     ----------
     arrays : Stack
         ``arena``: columns of all open nodes; ``first``, ``size``: node t has the columns
-        ``arena[first[t]:first[t] + size[t]]``; ``slack``, shape (depth, R): which of its rows may stay uncovered;
+        ``arena[first[t]:first[t] + size[t]]``; ``slack``, shape (depth, rows of the program): which may stay uncovered;
         ``bound``: no solution of the node weighs less; ``variable``, ``duals``, shape (depth, rows of the program):
         its basis and the multipliers of that.
     count : int
@@ -50,8 +49,8 @@ class OpenNodes:
         No solution of the nodes that were given up for want of memory weighs less; ``inf``: none was.
     """
 
-    def __init__(self, packing: Packing, duals: Floats) -> None:
-        num, rows = packing.num_columns, packing.num_rows
+    def __init__(self, root: Root) -> None:
+        num, rows = root.program.weights.size, root.slack.size
         self.arrays = Stack(
             arena=np.empty(max(8 * num, 1024), dtype=np.int32),
             first=np.zeros(_DEPTH, dtype=np.int64),
@@ -63,10 +62,9 @@ class OpenNodes:
         )
         self.arrays.arena[:num] = np.arange(num)
         self.arrays.size[0] = num
-        self.arrays.slack[0] = packing.slack
-        # anchors alone
-        self.arrays.variable[0] = num + rows + np.arange(rows)
-        self.arrays.duals[0] = duals
+        self.arrays.slack[0] = root.slack
+        self.arrays.variable[0] = root.variable
+        self.arrays.duals[0] = root.duals
         self.count = 1
         self.given_up = math.inf
 

@@ -69,11 +69,12 @@ class Trials(NamedTuple):
 
 
 @njit
-def new_trials(program: Program) -> Trials:
-    """Room for trials; nothing is known of any pair."""
+def new_trials(program: Program, num_rows: int) -> Trials:
+    """Room for trials of pairs of measurements, the program's first rows; nothing is known of any."""
     num, size = program.weights.size, program.sides.size
+    rows = num_rows
     return Trials(
-        np.zeros((size, size)), np.zeros((2, size, size), np.float32), np.zeros((2, size, size), np.uint8),
+        np.zeros((rows, rows)), np.zeros((2, rows, rows), np.float32), np.zeros((2, rows, rows), np.uint8),
         np.zeros((_CANDIDATES, 2), np.int32), np.zeros(_CANDIDATES), new_basis(program),
         Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(size, np.bool_)), np.empty(size),
     )  # fmt: skip
@@ -239,3 +240,70 @@ def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
                     if both < counts[one] or both < counts[two]:
                         return int(one), int(two)
     return -1, -1
+
+
+@njit
+def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any) -> int:
+    """Find pairs that the LP's solution, in whole numbers, has together: those in most other columns; how many."""
+    pairs, values = trials.pairs, trials.values
+    num, num_sensors = cols.shape
+    counts[:] = 0
+    for j in allowed.active:
+        for s in range(num_sensors):
+            if cols[j, s] >= 0:
+                counts[cols[j, s]] += 1
+    found = 0
+    for i in range(basis.variable.size):
+        j = basis.variable[i]
+        if j >= num or basis.values[i] <= WHOLE:
+            continue
+        for s in range(num_sensors):
+            for t in range(s + 1, num_sensors):
+                one, two = cols[j, s], cols[j, t]
+                # where there is nothing else and both must be covered, there is no question
+                if one < 0 or two < 0 or not (
+                    counts[one] > 1 or counts[two] > 1 or allowed.slack[one] or allowed.slack[two]
+                ):
+                    continue
+                others = float(counts[one] + counts[two])
+                place = found
+                if found < values.size:
+                    found += 1
+                elif others <= values[found - 1]:
+                    continue
+                else:
+                    place = found - 1
+                while place > 0 and values[place - 1] < others:
+                    values[place] = values[place - 1]
+                    pairs[place] = pairs[place - 1]
+                    place -= 1
+                values[place] = others
+                pairs[place, 0], pairs[place, 1] = one, two
+    return found
+
+
+@njit
+def part_certain(
+    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
+) -> Any:
+    """Choose the certain pair that costs the most to have apart; it and what is to be done with it, as `decide`.
+
+    -1: of no pair there is a question, as all that has one row of it has the other one too.
+    """
+    pick, best = -1, -np.inf
+    trial = Effort(effort.cutoff, _EXCHANGES, effort.deadline)
+    for i in range(count):
+        if pick >= 0 and is_over(effort.deadline):
+            break
+        one, two = trials.pairs[i]
+        open_question = allowed.slack[one] or allowed.slack[two]
+        for j in allowed.active:
+            open_question = open_question or is_dropped(cols, j, one, two, True)
+        if not open_question:
+            continue
+        _, reached = _try(program, cols, allowed, basis, trials, ((one, two), False), trial)
+        if reached >= effort.cutoff:
+            return i, TOGETHER
+        if reached > best:
+            pick, best = i, reached
+    return pick, NEITHER

@@ -67,7 +67,7 @@ is not among them: covers are built with it."""
 
 @dataclass(slots=True)
 class Component(Priced):
-    """A connected piece of the problem with its multipliers and the best cover known.
+    """An independent component of the problem with its multipliers and the best cover known.
 
     Attributes
     ----------
@@ -87,6 +87,8 @@ class Component(Priced):
         When time is over, by the kernels' clock (clock.py).
     refinement : str
         What improves covers (`SearchParameters`).
+    proven : float
+        A lower bound by branch and bound (proof.py), where that was asked; the multipliers alone do not give it.
     worker : int
         Which of several workers searches it (team.py).
     iterations, stalled : int
@@ -98,6 +100,7 @@ class Component(Priced):
     weight: float = np.inf
     deadline: float = np.inf
     refinement: str = "full"
+    proven: float = -np.inf
     worker: int = 0
     iterations: int = 0
     stalled: int = 0
@@ -116,7 +119,7 @@ class Component(Priced):
     @property
     def closed(self) -> bool:
         """Whether the best cover is optimal."""
-        return self.weight - self.bound <= self.tolerance
+        return self.weight - max(self.bound, self.proven) <= self.tolerance
 
     @property
     def late(self) -> bool:

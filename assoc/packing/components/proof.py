@@ -21,15 +21,22 @@ def bound_of_component(component: Component, run: Run) -> float:
     """Raise the bound of an open component by a short branch and bound."""
     if component.closed:
         # whole-numbered weights: nothing fits between the bound and the cover
-        return component.weight if component.packing.granularity else min(component.bound, component.weight)
+        known = max(component.bound, component.proven)
+        return component.weight if component.packing.granularity else min(known, component.weight)
     if run.should_stop():
-        return component.bound
+        return max(component.bound, component.proven)
     search = BranchAndBound(
-        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+        component.packing,
+        component.duals,
+        component.weight,
+        component.tolerance,
+        run.deadline(),
+        run.memory_allows,
+        cuts=True,
     )
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)
-    return min(max(component.bound, search.lower_bound), component.weight)
+    return min(max(component.bound, component.proven, search.lower_bound), component.weight)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:

@@ -23,6 +23,9 @@ from assoc.packing.run import Outcome, Run
 
 # covers from the linear program with which a search begins
 _DIVES = 3
+# components of fewer rows are bounded before they are searched, and not only after that: it takes less time than an
+# iteration, and a search that has the optimum knows it
+_SMALL = 30
 
 
 def search_components(
@@ -86,6 +89,8 @@ def search_components(
             over = component.closed or (component.best is not None and run.should_stop())
             if not over:
                 if team is None:
+                    if component.packing.num_rows < _SMALL and component.best is not None:
+                        component.proven = bound_of_component(component, run)
                     team = Team(make, component, run, parameters.clusters, workers, pool)
                 before, iterations_before = component.weight, component.iterations
                 over = _take_turn(component, team, run, parameters)

@@ -49,7 +49,7 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     smaller = whole.packing.restrict(keep)
     duals = whole.duals[smaller.row_origin]
     duals = np.ascontiguousarray(np.where(smaller.slack, np.minimum(duals, 0.0), duals))
-    hard_pass(smaller, duals, np.empty(smaller.num_columns), 1)
+    hard_pass(smaller, duals)
     place = np.full(whole.packing.num_columns, -1, dtype=np.int32)
     place[smaller.origin] = np.arange(smaller.num_columns, dtype=np.int32)
     owner = whole.best[smaller.row_origin]

@@ -60,7 +60,9 @@ class Team:
             return
         self._members = []
         for number, rng in enumerate(run.rng.spawn(workers)):
-            own = replace(component, worker=number, _searches={}, _diver=None)
+            # a cover of its own, too: it is refined in place
+            best = None if component.best is None else component.best.copy()
+            own = replace(component, best=best, worker=number, _searches={}, _diver=None)
             # a run of its own: the same clock, another generator
             aside = Run(rng, time_limit=run.time_limit, started=run.started)
             self._members.append((own, make(own, rng), aside))

@@ -22,6 +22,8 @@ from assoc.packing.simplex.program import Allowed, Program, reduced_cost
 
 # a pivot smaller than this is none
 SMALL_PIVOT = 1e-7
+# squared lengths of the inverse's rows that are computed anew
+_LONG = 1e10
 
 
 class Basis(NamedTuple):
@@ -47,6 +49,8 @@ class Basis(NamedTuple):
         Room for a row and a column of the tableau, and for the norms.
     steps : float array, shape (n,)
         Room for the entries of a row of the tableau, column by column.
+    age : int64 array, shape (1,)
+        Exchanges since everything was computed anew.
     """
 
     variable: NDArray[np.int32]
@@ -62,6 +66,7 @@ class Basis(NamedTuple):
     column: Floats
     sums: Floats
     steps: Floats
+    age: NDArray[np.int64]
 
 
 @njit
@@ -71,7 +76,7 @@ def new_basis(program: Program) -> Basis:
     return Basis(
         np.zeros(size, np.int32), np.full(num, -1, np.int32), np.full(size, -1, np.int32), np.zeros((size, size)),
         np.empty(size), np.empty(size), np.empty(size), np.empty(num), np.zeros(size),
-        np.empty(size), np.empty(size), np.empty(size), np.empty(num),
+        np.empty(size), np.empty(size), np.empty(size), np.empty(num), np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -87,6 +92,7 @@ def copy_basis(source: Basis, target: Basis) -> None:
     target.duals[:] = source.duals
     target.reduced[:] = source.reduced
     target.anchors[:] = source.anchors
+    target.age[:] = source.age
 
 
 @njit
@@ -104,6 +110,7 @@ def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: B
             basis.slack_place[r] = r
         else:
             basis.variable[r] = num + size + r
+    basis.age[:] = 0
     basis.norms[:] = 1.0
     basis.values[:] = program.sides
     basis.duals[:] = duals
@@ -159,10 +166,18 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
         if column[i] != 0.0:
             ratio = column[i] / pivot
             # rounding may not make it less than the part that is added
-            norms[i] = max(norms[i] - 2.0 * ratio * sums[i] + ratio * ratio * own, 1e-4 + 1e-3 * ratio * ratio * own)
+            least = 1e-4 + 1e-3 * ratio * ratio * own
+            norm = norms[i] - 2.0 * ratio * sums[i] + ratio * ratio * own
+            norms[i] = norm if norm > least else least
+            if not norms[i] < _LONG:
+                # what rounding leaves of such numbers is no length; and one that is no number would never leave
+                norms[i] = 0.0
+                for r in range(size):
+                    norms[i] += inverse[r, i] * inverse[r, i]
             basis.values[i] -= step * column[i]
     norms[p] = max(own / (pivot * pivot), 1e-4)
     basis.values[p] = step
+    basis.age[0] += 1
 
 
 @njit
@@ -253,6 +268,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
             costs[i] = program.weights[code]
         elif code >= num + size:
             costs[i] = basis.anchors[code - num - size]
+    basis.age[:] = 0
     basis.norms[:] = 0.0
     basis.values[:] = 0.0
     for r in range(size):
@@ -281,7 +297,9 @@ def residual(program: Program, basis: Basis) -> float:
                 left[program.rows[k]] -= value
     largest = 0.0
     for r in range(size):
-        largest = max(largest, abs(left[r]))
+        # what is no number is no residual that is small
+        if not abs(left[r]) <= largest:
+            largest = abs(left[r])
     return largest
 
 

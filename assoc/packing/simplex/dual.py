@@ -40,7 +40,8 @@ _VALUE = 1e-9
 _ENTRY = 1e-9
 # reduced costs, as a share of the largest weight: this far below 0 they are 0
 _COST = 1e-12
-# exchanges between two looks at the residual and at the clock, and after which everything is computed anew
+# exchanges between two looks at the residual and at the clock, and after which everything is computed anew: a basis
+# may be at work for thousands of short calls
 _LOOK = 20
 _FRESH = 400
 _RESIDUAL = 1e-9
@@ -58,7 +59,7 @@ class Effort(NamedTuple):
 def _leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
     """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
     num, size = program.weights.size, program.sides.size
-    best = 0.0
+    best = -1.0
     place = -1
     for i in range(size):
         value = basis.values[i]
@@ -72,7 +73,8 @@ def _leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
             elif code < num + size and allowed.slack[code - num]:
                 continue
         score = value * value / basis.norms[i]
-        if score > best:
+        # whatever rounding made of the norms, what is outside its limits must be found
+        if not score <= best:
             best = score
             place = i
     return place
@@ -148,13 +150,12 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         scale = max(scale, abs(program.weights[j]))
     tolerance = _COST * max(scale, 1e-300)
     done = 0
-    old = 0
+    age = basis.age
     while True:
         if done % _LOOK == 0 and is_over(effort.deadline):
             return STOPPED, done
-        if old >= _FRESH or (old > 0 and old % _LOOK == 0 and residual(program, basis) > _RESIDUAL):
+        if age[0] >= _FRESH or (age[0] > 0 and age[0] % _LOOK == 0 and not residual(program, basis) <= _RESIDUAL):
             _renew(program, allowed, basis, tolerance)
-            old = 0
         bound = 0.0
         for r in range(program.sides.size):
             bound += program.sides[r] * basis.duals[r]
@@ -162,9 +163,8 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
             return CUT, done
         p = _leaving(program, allowed, basis)
         if p < 0:
-            if old > 0 and residual(program, basis) > _RESIDUAL:
+            if age[0] > 0 and not residual(program, basis) <= _RESIDUAL:
                 _renew(program, allowed, basis, tolerance)
-                old = 0
                 continue
             return OPTIMAL, done
         if done >= effort.exchanges:
@@ -174,9 +174,8 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
             basis.row[r] = basis.inverse[r, p]
         chosen, step = _entering(program, allowed, basis, sign, tolerance)
         if chosen < 0:
-            if old > 0:
+            if age[0] > 0:
                 _renew(program, allowed, basis, tolerance)
-                old = 0
                 continue
             # the multipliers can rise for ever; as far as they are asked for is enough
             _step(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
@@ -185,9 +184,8 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
             coordinates(program, basis, chosen, basis.column)
         else:
             basis.column[:] = basis.inverse[chosen - num]
-        if abs(basis.column[p]) < SMALL_PIVOT and old > 0:
+        if abs(basis.column[p]) < SMALL_PIVOT and age[0] > 0:
             _renew(program, allowed, basis, tolerance)
-            old = 0
             continue
         _step(program, allowed, basis, p, sign, step)
         if chosen < num:
@@ -195,7 +193,6 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         exchange(basis, p, basis.column)
         enter(program, basis, p, chosen)
         done += 1
-        old += 1
 
 
 @njit

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
+from assoc._system.door import door
 from assoc._text.html import escape, warning_list
 from assoc.association.association import Association
 from assoc.association.scan import ScanAssociation
@@ -47,6 +48,7 @@ _HISTORY = """<div class="halves"><div><h3>This scan: cost and lower bound</h3>
 <div id="scans-plot" class="plot small"></div></div></div>"""
 
 
+@door
 def write_association_report(
     path: str | os.PathLike[str],
     association: Association,

@@ -32,7 +32,9 @@ def plot_data(shown: PlotTracks, decimals: int) -> dict[str, Any]:
             columns = zip("xyz", (*places[own].T, height[own]), strict=True)
             path = {axis: plain_numbers(values, decimals) for axis, values in columns}
             truth.append({"id": name, "t": plain_numbers(recording.times[own], 4), **path})
-    return {"measured": measured, "truth": truth, "rates": _rates(shown)}
+    # plots are counted from their radar
+    radar = {"name": "radar", "place": [0, 0, 0]}
+    return {"measured": measured, "truth": truth, "rates": _rates(shown), "sensors": [radar]}
 
 
 def _rates(shown: PlotTracks) -> dict[str, Any] | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._text.html import escape
 from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
@@ -21,6 +22,7 @@ _COMPONENTS = ("range", "azimuth", "elevation", "x", "y", "z")
 _MOST_SHOWN = 4_000
 
 
+@door
 def write_registration_report(
     path: str | os.PathLike[str], registration: Registration, *, name: str = "", words: Sequence[str] | None = None
 ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._text.html import escape
 from assoc.plotting.heat_map import LABELS, cells
 from assoc.plotting.report.page import Page, cards, definitions, made_with, sortable_table
@@ -41,6 +42,7 @@ _CURVES = """<div class="controls"><label>over <select id="trace-axis"><option v
 the one chosen in the table is black.</p>"""
 
 
+@door
 def write_sweep_report(
     path: str | os.PathLike[str],
     folder: str | os.PathLike[str],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._system.door import door
 from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -32,13 +33,15 @@ GOSPA_CUTOFF = 1_000.0
 _NEEDED = ("track_id", "time", "x", "y")
 _INSTANTS = 300
 _DECIMALS = 4
+_ON_EARTH = {"lat": "latitude", "lon": "longitude"}
 _MOST_POINTS = 40_000
 _MOST_MEASUREMENTS = 30_000
 
 _SCENE = (
     controls("time")
     + """<div class="controls"><div class="buttons"><button type="button" id="nearer" disabled>Zoom to track</button>
-<button type="button" id="whole">Whole scene</button></div></div>
+<button type="button" id="whole">Whole scene</button>
+<button type="button" id="legend" aria-pressed="true">Legend</button></div></div>
 <div id="scene-plot" class="plot large"></div><p class="note" id="detail" aria-live="polite"></p>"""
 )
 
@@ -48,6 +51,7 @@ _ALTITUDES = '<div id="altitude-plot" class="plot small"></div>'
 _COUNTS = '<div id="counts-plot" class="plot small"></div>'
 
 
+@door
 def write_tracking_report(
     path: str | os.PathLike[str],
     tracks: pd.DataFrame,
@@ -147,6 +151,10 @@ def _data(
         path = {"id": number_of, **_path(part["time"], part[["x", "y", "z"]], decimals)}
         if "altitude" in part:
             path["h"] = plain_numbers(part["altitude"].to_numpy(dtype=float), 0)
+        if "latitude" in part:
+            path |= {key: plain_numbers(part[name].to_numpy(dtype=float), 5) for key, name in _ON_EARTH.items()}
+        if "target" in part and str(part["target"].iloc[0]):
+            path["target"] = str(part["target"].iloc[0])
         paths.append(path)
     if scene is not None and scene.num_scans <= _INSTANTS:
         instants = np.unique(scene.times)

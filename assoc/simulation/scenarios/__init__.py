@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from assoc._parameters import Parameters
+from assoc._parameters import Parameters, whole_seed
+from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
@@ -28,16 +29,19 @@ _MODULES = {
 _RECORDINGS = {"rotating-radar": "assoc.simulation.scenarios.rotating_radar"}
 
 
+@door
 def names() -> list[str]:
     """Names of all scenarios that make a scene."""
     return list(_MODULES)
 
 
+@door
 def recording_names() -> list[str]:
     """Names of all scenarios that make a recording of plots."""
     return list(_RECORDINGS)
 
 
+@door
 def parameters(name: str) -> type[Parameters]:
     """Return the parameter dataclass of a scenario; its fields' metadata have a "help" text.
 
@@ -52,15 +56,16 @@ def parameters(name: str) -> type[Parameters]:
     return cast("type[Parameters]", import_module(every[name]).parameters)
 
 
-def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
+@door
+def simulate(name: str, seed: int | None = 0, **values: Any) -> Scene:
     """Simulate a scene.
 
     Parameters
     ----------
     name : str
         One of ``names()``.
-    seed : int, default 0
-        Seed of the one random generator: the same seed gives the same scene.
+    seed : int or None, default 0
+        Seed of the one random generator: the same seed gives the same scene; None: a random one, which its name tells.
     **values
         Parameters of the scenario (``parameters(name)``).
 
@@ -79,7 +84,8 @@ def simulate(name: str, seed: int = 0, **values: Any) -> Scene:
     return cast(Scene, _simulate(name, seed, values))
 
 
-def simulate_recording(name: str, seed: int = 0, **values: Any) -> SimulatedPlots:
+@door
+def simulate_recording(name: str, seed: int | None = 0, **values: Any) -> SimulatedPlots:
     """Simulate a recording of radar plots.
 
     Parameters
@@ -99,7 +105,7 @@ def simulate_recording(name: str, seed: int = 0, **values: Any) -> SimulatedPlot
     return cast("SimulatedPlots", _simulate(name, seed, values))
 
 
-def _simulate(name: str, seed: int, values: dict[str, Any]) -> Any:
+def _simulate(name: str, seed: int | None, values: dict[str, Any]) -> Any:
     kind = parameters(name)
     known = [field.name for field in fields(cast(Any, kind))]
     for key in values:
@@ -108,11 +114,10 @@ def _simulate(name: str, seed: int, values: dict[str, Any]) -> Any:
     missing = [f.name for f in fields(cast(Any, kind)) if f.default is MISSING and f.name not in values]
     if missing:
         raise InvalidInputError(f"{missing[0]}: scenario {name!r} needs a value")
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InvalidInputError(f"seed: expected a whole number >= 0, got {seed!r}")
+    seed = whole_seed(seed)
     chosen = kind(**values)
     module = import_module({**_MODULES, **_RECORDINGS}[name])
-    return module.simulate(chosen, np.random.default_rng(int(seed)), _title(name, seed, chosen))
+    return module.simulate(chosen, np.random.default_rng(seed), _title(name, seed, chosen))
 
 
 def _title(name: str, seed: int, chosen: Parameters) -> str:

@@ -19,7 +19,7 @@ from assoc.errors import LimitExceededError
 from assoc.scene.geodesy import east_north_up
 from assoc.scene.scene import Scene
 from assoc.simulation.cleaning import Reports, clean
-from assoc.simulation.flight_reports import ALTITUDE_UNITS, COLUMNS, FlightReports, read_flight_reports
+from assoc.simulation.flight_reports import ALTITUDE_UNITS, COLUMNS, SPEED_UNITS, FlightReports, read_flight_reports
 from assoc.simulation.flights import STEP
 from assoc.simulation.interpolation import along, frame_velocities, resample
 from assoc.simulation.memory import MOST, require_scene_memory
@@ -53,6 +53,9 @@ class FromTracksParameters(Parameters):
     altitude_column: str | None = _column("altitude", "")
     name_column: str | None = _column("name", ", as call signs, if there is one")
     altitude_unit: Literal["m", "ft"] = field(default="m", metadata={"help": "unit of the altitudes"})
+    speed_unit: Literal["m/s", "kt"] = field(
+        default="m/s", metadata={"help": "unit of velocity and vertrate; with kt the latter is in feet per minute"}
+    )
     interval: float = field(
         default=10.0, metadata={"help": "seconds from scan to scan (positions are interpolated)"}
     )
@@ -92,6 +95,7 @@ class FromTracksParameters(Parameters):
         if self.scans is not None:
             self._whole("scans", most=MAX_SCANS)
         self._require(self.altitude_unit in ALTITUDE_UNITS, "altitude_unit", "'m' or 'ft'")
+        self._require(self.speed_unit in SPEED_UNITS, "speed_unit", "'m/s' or 'kt'")
         self._number("interval", "max_gap", "noise", "false_alarms", above=0.0)
         self._number("spread", "range_rate_noise", least=0.0)
         if self.turns is not None:
@@ -103,7 +107,7 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
     named = {meaning: getattr(p, f"{meaning}_column") for meaning in COLUMNS}
-    recording = read_flight_reports(p.file, named, p.altitude_unit)
+    recording = read_flight_reports(p.file, named, p.altitude_unit, p.speed_unit)
     flown, found = _flown(recording, p.clean)
     origin = (_middle(flown.latitude), _middle(flown.longitude), 0.0)
     reports = east_north_up(flown.latitude, flown.longitude, flown.height, origin)

@@ -120,7 +120,10 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
 def _cycle(
     nodes: Any, value: Floats, greedy: bool, starts: Any, tours: Any, lengths: Any, rng: Any, deadline: float
 ) -> Any:
-    """Walk all ants' tours; the owner (node) of each row for each ant. Ants that are late stay at home."""
+    """Walk all ants' tours; the owner (node) of each row for each ant.
+
+    Ants that would start after the deadline do not walk.
+    """
     num, num_sensors = nodes.shape
     num_ants, num_rows = tours.shape
     owners = np.full((num_ants, num_rows), -1, np.int32)

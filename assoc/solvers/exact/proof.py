@@ -9,7 +9,7 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.search import BranchAndBound, compile_branching_ahead
 from assoc.packing.components.component import Component
 from assoc.packing.components.search import complete_greedily
 from assoc.packing.components.splitting import split_component
@@ -26,9 +26,13 @@ from assoc.solvers.tabu.parameters import TabuParameters
 _LARGE = 30
 _MANY = 90
 _TURNS = 3
+# share of a component's gap by which its bound has risen when the trace says so
+_WORTH = 0.02
 # columns up to which a component is branched on before anything else, and for how many nodes
-_SMALL = 400
+_SMALL = 2000
 _SHORT = 50
+# columns from which a problem may be hard enough for its branching to be compiled beforehand
+_HARD = 500
 
 
 @dataclass(slots=True)
@@ -59,8 +63,14 @@ class _Task:
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
+    if packing.num_columns > _HARD:
+        compile_branching_ahead()
     reduction = Reduction(packing, run)
     components = reduction.reduce()
+    columns, weight, bound = reduction.closed_columns, reduction.closed_weight, reduction.closed_bound
+    if components:
+        # what is known before the search of hard ones: worth seeing where the search takes long
+        _record(run, 0, weight, bound, [_Task(one) for one in components])
     tasks: list[_Task] = []
     settled: list[_Task] = []
     nodes = 0
@@ -74,8 +84,6 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             settled.append(task)
         else:
             tasks.extend(_Task(one) for one in _sharpen(component, run))
-    columns = reduction.closed_columns
-    weight, bound = reduction.closed_weight, reduction.closed_bound
 
     def show(tasks: list[_Task]) -> None:
         _record(run, nodes, weight, bound, settled + tasks)
@@ -90,7 +98,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             if task.search is None:
                 task.search = _branching(component, run)
                 component.stalled = 0
-            before = task.search.nodes
+            before, bound_before = task.search.nodes, task.bound
             # some ten milliseconds of work between two looks at the clock
             task.search.run(min(max(1, 20_000 // max(component.packing.num_columns, 1)), node_limit - nodes))
             nodes += task.search.nodes - before
@@ -98,7 +106,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             if not task.search.done:
                 task.turns += 1
                 # as long as they improve it, metaheuristics get half the time; then less and less
-                if task.turns >= _TURNS * min(1 + component.stalled // 5, 5):
+                if task.turns >= _TURNS * min(1 + component.stalled, 10):
                     task.turns = 0
                     if _search_better(task, run):
                         task.search.weight = component.weight
@@ -107,7 +115,8 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 # in one search the nodes of independent components multiply
                 smaller = split_component(component) if better else None
                 tasks.extend([task] if smaller is None else [_Task(one) for one in smaller])
-                if better:
+                risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
+                if better or risen or run.is_silent():
                     _record(run, nodes, weight, bound, tasks)
                 continue
             if better:
@@ -128,9 +137,15 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branching(component: Component, run: Run) -> BranchAndBound:
+def _branching(component: Component, run: Run, cuts: bool = True) -> BranchAndBound:
     return BranchAndBound(
-        component.packing, component.duals, component.weight, component.tolerance, run.deadline(), run.memory_allows
+        component.packing,
+        component.duals,
+        component.weight,
+        component.tolerance,
+        run.deadline(),
+        run.memory_allows,
+        cuts=cuts,
     )
 
 
@@ -139,7 +154,7 @@ def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
     task = _Task(component)
     if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = _branching(component, run)
+    task.search = _branching(component, run, cuts=False)
     task.search.run(nodes)
     task.take_over()
     return task

@@ -23,8 +23,6 @@ from assoc.packing.bounds.dual_ascent import (
     START,
     SmoothPoint,
     bounds_by_component,
-    certified_bound,
-    hard_pass,
     hard_sweeps,
     smooth_passes,
     spread,
@@ -131,8 +129,7 @@ class Reduction:
         on small problems mostly without loss.
         """
         duals = self._proof.copy()
-        hard_pass(self._whole, duals, np.empty(self._whole.num_columns), 2)
-        loss = self.closed_bound - certified_bound(self._whole, duals)
+        loss = self.closed_bound - math.fsum(_raised_bounds(self._whole.arrays, duals))
         return duals if loss <= TOLERANCE * max(1.0, abs(self.closed_bound)) else None
 
     def reduce(self) -> list[Component]:
@@ -140,29 +137,27 @@ class Reduction:
         num, granularity = self._whole.num_rows, self._whole.granularity
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
-        state: _State = _start(self._whole.arrays)
-        self._take_over_start(state)
-        while counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
-            state = _reduce(state, closed, granularity, self._run.deadline())
+        arrays, incumbents = self._whole.arrays, self._incumbents()
+        state = _state(_begin(arrays, *incumbents, closed, granularity, self._run.deadline()))
+        while state and counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
+            state = _state(_reduce(state, closed, granularity, self._run.deadline()))
         self.closed_columns.append(closed.columns[: counts[1]])
         self.closed_bound = math.fsum(closed.values[: counts[2], 0])
         self.closed_weight = math.fsum(closed.values[: counts[2], 1])
-        return self._open_components(state) if state.packing.slack.size else []
+        return self._open_components(state) if state else []
 
-    def _take_over_start(self, state: _State) -> None:
-        """Let what is known be the incumbents of the components that it covers as they must be."""
-        if self._run.start is None:
-            return
+    def _incumbents(self) -> tuple[NDArray[np.int32], Floats]:
+        """What is known, for the components that it covers as they must be: the column of each row, and weights."""
         whole = self._whole
+        if self._run.start is None:
+            return np.full(whole.num_rows, -1, dtype=np.int32), np.full(whole.num_components, np.inf)
         cover = Cover.of(whole, self._run.start)
         uncovered = np.flatnonzero((cover.owner < 0) & ~whole.slack)
-        weight = np.bincount(
-            np.searchsorted(whole.col_start, self._run.start, side="right") - 1,
-            weights=whole.weights[self._run.start],
-            minlength=state.weight.size,
-        )
+        component = np.searchsorted(whole.col_start, self._run.start, side="right") - 1
+        weight = np.zeros(whole.num_components)
+        np.add.at(weight, component, whole.weights[self._run.start])
         weight[np.searchsorted(whole.row_start, uncovered, side="right") - 1] = np.inf
-        state.owner[:], state.weight[:] = cover.owner, weight
+        return cover.owner, weight
 
     def _open_components(self, state: _State) -> list[Component]:
         packing = Packing(*state.packing, state.origin, state.rows, self._whole.granularity)
@@ -177,29 +172,41 @@ class Reduction:
         return components
 
 
+def _state(arrays: Any) -> _State | None:
+    """The state of the arrays that a kernel returns."""
+    count = len(PackingArrays._fields)
+    return None if arrays is None else _State(PackingArrays(*arrays[:count]), *arrays[count:])
+
+
 @njit
-def _start(packing: PackingArrays) -> _State:
-    """The state of the reduction at its start."""
+def _begin(
+    packing: PackingArrays, owner: Any, weight: Floats, done: _Closed, granularity: float, deadline: float
+) -> Any:
+    """Begin with incumbents and go through temperatures; one kernel, as most scenes need no second one."""
     num, num_rows, num_components = packing.weights.size, packing.slack.size, packing.col_start.size - 1
     smooth = np.zeros(num_rows)
-    reduced = np.empty(num)
-    hard_sweeps(packing, smooth, reduced, 1)
-    return _State(
+    hard_sweeps(packing, smooth, np.empty(num), 1)
+    state = _State(
         packing,
         np.arange(num).astype(np.int32),
         np.arange(num_rows).astype(np.int32),
         smooth,
         smooth.copy(),
-        np.full(num_rows, -1, np.int32),
-        np.full(num_components, np.inf),
+        owner,
+        weight,
         np.full(num_components, -np.inf),
         spread(packing) * START,
     )
+    return _reduce(state, done, granularity, deadline)
 
 
 @njit
-def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> _State:
-    """Go through temperatures until none is left, nothing is open or the visits are used up; the new state."""
+def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> Any:
+    """Go through temperatures until none is left or the visits are used up.
+
+    Returns the arrays of the new state, in its order; None: nothing is open. A plain tuple: where Ctrl-C comes while a
+    result is converted, numba calls a record's class without having found it, and the process dies.
+    """
     packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
     counts, closed_columns, closed, proof = done
     visits = 0
@@ -272,7 +279,19 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
                 new_weight[c] = np.inf
         weight = new_weight
         bound = bounds_by_component(packing, hard)
-    return _State(packing, origin, rows, smooth, hard, owner, weight, bound, temperature)
+    if packing.slack.size == 0:
+        return None
+    return (
+        packing.cols, packing.weights, packing.slack, packing.col_start, packing.row_start, packing.row_ptr,
+        packing.row_cols, origin, rows, smooth, hard, owner, weight, bound, temperature,
+    )  # fmt: skip
+
+
+@njit
+def _raised_bounds(packing: PackingArrays, duals: Floats) -> Floats:
+    """Raise multipliers by two passes with the hard minimum; the bound of each component."""
+    hard_sweeps(packing, duals, np.empty(packing.weights.size), 2)
+    return bounds_by_component(packing, duals)
 
 
 @njit

@@ -2,8 +2,8 @@
 
 A child first takes the tuples that both parents have. The other tuples of both are then offered in an order
 drawn by their reduced costs, and taken where they fit; what mutation gives up and what then lies open is
-repaired by insertion with ejection (insertion.py) and exact sub-steps (cluster.py). A child
-replaces the worst member if it is better and no member costs the same.
+repaired by insertion with ejection (insertion.py) and exact sub-steps (cluster.py), or without refinement filled with
+what fits. A child replaces the worst member if it is better and no member costs the same.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
-from assoc.packing.neighbourhoods.cover import own
+from assoc.packing.kernels.sorting import ascending
+from assoc.packing.neighbourhoods.cover import Cover, own
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
 from assoc.packing.packing import PackingArrays
 
@@ -105,6 +106,10 @@ class Breeding:
         if component.inserts:
             rows = np.arange(owner.size, dtype=np.int32)
             insert_and_eject(component.arrays, owner, rows, component.deadline)
+        else:
+            # what lies open takes what fits, in an order drawn by reduced cost, or no child could gain a tuple
+            order = ascending(component.reduced / component.temperature + rng.gumbel(size=component.reduced.size))
+            Cover(component.packing, owner).add_greedily(order)
         return np.asarray(owner)
 
     def _admit(self, component: Component, owner: NDArray[np.int32], weight: float) -> None:

@@ -66,7 +66,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
         duals = dual_bound(packing, levels=_COARSE_LEVELS, passes=_COARSE_PASSES, run=run)
     else:
         duals = np.zeros(packing.num_rows)
-        hard_pass(packing, duals, np.empty(packing.num_columns), 1)
+        hard_pass(packing, duals)
     bound = certified_bound(packing, duals)
     if bound == math.inf:
         raise infeasible(packing)

@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.checking import checked_measurements
+from assoc.tracking.checkpoint import Memory
 from assoc.tracking.track import Decision, Step, Track
-from assoc.tracking.tracker import Memory, Tracker
+from assoc.tracking.tracker import Tracker
 
 HORIZON = 30.0
 """Seconds that a measurement may be late where nothing else is said."""
@@ -40,6 +42,7 @@ class _Kept:
     assigned: tuple[Array, ...] = ()
 
 
+@doors
 class LatePlots:
     """A tracker for measurements that may be late.
 

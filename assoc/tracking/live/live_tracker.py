@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._parameters import positive
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
@@ -48,6 +49,7 @@ class Picture(NamedTuple):
     """Sensor of each of these, (n,)."""
 
 
+@doors
 class LiveTracker:
     """Plots in, one by one and in nearly any order; pictures out, one for each interval.
 

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system import memory
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
@@ -39,6 +40,7 @@ from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 
+@doors
 class HypothesisOrientedMHT(Tracker):
     """Multiple hypothesis tracker that keeps the m best hypotheses about everything.
 
@@ -211,7 +213,7 @@ class HypothesisOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array, Array]:
         numbers = np.arange(len(z))
-        states, fit, positions, score = self._singles(s, z)
+        states, fit, positions, score = self._new_tracks.singles(s, z)
         numbers = numbers[fit]
         when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
         ids = np.empty(len(numbers), dtype=np.int64)

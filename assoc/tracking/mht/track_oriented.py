@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.own_times import score_costs
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
@@ -39,6 +40,7 @@ _MOST_CROSSINGS = 100
 """The most trees that begin in a scan where several sensors together tell a position."""
 
 
+@doors
 class TrackOrientedMHT(Tracker):
     """Multiple hypothesis tracker with track trees.
 
@@ -186,7 +188,7 @@ class TrackOrientedMHT(Tracker):
 
     def _roots(self, s: int, z: Array, time: float) -> tuple[Any, Roots]:
         """New trees, one for each measurement that tells a position, and their states."""
-        states, fit, positions, score = self._singles(s, z)
+        states, fit, positions, score = self._new_tracks.singles(s, z)
         numbers = np.flatnonzero(fit)
         # numbered by place, so that the order of the measurements does not matter
         ids = np.empty(len(numbers), dtype=np.int64)

@@ -43,10 +43,9 @@ class PlotTracks(NamedTuple):
 def track_plots(
     tracker: Tracker,
     recording: Recording,
-    windows: Sequence[Window],
+    windows: Iterable[Window],
     *,
     confirmed: bool = True,
-    progress: Iterable[Window] | None = None,
 ) -> PlotTracks:
     """Run a tracker of one radar over the windows of a recording.
 
@@ -55,20 +54,20 @@ def track_plots(
     tracker : Tracker
         Of a single sensor, one that takes measurements with times of their own.
     recording : Recording
-    windows : list of Window
+    windows : iterable of Window
         Of this recording.
     confirmed : bool
         Whether only confirmed tracks are listed.
-    progress : iterable of Window, optional
-        The windows once more, one that shows how far it is.
     """
     table = TrackTable()
     ends: list[float] = []
     takers: list[Array] = [np.zeros(0, dtype=np.int64)]
     sure: list[Array] = [np.zeros(0, dtype=np.bool_)]
     altitudes: dict[int, float] = {}
-    steps = step_windows(tracker, windows if progress is None else progress)
-    for window, step in zip(windows, steps, strict=True):
+    done: list[Window] = []
+    for window in windows:
+        (step,) = step_windows(tracker, [window])
+        done.append(window)
         ids = step.assigned[0]
         takers.append(np.where(ids > 0, ids, -1))
         sure.append(np.asarray(step.confirmed[0], dtype=np.bool_))
@@ -80,8 +79,8 @@ def track_plots(
     tracks = np.concatenate(takers)
     aircraft = recording.aircraft
     rates = None
-    if aircraft is not None and windows:
-        number = np.repeat(np.arange(len(windows)), [len(window) for window in windows])
-        rows = np.concatenate([window.rows for window in windows])
+    if aircraft is not None and done:
+        number = np.repeat(np.arange(len(done)), [len(window) for window in done])
+        rows = np.concatenate([window.rows for window in done])
         rates = ct_mt_it(number, aircraft[rows], tracks, np.concatenate(sure))
-    return PlotTracks(recording, windows, np.array(ends), tracks, rates, table)
+    return PlotTracks(recording, done, np.array(ends), tracks, rates, table)

@@ -107,13 +107,13 @@ class SingleScanTracker(Tracker):
         tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
         if not len(tuples):
             return self._batch[:0], tuples
-        positions, covariances, fit = self._fused(scan, tuples)
+        positions, covariances, fit = self._new_tracks.fused(scan, tuples)
         order = np.flatnonzero(fit)
         order = order[np.lexsort(positions[order].T)]
         rows, positions, covariances = tuples[order], positions[order], covariances[order]
         states = self.initiation.start(self.filter, positions, covariances)
         costs = tuple_costs(self._place, scan, rows, speed=self.initiation.speed)
-        score = self._new_scores(rows, costs, covariances)
+        score = self._new_tracks.scores(rows, costs, covariances)
         return TrackBatch.new(states, self._new_ids(len(order)), score, scan.time), rows
 
     def _decision(self, scan: Scan, batch: TrackBatch, rows: Array) -> Decision:

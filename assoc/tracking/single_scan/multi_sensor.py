@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, grow_timed_tuples
 from assoc.costs.tracks.scores import doubted_gain
@@ -15,6 +16,7 @@ from assoc.scene.scan import Scan
 from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
+@doors
 class MultiSensorTracker(SingleScanTracker):
     """Tracks and S sensors in one (S+1)-D assignment problem for each scan.
 
@@ -79,6 +81,6 @@ class MultiSensorTracker(SingleScanTracker):
         if not problem.num_tuples:
             return problem.tuples, problem.costs
         # where false alarms are rarer than new targets a single measurement is one, too
-        scores = self._new_scores(problem.tuples, problem.costs, self._fused(scan, problem.tuples)[1])
+        scores = self._new_tracks.scores(problem.tuples, problem.costs, self._new_tracks.fused(scan, problem.tuples)[1])
         good = scores > 0
         return problem.tuples[good], -scores[good]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.costs.gating import chi_square_quantiles
 from assoc.costs.tracks.gating import near_pairs
@@ -18,6 +19,7 @@ from assoc.scene.scan import Scan
 from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 
 
+@doors
 class StaticFusionTracker(SingleScanTracker):
     """S-D fusion of each scan by itself, then a 2-D assignment of the fused tuples to the tracks.
 

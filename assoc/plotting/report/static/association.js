@@ -181,12 +181,7 @@ try {
       if (valuesOf(name).some((value) => value !== null)) byId('measure').append(element('option', title, { value: name }));
     }
     choose = makeSlider(data.scans.length, scanLabel, showScan);
-    byId('legend').setAttribute('aria-pressed', String(!PHONE));
-    byId('legend').addEventListener('click', () => {
-      const button = byId('legend');
-      button.setAttribute('aria-pressed', String(button.getAttribute('aria-pressed') !== 'true'));
-      drawScene();
-    });
+    makeToggle(byId('legend'), !PHONE, drawScene);
     byId('plan').addEventListener('click', () => setSpace(false));
     byId('space').addEventListener('click', () => setSpace(true));
     byId('nearer').addEventListener('click', () => {

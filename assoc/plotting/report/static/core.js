@@ -99,6 +99,15 @@ const onRow = (table, choose) => table.tBodies[0].addEventListener('click', (eve
   choose(Number(row.dataset.row));
 });
 
+// A button that is pressed or not; `draw` follows.
+const makeToggle = (button, pressed, draw) => {
+  button.setAttribute('aria-pressed', String(pressed));
+  button.addEventListener('click', () => {
+    button.setAttribute('aria-pressed', String(button.getAttribute('aria-pressed') !== 'true'));
+    draw();
+  });
+};
+
 // A slider with its buttons; choose(i) moves it from elsewhere, and may say that it has another number of places now.
 const makeSlider = (places, label, show, prefix = '') => {
   let count = places;

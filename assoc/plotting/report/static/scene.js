@@ -38,11 +38,15 @@ const residualRows = (source, scan, target) => {
 
 const tupleText = (scan, target) => `(${scan.tuples[target].join(', ')})`;
 
+// Degrees, where a scene says where it is on the earth.
+const onEarth = (places, i) => (places ? [`${places[i][0].toFixed(5)}\u00b0, ${places[i][1].toFixed(5)}\u00b0`] : []);
+
 const targetHover = (source, scan, target) => {
   const place = scan.view.positions[target];
   const sigma = scan.view.sigmas[target];
   const lines = [`<b>target ${target + 1}</b>, tuple ${tupleText(scan, target)}`, `cost ${short(scan.costs[target], 5)}`];
   ['x', 'y', 'z'].forEach((axis, i) => lines.push(`${axis} ${metres(place[i])} \u00b1 ${short(sigma[i], 3)} m`));
+  lines.push(...onEarth(scan.view.degrees, target));
   residualRows(source, scan, target).forEach(([name, component, shown, sigmas]) => {
     lines.push(`${plain(name)} ${component} ${shown}${sigmas ? `, ${sigmas}` : ''}`);
   });

@@ -12,17 +12,22 @@ const drawMap = (map, measure) => {
   let least = Infinity;
   let most = -Infinity;
   middle.flat().forEach((value) => { if (value !== null) { least = Math.min(least, value); most = Math.max(most, value); } });
+  const constant = most - least <= 1e-9 * Math.max(Math.abs(least), Math.abs(most));
   middle.forEach((row, y) => row.forEach((value, x) => {
     if (value === null || small) return;
-    const light = most > least && value > (least + most) / 2;
+    const light = !constant && value > (least + most) / 2;
     annotations.push({ x, y, text: window.innerWidth < 820 ? short(value, 3) : withInterval(value, low[y][x], high[y][x]), showarrow: false, font: { size: 11, color: light ? '#000' : '#fff' } });
   }));
+  if (constant) {
+    annotations.push({ xref: 'paper', yref: 'paper', x: 0, y: 1, yanchor: 'bottom', xanchor: 'left', showarrow: false, text: `${plain(data.measures[measure])}: ${short(most, 4)} everywhere` });
+  }
   const layout = layoutOf(plain(map.across), plain(map.up), { annotations });
   Object.assign(layout.xaxis, { tickvals: map.xs.map((_, i) => i), ticktext: map.xs.map(plain), showgrid: false });
   Object.assign(layout.yaxis, { tickvals: map.ys.map((_, i) => i), ticktext: map.ys.map(plain), showgrid: false });
   Plotly.react('map-plot', [{
     type: 'heatmap', z: middle, colorscale: 'Cividis', colorbar: { title: { text: plain(data.measures[measure]), side: 'right' }, thickness: 14 },
-    ...(most > least ? {} : { zmin: least - 0.5, zmax: most + 0.5 }),
+    // one value everywhere has no scale: it is said above
+    ...(constant ? { zmin: least - 1, zmax: least + 1, showscale: false } : {}),
     text: middle.map((row, y) => row.map((value, x) => `${plain(map.across)} ${plain(map.xs[x])}, ${plain(map.up)} ${plain(map.ys[y])}<br>${withInterval(value, low[y][x], high[y][x])}`)),
     hovertemplate: '%{text}<extra></extra>',
   }], layout, CONFIG);

@@ -49,7 +49,9 @@ const present = (path, time) => {
 };
 
 const trackHover = (track, i) => [`<b>track ${track.id}</b>, t ${exact(track.t[i])} s`,
-  ...['x', 'y', 'z'].map((axis) => `${axis} ${short(track[axis][i] * unit.factor, 5)} ${unit.name}`)].join('<br>');
+  ...['x', 'y', 'z'].map((axis) => `${axis} ${short(track[axis][i] * unit.factor, 5)} ${unit.name}`),
+  ...(track.lat ? [`${track.lat[i].toFixed(5)}\u00b0, ${track.lon[i].toFixed(5)}\u00b0`] : []),
+  ...(track.target ? [`follows ${plain(track.target)}`] : [])].join('<br>');
 
 const drawTracks = () => {
   const time = data.instants[now.index];
@@ -91,6 +93,7 @@ const drawTracks = () => {
   const ranges = (now.zoom || near).map((range) => range.map((value) => value * unit.factor));
   layout.xaxis.range = ranges[0];
   Object.assign(layout.yaxis, { range: ranges[1], scaleanchor: 'x' });
+  layout.showlegend = byId('legend').getAttribute('aria-pressed') === 'true';
   layout.legend = { orientation: 'h', x: 0, xanchor: 'left', y: window.innerWidth < 820 ? -0.3 : -0.17, yanchor: 'top', font: { size: 12 } };
   const plot = byId('scene-plot');
   Plotly.react(plot, traces, layout, CONFIG);
@@ -167,6 +170,7 @@ try {
       now.zoom = [range(one.x), range(one.y)];
       drawTracks();
     });
+    makeToggle(byId('legend'), !PHONE, drawTracks);
     byId('whole').addEventListener('click', () => {
       now.zoom = null;
       Plotly.purge('scene-plot');

@@ -1,0 +1,91 @@
+"""``assoc.track --live``: tracks of plots as they come, until they end or a signal ends the program."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+from assoc._cli.options import flag_of
+from assoc._cli.signals import Interruption
+from assoc._cli.track.options import RADAR, make_tracker
+from assoc._cli.track.plot_lines import Lines, TrackWriter, parse_line, replayed
+from assoc._cli.values import number, whole_number
+from assoc._text.plain import printable
+from assoc.errors import InvalidInputError
+from assoc.scene.scene import Scene
+from assoc.tracking import LiveTracker, Tracker
+
+
+def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
+    """Track plots as they come, until they end or a signal ends the program."""
+    for flag in ("report", "rates", "window", "rotation", "registration", *RADAR):
+        if parsed[flag] is not None:
+            raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
+    if parsed["smooth"]:
+        raise InvalidInputError("--smooth: is for finished tracks, not for --live")
+    if parsed["udp"] is not None and parsed["replay"] is not None:
+        raise InvalidInputError("--udp and --replay: expected one of them")
+    parsed["filter"] = parsed["filter"] or "imm-cv"
+    given = [name for name in ("interval", "horizon", "wait") if parsed[name] is not None]
+    numbers = {name: number(parsed[name], flag_of(name)) for name in given}
+    turns = None if parsed["turns"] is None else [number(one, "--turns") for one in parsed["turns"].split(",")]
+    ports = {
+        name: None if parsed[name] is None else whole_number(parsed[name], flag_of(name), 0) for name in ("udp", "page")
+    }
+    speed = None if parsed["replay"] is None else number(parsed["replay"], "--replay")
+    if speed is not None and not 0 <= speed < math.inf:
+        raise InvalidInputError(f"--replay: expected a number >= 0, got {parsed['replay']!r}")
+    scene = Scene.load(file)
+
+    def tell(line: str) -> None:
+        print(f"assoc.track: {printable(line)}", file=sys.stderr, flush=True)
+
+    def make() -> Tracker:
+        return make_tracker(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+
+    tracker = LiveTracker(scene, make, turns=turns, tell=tell, **numbers)
+    tracker.warm_up()
+    page = None
+    if ports["page"] is not None:
+        from assoc.plotting.live import LivePage
+
+        page = LivePage(scene, ports["page"], scene.name)
+        tell(f"page: {page.address}")
+    lines = None if speed is not None else Lines(ports["udp"])
+    if lines is not None and lines.port is not None:
+        tell(f"plots: udp 127.0.0.1:{lines.port}")
+    kept = parsed["output"] not in (None, "-")
+    stream = open(parsed["output"], "w", encoding="utf-8", newline="\n") if kept else sys.stdout
+    writer = TrackWriter(stream, tracker.positions)
+
+    def show(pictures: list[Any]) -> None:
+        for picture in pictures:
+            writer.write(picture)
+            if page is not None:
+                page.show(picture)
+
+    def end() -> None:
+        show(tracker.finish())
+        if page is not None:
+            page.close()
+        if kept:
+            stream.close()
+        if lines is not None and lines.lost:
+            tell(f"{lines.lost} lines lost: they came quicker than tracks can be made")
+        tell(tracker.summary())
+
+    with interruption.reported(end):
+        if lines is None:
+            for plot in replayed(scene, speed or 0.0):
+                show(tracker.take(*plot))
+        else:
+            for line in lines:
+                try:
+                    found = parse_line(line, scene)
+                except InvalidInputError as error:
+                    tracker.leave_out("lines not understood", f"line left out: {error}")
+                    continue
+                if found is not None:
+                    show(tracker.take(*found))
+    end()

@@ -1,0 +1,59 @@
+"""Kernels that a hard problem will need are compiled in another process, while this one compiles those it needs first.
+
+On two cores the first hard problem after an installation then waits half as long.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+from assoc._system import compile_time, interpreted
+from assoc._system.compiled import is_kept
+
+_under_way: list[subprocess.Popen[bytes]] = []
+
+
+def compile_ahead(kernel: Any, prepare: Callable[[], object]) -> None:
+    """Let another process call ``prepare``, if no compiled code of the kernel that it is for is on disk.
+
+    Parameters
+    ----------
+    kernel : Dispatcher
+    prepare : callable
+        A function at the top level of a module, which calls the kernel.
+    """
+    if _under_way or not interpreted.may_use_processes() or is_kept(kernel):
+        return
+    words = [sys.executable, "-m", __name__, prepare.__module__, prepare.__qualname__]
+    quiet = subprocess.DEVNULL
+    try:
+        # Ctrl-C is for the program, with which this process ends
+        _under_way.append(subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True))
+    except OSError:
+        # no process to be had: this one compiles
+        return
+
+
+def wait_for_kernels() -> None:
+    """Wait for what is compiled ahead: compiling it here, too, would take longer."""
+    while _under_way:
+        with compile_time.loading():
+            _under_way.pop().wait()
+
+
+def _work(module: str, name: str) -> None:
+    import os
+
+    from assoc._system.processes import end_with_parent
+
+    end_with_parent(os.getppid())
+    with interpreted.compiled_only():
+        getattr(import_module(module), name)()
+
+
+if __name__ == "__main__":
+    _work(*sys.argv[1:])

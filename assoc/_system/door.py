@@ -1,0 +1,199 @@
+"""Wrong types at the doors of the library: one line that names the argument and what was expected.
+
+A function that is a `door` checks ranges and shapes itself. What it does not foresee, an object of another kind, ends
+in an error of Python somewhere inside; the door then looks which argument does not fit its annotation and says so. It
+costs nothing where all is well.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import inspect
+import os
+import sys
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any, Literal, TypeVar, Union
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assoc.errors import AssocError, InvalidInputError
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Class = TypeVar("Class", bound=type)
+
+_ERRORS = (TypeError, AttributeError, ValueError, IndexError, KeyError, OverflowError)
+_LISTS = (list, tuple, Sequence, Iterable)
+# elements of a list that are looked at
+_SOME = 1000
+
+
+def door(function: Function) -> Function:
+    """Make a public function answer arguments of a wrong type with one `InvalidInputError`."""
+
+    @functools.wraps(function)
+    def through(*args: Any, **keywords: Any) -> Any:
+        try:
+            return function(*args, **keywords)
+        except _ERRORS as error:
+            wrong = None if isinstance(error, AssocError) else _wrong_argument(function, args, keywords)
+            if wrong is None:
+                raise
+            raise InvalidInputError(wrong) from error
+
+    return typing.cast(Function, through)
+
+
+def doors(kind: Class) -> Class:
+    """Make the constructor of a public class, and its public methods, doors."""
+    for name, value in [*vars(kind).items()]:
+        if name == "__init__" or not name.startswith("_"):
+            if isinstance(value, types.FunctionType):
+                setattr(kind, name, door(value))
+            elif isinstance(value, classmethod):
+                setattr(kind, name, classmethod(door(value.__func__)))
+    return kind
+
+
+def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords: Mapping[str, Any]) -> str | None:
+    """Say of the first argument that does not fit its annotation what was expected; None if all do."""
+    try:
+        bound = inspect.signature(function).bind(*args, **keywords).arguments
+    except TypeError:
+        return None  # too many or too few: Python says it well
+    kinds = annotations_of(function)
+    for name, value in bound.items():
+        parameter = inspect.signature(function).parameters[name]
+        kind = kinds.get(name, Any)
+        if parameter.kind is parameter.VAR_KEYWORD:
+            continue
+        for one in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
+            if not fits(one, kind):
+                return f"{name}: expected {described(kind)}, got {_found(one, kind)}"
+    return None
+
+
+class _Unloaded(type):
+    """A class, or a module, that only a type checker sees: known by its name."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return _Unloaded(name, (), {})
+
+    def __getitem__(cls, item: Any) -> Any:
+        return cls
+
+
+class _Names(dict[str, Any]):
+    """The names of a module, also those that only a type checker sees."""
+
+    def __missing__(self, name: str) -> Any:
+        if hasattr(builtins, name):
+            raise KeyError(name)
+        return _Unloaded(name, (), {})
+
+
+def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
+    names = _Names(vars(sys.modules[function.__module__]))
+    found = {}
+    # a dataclass's constructor is made from strings, too
+    for name, text in inspect.get_annotations(function).items():
+        try:
+            found[name] = eval(text, {}, names) if isinstance(text, str) else text
+        except Exception:  # what cannot be read is not checked
+            found[name] = Any
+    return found
+
+
+def fits(value: Any, kind: Any) -> bool:
+    """Whether a value can stand where an annotation says ``kind``; arrays may be anything that makes one."""
+    if kind == ArrayLike:
+        return _makes_array(value)
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if kind is Any or kind is object or isinstance(kind, (TypeVar, str)):
+        return True
+    if kind is None or kind is type(None):
+        return value is None
+    if origin in (Union, types.UnionType):
+        return any(fits(value, one) for one in inner)
+    if origin is Literal:
+        return any(type(value) is type(one) and value == one for one in inner)
+    if origin is np.ndarray or kind is np.ndarray:
+        return _makes_array(value)
+    if origin is Callable or kind is Callable:
+        return callable(value)
+    if origin in _LISTS or kind in _LISTS:
+        if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+            return False
+        element = inner[0] if inner and not (origin is tuple and len(inner) > 1 and inner[1] is not ...) else Any
+        return not isinstance(value, Sequence) or all(fits(one, element) for one in value[:_SOME])
+    kind = origin or kind
+    if kind is float:
+        return isinstance(value, Real) and not isinstance(value, bool)
+    if kind is int:
+        return isinstance(value, Integral) and not isinstance(value, bool)
+    if kind is bool:
+        return isinstance(value, (bool, np.bool_))
+    if isinstance(kind, _Unloaded):
+        return kind.__name__ in [one.__name__ for one in type(value).__mro__]
+    if getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
+        return True
+    return isinstance(value, kind)
+
+
+def _makes_array(value: Any) -> bool:
+    try:
+        array = np.asarray(value)
+        return array.ndim > 0 and (array.dtype.kind in "biufmM" or not array.size)
+    except (TypeError, ValueError):
+        return False
+
+
+def described(kind: Any, several: bool = False) -> str:
+    """Return in words what an annotation asks for."""
+    if kind == ArrayLike:
+        kind = np.ndarray
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (Union, types.UnionType):
+        return " or ".join(dict.fromkeys(described(one, several) for one in inner))
+    if kind is None or kind is type(None):
+        return "None"
+    if origin is Literal:
+        return " or ".join(map(repr, inner))
+    if origin is np.ndarray or kind is np.ndarray:
+        return "arrays of numbers" if several else "an array of numbers"
+    if origin is Callable or kind is Callable:
+        return "functions" if several else "a function"
+    if origin in _LISTS or kind in _LISTS:
+        element = f" of {described(inner[0], several=True)}" if inner and inner[0] is not Any else ""
+        return f"{'lists' if several else 'a list'}{element}"
+    kind = origin or kind
+    plain = {
+        int: ("a whole number", "whole numbers"), float: ("a number", "numbers"), str: ("text", "texts"),
+        bool: ("True or False", "True or False"), Mapping: ("a mapping", "mappings"), dict: ("a mapping", "mappings"),
+        os.PathLike: ("a path", "paths"),
+    }  # fmt: skip
+    if kind in plain:
+        return plain[kind][several]
+    name = str(getattr(kind, "__name__", kind))
+    return name if several else f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _found(value: Any, kind: Any) -> str:
+    """Say what was given: short values as they are, of lists the first element that does not fit."""
+    if isinstance(value, (list, tuple)):
+        kinds = [one for one in (typing.get_args(kind) or [kind]) if typing.get_origin(one) in _LISTS] or [kind]
+        inner = typing.get_args(kinds[0])
+        if inner and typing.get_origin(kinds[0]) in _LISTS:
+            for number, one in enumerate(value[:_SOME]):
+                if not fits(one, inner[0]):
+                    return f"{_found(one, inner[0])} as element {number}"
+        return f"a {type(value).__name__}"
+    if value is None or isinstance(value, (bool, Real, str)):
+        return repr(value) if len(repr(value)) <= 80 else f"{repr(value)[:77]}..."
+    return f"a {type(value).__name__}"

@@ -1,0 +1,162 @@
+"""The node at work: taken from the stack, solved, thinned out, and put back as two.
+
+The search for the best solution (search.py) and that for the k best (ranking/component_ranking.py) take these steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.branching.open_nodes import Stack, push_node, take_node
+from assoc.packing.branching.pairs import Trials, answer, new_trials
+from assoc.packing.packing import PackingArrays
+from assoc.packing.simplex.basis import Basis, new_basis, refactor
+from assoc.packing.simplex.dual import Effort, restart, solve_dual
+from assoc.packing.simplex.program import (
+    Allowed,
+    Program,
+    all_allowed,
+    certified,
+    make_feasible,
+    reduced_cost,
+    weight_limit,
+)
+
+# exchanges of the simplex method at one node, at the most
+_EXCHANGES = 100_000
+
+
+class Work(NamedTuple):
+    """What the search of one packing has at hand.
+
+    Attributes
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of the columns, as the packing has them.
+    weights : float array, shape (N,)
+        Weights of the columns; the program may have others, none of them larger.
+    program : Program
+    basis : Basis
+        Of the node at work.
+    node : Allowed
+        What it allows; ``active`` is room.
+    trials : Trials
+    duals : float array, shape (rows of the program,)
+        Multipliers of the node's bound, feasible.
+    key : float array, shape (N,)
+        Room for what columns are sorted by.
+    found, trial : int32 arrays, shape (R,)
+        Columns of the best solution found, and room for another one.
+    limit : float
+        No solution weighs as much.
+    """
+
+    cols: NDArray[np.int32]
+    weights: Floats
+    program: Program
+    basis: Basis
+    node: Allowed
+    trials: Trials
+    duals: Floats
+    key: Floats
+    found: NDArray[np.int32]
+    trial: NDArray[np.int32]
+    limit: float
+
+
+def work_memory(rows: float, columns: int) -> float:
+    """Bytes that `new_work` takes: two inverses, and what is known of pairs."""
+    return 34.0 * rows * rows + 100.0 * columns
+
+
+@njit
+def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
+    """Room for the search of a program whose first rows are those of the packing."""
+    num_rows = packing.slack.size
+    return Work(
+        packing.cols, packing.weights, program, new_basis(program), all_allowed(program, slack),
+        new_trials(program, num_rows), np.empty(slack.size), np.empty(program.weights.size),
+        np.empty(num_rows, np.int32), np.empty(num_rows, np.int32), weight_limit(program),
+    )  # fmt: skip
+
+
+@njit
+def drop(work: Work, num: int, bound: float, cut: float) -> int:
+    """Drop the columns and the slack that no solution below the cut has; how many columns are left.
+
+    Leaves the reduced costs of those in ``key``.
+    """
+    node, duals = work.node, work.duals
+    kept = 0
+    for a in range(num):
+        j = node.active[a]
+        reduced = reduced_cost(work.program, duals, j)
+        # a column at the cut itself stays
+        if bound + reduced <= cut:
+            node.active[kept] = j
+            work.key[kept] = reduced
+            kept += 1
+        else:
+            node.columns[j] = False
+    for r in range(node.slack.size):
+        if node.slack[r] and bound - duals[r] > cut:
+            node.slack[r] = False
+    return kept
+
+
+@njit
+def allowed_at(work: Work, num: int) -> Allowed:
+    """What the node at work allows, of which so many columns are left."""
+    return Allowed(work.node.active[:num], work.node.columns, work.node.slack)
+
+
+@njit
+def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
+    """Make the node at ``top`` the one at work, unless its basis is at hand; how many columns it has."""
+    basis = work.basis
+    num = take_node(stack, top, work.node)
+    if at_work != top:
+        basis.variable[:] = stack.variable[top]
+        basis.duals[:] = stack.duals[top]
+        basis.anchors[:] = stack.duals[top]
+        refactor(work.program, allowed_at(work, num), basis)
+    return num
+
+
+@njit
+def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
+    """Solve the linear program of the node at work; how that ended, and a bound that holds."""
+    allowed = allowed_at(work, num)
+    restart(work.program, allowed, work.basis)
+    status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, _EXCHANGES, deadline))
+    work.duals[:] = work.basis.duals
+    make_feasible(work.program, allowed, work.duals)
+    return status, certified(work.program, allowed, work.duals)
+
+
+@njit
+def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
+    """Make the node at work the one side of it that is left; how many columns it has."""
+    side, node = work.trials.side, work.node
+    num = answer(work.cols, allowed_at(work, num), pair, joined, side)
+    node.active[:num] = side.active[:num]
+    node.columns[:] = side.columns
+    node.slack[:] = side.slack
+    return num
+
+
+@njit
+def branch(work: Work, stack: Stack, top: int, num: int, pair: Any, likely: bool, lower: float) -> int:
+    """Put both sides of the node at work on the stack, the likelier one last: searched first; the open nodes."""
+    side = work.trials.side
+    for turn in range(2):
+        # the likelier side: together or apart
+        joined = likely if turn == 1 else not likely
+        count = answer(work.cols, allowed_at(work, num), pair, joined, side)
+        push_node(stack, top + turn, Allowed(side.active[:count], side.columns, side.slack), work.basis, lower)
+    return top + 2

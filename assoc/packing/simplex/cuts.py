@@ -1,0 +1,212 @@
+"""Cuts from odd sets of rows: what whole-numbered solutions satisfy and the linear program's solution does not.
+
+Of an odd set Q of rows, each covered at most once, at most (|Q| - 1) / 2 pairs can be covered together:
+
+    sum_j floor(|rows of j in Q| / 2) x_j <= (|Q| - 1) / 2.
+
+(Half of the sum of the rows in Q, rounded down: a {0, 1/2} cut. Odd holes and cliques of the conflict graph are among
+them.) The linear program's solution violates it by (1 - f(Q)) / 2, where
+
+    f(Q) = sum of what the rows in Q leave uncovered + sum of x_j over the columns with an odd number of rows in Q.
+
+Sets of small f are looked for by tabu search, one row entering or leaving at a time. A cut is a row of the program like
+any other, with a slack that may be anything; that slack is a whole number in every whole-numbered solution.
+
+References
+----------
+A. Caprara, M. Fischetti, "{0, 1/2}-Chvatal-Gomory cuts", Mathematical Programming 74 (1996), 221-235.
+G. Andreello, A. Caprara, M. Fischetti, "Embedding {0, 1/2}-cuts in a branch-and-cut framework", INFORMS Journal on
+Computing 19 (2007), 229-238 (separation by tabu search).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.program import Program
+
+# an LP value this near to a whole number is one
+_WHOLE = 1e-6
+# f of a set that is worth a cut; sets kept of one search; moves from each row, and how long a moved row rests
+_LARGEST, _KEPT, _MOVES, _REST = 0.96, 30, 40, 6
+# the share of a set's rows that another one of the same search may have
+_COMMON = 0.7
+
+
+@njit
+def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
+    """Odd sets of rows whose cuts the program's solution violates, the most violated first.
+
+    Parameters
+    ----------
+    cols : int32 array, shape (N, S)
+        Rows of the columns.
+    basis : Basis
+        Optimal.
+    num_rows : int
+        Rows of measurements; cuts follow them.
+
+    Returns
+    -------
+    bool array, shape (K, num_rows)
+        The sets.
+    """
+    num, num_sensors = cols.shape
+    members = np.empty(basis.variable.size, np.int32)
+    values = np.empty(basis.variable.size)
+    uncovered = np.ones(num_rows)
+    count = 0
+    for i in range(basis.variable.size):
+        j, value = basis.variable[i], basis.values[i]
+        if j < num and value > _WHOLE:
+            if value < 1.0 - _WHOLE:
+                members[count] = j
+                values[count] = value
+                count += 1
+            for s in range(num_sensors):
+                if cols[j, s] >= 0:
+                    uncovered[cols[j, s]] -= value
+    # the fractional columns by row
+    pointer = np.zeros(num_rows + 1, np.int64)
+    for a in range(count):
+        for s in range(num_sensors):
+            if cols[members[a], s] >= 0:
+                pointer[cols[members[a], s] + 1] += 1
+    for r in range(num_rows):
+        pointer[r + 1] += pointer[r]
+    by_row = np.empty(pointer[num_rows], np.int32)
+    place = pointer[:num_rows].copy()
+    for a in range(count):
+        for s in range(num_sensors):
+            r = cols[members[a], s]
+            if r >= 0:
+                by_row[place[r]] = a
+                place[r] += 1
+    sets = np.zeros((_KEPT, num_rows), np.bool_)
+    scores = np.full(_KEPT, _LARGEST)
+    kept = 0
+    inside, odd = np.zeros(num_rows, np.bool_), np.zeros(count, np.bool_)
+    change, rest = np.empty(num_rows), np.empty(num_rows, np.int64)
+    best_set = np.zeros(num_rows, np.bool_)
+    for begin in range(num_rows):
+        if pointer[begin] == pointer[begin + 1]:
+            continue
+        inside[:] = False
+        odd[:] = False
+        rest[:] = 0
+        for r in range(num_rows):
+            # what f changes by when the row enters or leaves
+            change[r] = max(uncovered[r], 0.0)
+            for k in range(pointer[r], pointer[r + 1]):
+                change[r] += values[by_row[k]]
+        f = 0.0
+        size = 0
+        best = _LARGEST
+        row = begin
+        for move in range(_MOVES):
+            f += change[row]
+            change[row] = -change[row]
+            inside[row] = not inside[row]
+            size += 1 if inside[row] else -1
+            rest[row] = move + _REST
+            for k in range(pointer[row], pointer[row + 1]):
+                a = by_row[k]
+                odd[a] = not odd[a]
+                step = -2.0 * values[a] if odd[a] else 2.0 * values[a]
+                for s in range(num_sensors):
+                    r = cols[members[a], s]
+                    if r >= 0 and r != row:
+                        change[r] += step
+            if size % 2 == 1 and f < best:
+                best = f
+                best_set[:] = inside
+            row = -1
+            least = np.inf
+            for r in range(num_rows):
+                # the first row stays: else every search would end at the empty set
+                if pointer[r] < pointer[r + 1] and rest[r] <= move and r != begin and change[r] < least:
+                    least = change[r]
+                    row = r
+            if row < 0:
+                break
+        if best < _LARGEST:
+            kept = _keep(sets, scores, kept, best_set, best)
+    return sets[:kept].copy()
+
+
+@njit
+def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
+    """Insert a set in order of f, unless it has too many rows in common with a better one; how many are kept."""
+    place = kept
+    for i in range(kept):
+        common, size, other = 0, 0, 0
+        for r in range(new.size):
+            common += new[r] and sets[i, r]
+            size += new[r]
+            other += sets[i, r]
+        if common > _COMMON * min(size, other):
+            if score >= scores[i] - 1e-9:
+                return kept
+            # the new one takes its place
+            for k in range(i, kept - 1):
+                sets[k] = sets[k + 1]
+                scores[k] = scores[k + 1]
+            return _keep_at(sets, scores, kept - 1, new, score)
+    return _keep_at(sets, scores, place, new, score)
+
+
+@njit
+def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
+    place = kept
+    if kept == scores.size:
+        if score >= scores[kept - 1]:
+            return kept
+        place = kept - 1
+    else:
+        kept += 1
+    while place > 0 and scores[place - 1] > score:
+        sets[place] = sets[place - 1]
+        scores[place] = scores[place - 1]
+        place -= 1
+    sets[place] = new
+    scores[place] = score
+    return kept
+
+
+@njit
+def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
+    """The linear program of columns over rows, and a further row for the cut of each set."""
+    num, num_sensors = cols.shape
+    start = np.zeros(num + 1, np.int64)
+    for count in range(2):
+        if count:
+            rows = np.empty(start[num], np.int32)
+        place = 0
+        for j in range(num):
+            for s in range(num_sensors):
+                if cols[j, s] >= 0:
+                    if count:
+                        rows[place] = cols[j, s]
+                    place += 1
+            for c in range(len(sets)):
+                uses = 0
+                for s in range(num_sensors):
+                    if cols[j, s] >= 0 and sets[c, cols[j, s]]:
+                        uses += 1
+                for _ in range(uses // 2):
+                    if count:
+                        rows[place] = num_rows + c
+                    place += 1
+            start[j + 1] = place
+    sides = np.ones(num_rows + len(sets))
+    for c in range(len(sets)):
+        size = 0
+        for r in range(num_rows):
+            size += sets[c, r]
+        sides[num_rows + c] = (size - 1) // 2
+    return Program(weights, start, rows, sides)

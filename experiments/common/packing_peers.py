@@ -1,0 +1,158 @@
+"""Peers that know another form of the problem: weighted independent sets, and assignment by pairs.
+
+**Independent sets.** Tuples that save something against false alarms are the vertices of a graph, weighted by what they
+save; those that share a measurement are joined. The heaviest independent set is the best association with dummies.
+Three of the best codes for it, all in the package ``chszlablib``: CHILS (Grossmann, Langedal and Schulz; concurrent
+local search with reductions; also a package of its own, which takes a graph edge by edge), and KaMIS's weighted branch
+and reduce and its memetic algorithm (Lamm, Schulz, Strash and others).
+
+**Pairs.** ``kap`` is Gabrovsek's multiple Hungarian method: costs are given for pairs of measurements alone, and a
+tuple costs the sum of its pairs. Its tuples are priced by our costs afterwards, and those that save nothing are false
+alarms.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from assoc.problem import AssignmentProblem
+
+Chosen = tuple[NDArray[np.intp] | None, float | None, bool]
+
+# sums of weights stay below this: two of the codes count in 32 bits
+_MOST = 2.0e9
+# searches of CHILS side by side: its own default
+_CONCURRENT = 4
+
+
+def _numbered(problem: AssignmentProblem) -> NDArray[np.int64]:
+    """Measurement of each place of each tuple, numbered through all sensors; -1 for none."""
+    offsets = np.concatenate([[0], np.cumsum(problem.sizes.astype(np.int64))[:-1]])
+    return np.where(problem.tuples > 0, problem.tuples + offsets - 1, -1)
+
+
+def _singletons(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Tuple and cost of each measurement as a false alarm."""
+    rows = _numbered(problem)
+    alone = np.flatnonzero((rows >= 0).sum(axis=1) == 1)
+    # the cheapest is written last
+    alone = alone[np.argsort(-problem.costs[alone], kind="stable")]
+    row = rows[alone].max(axis=1)
+    where = np.full(int(problem.sizes.sum()), -1, dtype=np.int64)
+    cost = np.zeros(where.size)
+    where[row], cost[row] = alone, problem.costs[alone]
+    return where, cost
+
+
+def _savings(problem: AssignmentProblem) -> NDArray[np.float64]:
+    """What each tuple saves against its measurements as false alarms."""
+    rows = _numbered(problem)
+    _, alone = _singletons(problem)
+    return np.where(rows >= 0, alone[rows], 0.0).sum(axis=1) - problem.costs
+
+
+def _with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Chosen tuples, and the false alarms that are left; places in the problem."""
+    where, _ = _singletons(problem)
+    rows = _numbered(problem)[chosen]
+    free = np.ones(where.size, dtype=np.bool_)
+    free[rows[rows >= 0]] = False
+    return np.concatenate([chosen, where[free]]).astype(np.intp)
+
+
+def conflict_graph(problem: AssignmentProblem) -> tuple[NDArray[np.intp], NDArray[np.int64], Any]:
+    """Return the vertices (tuples), their weights as whole numbers, and the adjacency as a sparse array.
+
+    Raises
+    ------
+    ValueError
+        A problem without dummies: its best solution need not be an independent set of greatest weight.
+    """
+    if not problem.dummy:
+        raise ValueError("expected a problem with dummies")
+    saved = _savings(problem)
+    rows = _numbered(problem)
+    vertices = np.flatnonzero((saved > 0) & ((rows >= 0).sum(axis=1) > 1))
+    inside, saved = rows[vertices], saved[vertices]
+    column, place = np.nonzero(inside >= 0)
+    row = inside[column, place]
+    most = np.zeros(int(problem.sizes.sum()))
+    np.maximum.at(most, row, saved[column])
+    # a tuple of two measurements or more counts at half of each at the most
+    weights = np.floor(saved * min(1e6, _MOST / max(0.5 * most.sum(), 1e-9))).astype(np.int64)
+    incidence = csr_array((np.ones(row.size, dtype=np.int32), (column, row)), shape=(vertices.size, most.size))
+    graph = csr_array(incidence @ incidence.T)
+    graph.setdiag(0)
+    graph.eliminate_zeros()
+    graph.sort_indices()
+    return vertices, np.maximum(weights, 1), graph
+
+
+def _independent_set(problem: AssignmentProblem, time_limit: float, kind: str) -> Chosen:
+    # their threads are counted when they are loaded, and are theirs to take
+    threads = os.environ.pop("OMP_NUM_THREADS", None)
+    try:
+        from chszlablib import _chils, _kamis_mmwis, _kamis_wmis  # type: ignore[import-untyped,unused-ignore]
+    finally:
+        if threads is not None:
+            os.environ["OMP_NUM_THREADS"] = threads
+    vertices, weights, graph = conflict_graph(problem)
+    ends, neighbours = graph.indptr, graph.indices.astype(np.int32)
+    if kind == "chils":
+        _, found = _chils.mwis(ends.astype(np.int64), neighbours, weights, time_limit, _CONCURRENT, 0)
+    else:
+        search = _kamis_wmis.branch_reduce if kind == "branch_reduce" else _kamis_mmwis.mmwis_solver
+        _, found = search(ends.astype(np.int32), neighbours, weights.astype(np.int32), time_limit, 0)
+    return _with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
+
+
+def chils(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """CHILS on the conflict graph."""
+    return _independent_set(problem, time_limit, "chils")
+
+
+def branch_reduce(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """KaMIS's weighted branch and reduce; it does not say whether it ended."""
+    return _independent_set(problem, time_limit, "branch_reduce")
+
+
+def mmwis(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """KaMIS's memetic algorithm."""
+    return _independent_set(problem, time_limit, "mmwis")
+
+
+def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    """Multiple Hungarian method on the costs of pairs, algorithm "Fm"; it takes no time limit."""
+    from kap import k_assignment  # type: ignore[import-untyped,unused-ignore]
+
+    saved = _savings(problem)
+    count = (problem.tuples > 0).sum(axis=1)
+    matrices = []
+    for one, two in itertools.combinations(range(problem.num_sensors), 2):
+        matrix = np.zeros((problem.sizes[one], problem.sizes[two]))
+        pairs = np.flatnonzero((count == 2) & (problem.tuples[:, one] > 0) & (problem.tuples[:, two] > 0))
+        np.minimum.at(matrix, (problem.tuples[pairs, one] - 1, problem.tuples[pairs, two] - 1), -saved[pairs])
+        matrices.append(matrix)
+    listed = {tuple(row): place for place, row in enumerate(problem.tuples.tolist())}
+    chosen = []
+    for match in k_assignment(matrices, algo="Fm", random_state=0).matches:
+        row = [0] * problem.num_sensors
+        for sensor, measurement in match:
+            row[sensor] = measurement + 1
+        place = listed.get(tuple(row))
+        if place is not None and saved[place] > 0:
+            chosen.append(place)
+    return _with_false_alarms(problem, np.array(sorted(chosen), dtype=np.intp)), None, False
+
+
+def available(name: str, problem: AssignmentProblem) -> bool:
+    """Whether the package is installed and the problem has the form that it needs."""
+    package = "kap" if name == "kap" else "chszlablib"
+    return problem.dummy and importlib.util.find_spec(package) is not None

@@ -1,0 +1,134 @@
+"""What each part of `aco`, `genetic` and `tabu` contributes, and what a second core does.
+
+    python -m experiments.metaheuristics.ablation [--problems NAME ...] [--seconds S] [--count N] [--workers]
+
+Each solver runs with one part taken out (parts.py) on the same problems as the whole, with the same seeds and the
+same processor time (with two workers: of each core). A figure is the mean over the problems of the cost with the part
+out, less the cost of the whole, in percent of it: above 0, the part helps. Parts that one solver alone has are also
+taken out of it without refinement ("alone"), where they can be seen. Intervals are 95 %, from resampling problems.
+The first row gives how far the whole is above the best cost that any of these runs found. With --workers the whole on
+one core is compared with two workers on two.
+
+--publish replaces the rows of the problems and of the budget that were measured, so that the whole table can be
+measured in several runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from assoc._types import Floats
+from assoc.sweeps.bootstrap import mean_interval
+from experiments.common.claims import Claim, load_json, print_table, save_json
+from experiments.common.command import add_publish, publish
+from experiments.common.results import result_file
+from experiments.metaheuristics import parts
+from experiments.metaheuristics.problems import PROBLEMS, problem
+from experiments.metaheuristics.running import log, run
+
+NAME = "metaheuristics.ablation"
+TITLE = "What the parts of the metaheuristics contribute"
+
+
+def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]) -> dict[tuple[str, str], Floats]:
+    """Costs by solver and part, one for each problem; after Ctrl-C of the problems that were done."""
+    costs: list[dict[tuple[str, str], float]] = []
+    try:
+        for number in range(count):
+            one = problem(name, number)
+            found = {}
+            for part in chosen:
+                for solver in part.solvers:
+                    with part.without():
+                        found[solver, part.words] = run(one, solver, seconds, number, **part.parameters)
+            costs.append(found)
+            log(f"{name}, {number + 1} of {count}:")
+            log("\n".join(f"    {solver} {words}: {cost:.8g}" for (solver, words), cost in found.items()))
+    except KeyboardInterrupt:
+        if len(costs) < 2:
+            raise
+    return {key: np.array([found[key] for found in costs]) for key in costs[0]}
+
+
+def _warm_up(name: str, number: int, chosen: Sequence[parts.Part]) -> None:
+    """Compile what all parts call, on a problem that is not measured."""
+    one = problem(name, number)
+    for part in chosen:
+        for solver in part.solvers:
+            with part.without():
+                # what is compiled is in processor time, too: a second time with all of it
+                for _ in range(2 if part.words == parts.WHOLE else 1):
+                    run(one, solver, 1.5 if part.words == parts.WHOLE else 0.3, 0, **part.parameters)
+
+
+def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -> list[Claim]:
+    """The claims of one problem's costs."""
+    group = prefix(name, seconds)
+    best = np.min(list(costs.values()), axis=0)
+    bases = {part.words: part.base for part in (*parts.PARTS, parts.TWO_WORKERS)}
+    found = [Claim(f"{group}: problems", "", None, len(best))]
+    for (solver, words), values in costs.items():
+        whole = words == parts.WHOLE
+        base = best if whole else costs[solver, bases[words]]
+        excess = 100.0 * (values - base) / np.abs(base)
+        interval = mean_interval(excess[:, None])
+        what = "the best found" if whole else bases[words]
+        found.append(Claim(f"{group}: {solver}, {words}, above {what}", "%", None, float(excess.mean()), interval))
+    return found
+
+
+def prefix(name: str, seconds: float) -> str:
+    """How the quantities of one problem and budget begin."""
+    return f"{name}, {seconds:g} s"
+
+
+def merged(new: list[Claim], name: str = NAME) -> list[Claim]:
+    """The published claims, those of the same problems and budgets replaced."""
+    path = result_file(name)
+    old = load_json(path) if path.exists() else []
+    groups = {claim.quantity.split(": ")[0] for claim in new}
+    return [claim for claim in old if claim.quantity.split(": ")[0] not in groups] + new
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
+    parser.add_argument("--problems", nargs="+", default=["ghosts 40"], metavar="NAME", help=", ".join(PROBLEMS))
+    parser.add_argument("--seconds", type=float, default=2.0, metavar="S", help="of each run (default 2)")
+    parser.add_argument("--count", type=int, default=10, metavar="N", help="problems of each name (default 10)")
+    parser.add_argument("--solvers", nargs="+", default=list(parts.SOLVERS), metavar="NAME", help="only these")
+    parser.add_argument("--workers", action="store_true", help="no parts: one worker against two, on two cores")
+    parser.add_argument("--json", metavar="FILE", help="write the results here")
+    add_publish(parser, NAME)
+    chosen = parser.parse_args(arguments)
+    for label, given, known in (
+        ("--problems", chosen.problems, PROBLEMS),
+        ("--solvers", chosen.solvers, parts.SOLVERS),
+    ):
+        for one in given:
+            if one not in known:
+                parser.error(f"{label}: unknown {one!r}; known: {', '.join(known)}")
+    if chosen.count < 2 or not 0.0 < chosen.seconds < 1e5:
+        parser.error("expected --count of at least 2 and --seconds above 0")
+    taken = (parts.PARTS[0], parts.TWO_WORKERS) if chosen.workers else parts.PARTS
+    taken = tuple(
+        part._replace(solvers=tuple(one for one in part.solvers if one in chosen.solvers)) for part in taken
+    )
+    claims: list[Claim] = []
+    for name in chosen.problems:
+        _warm_up(name, chosen.count, taken)
+        costs = measured(name, chosen.count, chosen.seconds, taken)
+        claims += claims_of(name, chosen.seconds, costs)
+    print_table(claims, TITLE)
+    if chosen.json:
+        save_json(chosen.json, claims, NAME, 0, __doc__ or "")
+    if chosen.publish:
+        publish(merged(claims), NAME, 0, __doc__)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

@@ -1,0 +1,187 @@
+"""The parts of the three metaheuristics, and how each is taken out."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import cache
+from typing import Any, NamedTuple
+from unittest import mock
+
+import numba  # noqa: TID251  (a changed kernel is not kept)
+
+from assoc.packing.components.component import Component
+from assoc.packing.neighbourhoods.cluster import ClusterSearch
+from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
+from assoc.packing.neighbourhoods.large import LargeNeighbourhood
+from assoc.solvers.aco import max_min
+from assoc.solvers.genetic.population import Breeding
+from assoc.solvers.tabu import moves
+
+SOLVERS = ("aco", "genetic", "tabu")
+WHOLE, ALONE = "all parts", 'refinement="none"'
+
+
+class Part(NamedTuple):
+    """One variant of a solver.
+
+    Attributes
+    ----------
+    words : str
+        What is left out.
+    solvers : tuple of str
+        Which have this part.
+    parameters : dict
+        Of the solver.
+    without : callable
+        Makes the context in which the part is missing.
+    base : str
+        Words of what it is compared with.
+    """
+
+    words: str
+    solvers: tuple[str, ...]
+    parameters: dict[str, Any] = {}
+    without: Callable[[], AbstractContextManager[Any]] = nullcontext
+    base: str = WHOLE
+
+
+def _unchanged(self: Any, priced: Any, owner: Any, weight: float, *_: Any) -> float:
+    """A neighbourhood that finds nothing."""
+    return weight
+
+
+def _never(*_: Any) -> bool:
+    return False
+
+
+def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextManager[Any]]:
+    return lambda: mock.patch.object(owner, name, new)
+
+
+@contextmanager
+def _no_ants() -> Iterator[None]:
+    """The best cover known in place of the ants'."""
+    iterate = max_min.Colony.iterate
+
+    def without(self: Any, component: Component, rng: Any) -> None:
+        def walk(*_: Any) -> Any:
+            # where nothing is known yet one ant has to walk
+            if component.best is None:
+                return component.random_cover(1.0, rng), 0.0
+            return component.best.copy(), component.weight
+
+        with mock.patch.object(max_min, "walk", walk):
+            iterate(self, component, rng)
+
+    with mock.patch.object(max_min.Colony, "iterate", without):
+        yield
+
+
+@contextmanager
+def _no_crossover() -> Iterator[None]:
+    """A child has one parent."""
+    child = Breeding._child
+
+    def of_one(self: Any, component: Any, one: int, two: int, rng: Any) -> Any:
+        return child(self, component, one, one, rng)
+
+    with mock.patch.object(Breeding, "_child", of_one):
+        yield
+
+
+@contextmanager
+def _inverted_selection() -> Iterator[None]:
+    """The worst of those drawn breed."""
+    parent = Breeding._parent
+
+    def worst(self: Any, rng: Any) -> int:
+        self.fitness = -self.fitness
+        try:
+            return parent(self, rng)
+        finally:
+            self.fitness = -self.fitness
+
+    with mock.patch.object(Breeding, "_parent", worst):
+        yield
+
+
+def _rewritten(kernel: Any, old: str, new: str) -> Any:
+    """A kernel with a part of its text replaced, compiled when it is called."""
+    function = getattr(kernel, "py_func", kernel)
+    text = textwrap.dedent(inspect.getsource(function))
+    if text.count(old) != 1:
+        raise ValueError(f"{function.__name__}: expected {old!r} once")
+    names = dict(function.__globals__)
+    names["njit"] = lambda plain: plain
+    exec(compile(text.replace(old, new), function.__code__.co_filename, "exec"), names)
+    return numba.njit(nogil=True, error_model="numpy")(names[function.__name__])
+
+
+@contextmanager
+def _no_aspiration() -> Iterator[None]:
+    with mock.patch.object(moves, "_moves", _moves_without_aspiration()):
+        yield
+
+
+@cache
+def _moves_without_aspiration() -> Any:
+    rule = "(until[j] < clock or current + gain[j] < record - 1e-9)"
+    return _rewritten(moves._moves, rule, "until[j] < clock")
+
+
+@contextmanager
+def _no_moves() -> Iterator[None]:
+    """Covers are only improved, and the search begins anew from other covers."""
+    with mock.patch.object(moves, "_moves", lambda *arguments: arguments[4].clock + arguments[4].moves):
+        yield
+
+
+OWN = (
+    Part("no ants that walk", ("aco",), without=_no_ants),
+    Part("no ants that dive", ("aco",), {"divers": 0}),
+    Part("alpha 0: pheromone ignored", ("aco",), {"alpha": 0.0}),
+    Part("beta 0: visibility ignored", ("aco",), {"beta": 0.0}),
+    Part("no pheromone laid", ("aco",), without=_replaced(max_min.Colony, "_deposit", lambda *_: None)),
+    Part("no crossover", ("genetic",), without=_no_crossover),
+    Part("no mutation", ("genetic",), {"mutation": 0.0}),
+    Part("no selection", ("genetic",), {"tournament": 1}),
+    Part("selection inverted", ("genetic",), without=_inverted_selection),
+    Part("no moves", ("tabu",), without=_no_moves),
+    Part("tenure 0", ("tabu",), {"tenure": 0}),
+    Part("no aspiration", ("tabu",), without=_no_aspiration),
+    Part("no column forced in", ("tabu",), without=_replaced(moves.TabuSearch, "_force", lambda *_: -1)),
+    Part("no restarts", ("tabu",), {"restart": 1_000_000_000}),
+)
+"""Parts that one of the three has and the others have not."""
+
+SHARED = (
+    Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
+    Part("no large neighbourhoods", SOLVERS, without=_replaced(LargeNeighbourhood, "improve", _unchanged)),
+    Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
+    Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),
+    Part('refinement="local"', SOLVERS, {"refinement": "local"}),
+    Part(ALONE, SOLVERS, {"refinement": "none"}),
+)
+"""What all three have."""
+
+
+def _alone(part: Part) -> Part:
+    """The same part taken out of the metaheuristic without any refinement."""
+    return part._replace(
+        words=f"alone, {part.words}", parameters={"refinement": "none", **part.parameters}, base=ALONE
+    )
+
+
+PARTS = (
+    Part(WHOLE, SOLVERS),
+    *OWN,
+    *SHARED,
+    # nothing dives without refinement
+    *(_alone(part) for part in OWN if part.words != "no ants that dive"),
+)
+"""All variants, the whole first."""
+
+TWO_WORKERS = Part("two workers", SOLVERS, {"workers": 2})

@@ -1,0 +1,52 @@
+"""The problems of these experiments, by name; their seeds were used for nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from assoc.costs import build_problem
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scene
+from assoc.simulation import simulate
+from experiments.common.instances import scenes, synthetic
+
+# of the first problem of each name; benchmarks begin with 1000, tuning ends before 100
+FIRST_SEED = 3000
+
+
+def _ghosts(targets: int) -> Callable[[int], AssignmentProblem]:
+    return lambda seed: build_problem(scenes.ghost(targets, seed), 0)
+
+
+def _known(n: int) -> Callable[[int], AssignmentProblem]:
+    return lambda seed: synthetic.axial_known_optimum(n, seed)[0]
+
+
+def _radars(noise: float, false_alarms: float) -> Callable[[int], AssignmentProblem]:
+    """One scan of the ant colony paper's scene, another one for each seed."""
+
+    def make(seed: int) -> AssignmentProblem:
+        scene: Scene = simulate("three-radar", seed=seed, scans=100, noise=noise, false_alarms=false_alarms)
+        return build_problem(scene, seed % scene.num_scans)
+
+    return make
+
+
+PROBLEMS: dict[str, Callable[[int], AssignmentProblem]] = {
+    **{f"ghosts {targets}": _ghosts(targets) for targets in (10, 20, 40, 60, 100)},
+    "Grundel-Pardalos 30": _known(30),
+    "Grundel-Pardalos 50": _known(50),
+    "noisy radars": _radars(200.0, 10.0),
+    "poor radars": _radars(4000.0, 30.0),
+}
+"""Name -> what makes its problem of a seed."""
+
+
+def problem(name: str, number: int) -> AssignmentProblem:
+    """Return the problem of a name, numbers from 0."""
+    return PROBLEMS[name](FIRST_SEED + number)
+
+
+def fresh(one: AssignmentProblem) -> AssignmentProblem:
+    """Return a copy in which nothing is left that an earlier solver prepared."""
+    return AssignmentProblem(one.tuples, one.costs, one.sizes, dummy=one.dummy)

@@ -1,0 +1,234 @@
+"""What alpha, beta, rho, the number of ants and the refinement do where problems are not easy.
+
+    python -m experiments.metaheuristics.sweep [--quick] [--cases NAME ...] [--seed N] [--publish]
+
+On the ant colony paper's own scene every setting finds every optimum, so that its table 1 says nothing of solutions.
+Here are the same scene with noise of 200 m and ten times the false alarms ("noisy radars"; still easy: greedy finds
+every optimum), with noise of 4 km and thirty times the false alarms ("poor radars"), and scenes of three bearing-only
+sensors full of ghosts. All 54 settings of alpha 0, 1, 2, beta 1, 2, 4, rho 0.3, 0.9 and 5, 15, 45 ants run
+on the same problems: mode "paper" until all ants walk the same tour (150 cycles at the most), mode "mmas" with
+refinement="none" until 900 ants have walked, with refinement="full" for three cycles. So all have an effort that
+does not depend on the machine. A figure is the mean excess over the optimum in percent; intervals are 95 %, from
+resampling problems. The best setting is chosen on every second problem, and judged on the others.
+
+Figures: mean excess over alpha and beta, and over rho and ants, the other two averaged.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest import mock
+
+import numpy as np
+
+import assoc
+from assoc._types import Floats
+from assoc.packing.components import search
+from assoc.problem import AssignmentProblem
+from assoc.sweeps import Setting, Study, load
+from assoc.sweeps.bootstrap import mean_interval
+from assoc.sweeps.sources import StudySource
+from experiments.common.claims import Claim, load_json, print_table, save_json
+from experiments.common.command import add_publish, publish, save_figure
+from experiments.common.results import result_file
+from experiments.metaheuristics.problems import problem
+from experiments.metaheuristics.running import UNLIMITED, log
+
+NAME = "metaheuristics.sweep"
+TITLE = "Settings of the ant colony where problems are not easy"
+GRID: dict[str, tuple[float, ...]] = {
+    "alpha": (0.0, 1.0, 2.0),
+    "beta": (1.0, 2.0, 4.0),
+    "rho": (0.3, 0.9),
+    "ants": (5, 15, 45),
+}
+ADVICE = {"alpha": 2.0, "beta": 1.0, "rho": 0.3, "ants": 15}
+"""What table 1 of the paper ends with."""
+DEFAULT = {"alpha": 1.0, "beta": 1.0, "rho": 0.9, "ants": 15}
+SURFACES = (("alpha", "beta"), ("rho", "ants"))
+_WALKS = 900
+
+
+class Case(NamedTuple):
+    """Problems, and how the ants search them.
+
+    Attributes
+    ----------
+    problems : str
+        Name in problems.py.
+    count : int
+        Number of problems.
+    how : str
+        "paper", "mmas, none" or "mmas, full".
+    """
+
+    problems: str
+    count: int
+    how: str
+
+    @property
+    def name(self) -> str:
+        """How it is reported."""
+        return f"{self.problems}, {self.how}"
+
+
+HOW = ("paper", "mmas, none", "mmas, full")
+CASES = (
+    *(Case(name, 20, how) for name in ("noisy radars", "poor radars") for how in HOW),
+    *(Case("ghosts 20", 4, how) for how in HOW),
+    *(Case("ghosts 40", 4, how) for how in HOW[1:]),
+)
+
+
+def settings() -> list[dict[str, Any]]:
+    """All settings, in the order of the arrays."""
+    made = [dict(zip(GRID, values, strict=True)) for values in itertools.product(*GRID.values())]
+    return [one | {"ants": int(one["ants"])} for one in made]
+
+
+def _setting(how: str, one: dict[str, Any]) -> Setting:
+    if how == "paper":
+        return Setting("aco", {"mode": "paper", "iterations": 150, **one})
+    refinement = how.removeprefix("mmas, ")
+    cycles = 3 if refinement == "full" else _WALKS // one["ants"]
+    more = {"refinement": refinement, "iterations": cycles, "patience": UNLIMITED}
+    return Setting("aco", {**one, **more})
+
+
+def excesses(case: Case, problems: Sequence[AssignmentProblem], optima: Floats, seed: int) -> Floats:
+    """Excess of every setting on every problem, percent."""
+    made = [_setting(case.how, one) for one in settings()]
+    sources = [StudySource(one, f"{number:03d}") for number, one in enumerate(problems)]
+    # what an answer proves is not asked for: it would take longer than the ants
+    without = mock.patch.object(search, "bound_of_component", lambda component, run: component.bound)
+    with tempfile.TemporaryDirectory(prefix="assoc-") as folder, without:
+        Study(sources, made, 1, seed).run(folder)
+        frame = load(folder)
+    costs = frame.pivot(index="setting", columns="scene", values="cost").loc[[one.key for one in made]]
+    return 100.0 * (costs.to_numpy(dtype=float) - optima) / np.abs(optima)
+
+
+def optima_of(problems: Sequence[AssignmentProblem]) -> tuple[Floats, int]:
+    """Optimal costs, and how many of them are proven (else the best that a minute gives)."""
+    found = [assoc.assign(one, "exact", time_limit=60.0) for one in problems]
+    return np.array([one.cost for one in found]), sum(one.status == "optimal" for one in found)
+
+
+def claims_of(case: Case, excess: Floats) -> list[Claim]:
+    """The claims of one case; excess (settings, problems)."""
+    every = settings()
+
+    def claim(words: str, values: Floats) -> Claim:
+        interval = mean_interval(values[:, None])
+        return Claim(f"{case.name}: {words}", "%", None, float(values.mean()), interval)
+
+    found = []
+    for names in SURFACES:
+        for values in itertools.product(*(GRID[name] for name in names)):
+            chosen = [all(one[n] == v for n, v in zip(names, values, strict=True)) for one in every]
+            words = ", ".join(f"{name} {value:g}" for name, value in zip(names, values, strict=True))
+            found.append(claim(words, excess[chosen].mean(axis=0)))
+    train, test = excess[:, ::2], excess[:, 1::2]
+    best = int(train.mean(axis=1).argmin())
+    words = " ".join(f"{name} {value:g}" for name, value in every[best].items())
+    found.append(claim(f"best setting, {words}", test[best]))
+    for name, one in (("table 1's advice", ADVICE), ("default", DEFAULT)):
+        place = every.index(one)
+        found.append(claim(name, test[place]))
+        found.append(claim(f"{name} less the best setting", test[place] - test[best]))
+    means = excess.mean(axis=1)
+    found.append(claim("worst setting", excess[int(means.argmax())]))
+    place = every.index(ADVICE)
+    # settings that tie share the places between them
+    rank = 1 + (means < means[place] - 1e-9).sum() + (np.abs(means - means[place]) <= 1e-9).sum() / 2 - 0.5
+    found.append(Claim(f"{case.name}: rank of table 1's advice of {len(every)}", "", None, float(rank)))
+    return found
+
+
+def draw(figure: Any, shown: tuple[list[Case], dict[str, Claim]]) -> None:
+    """Draw the surfaces of all cases of one kind of problem."""
+    cases, claims = shown
+    axes = figure.subplots(len(cases), 2, squeeze=False)
+    for row, case in zip(axes, cases, strict=True):
+        for ax, (up, across) in zip(row, SURFACES, strict=True):
+            found = [
+                [claims[f"{case.name}: {up} {one:g}, {across} {other:g}"] for other in GRID[across]] for one in GRID[up]
+            ]
+            means = np.array([[claim.ours for claim in line] for line in found])
+            picture = ax.imshow(means, cmap="cividis_r", aspect="auto", origin="lower", vmin=0.0)
+            dark = 0.5 * max(float(means.max()), 1e-12)
+            for (i, j), mean in np.ndenumerate(means):
+                low, high = found[i][j].interval or (mean, mean)
+                text = f"{mean:.3g}\n{low:.2g} .. {high:.2g}"
+                ax.text(j, i, text, ha="center", va="center", fontsize=7, color="white" if mean > dark else "black")
+            ax.set_xticks(range(len(GRID[across])), [f"{value:g}" for value in GRID[across]])
+            ax.set_yticks(range(len(GRID[up])), [f"{value:g}" for value in GRID[up]])
+            ax.set(xlabel=across, ylabel=up, title=case.name)
+            figure.colorbar(picture, ax=ax, label="mean excess, %")
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
+    names = [case.name for case in CASES]
+    parser.add_argument("--quick", action="store_true", help="two problems a case, for a first look")
+    parser.add_argument("--cases", nargs="+", default=names, metavar="NAME", help="; ".join(names))
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the ants (default 0)")
+    parser.add_argument("--json", metavar="FILE", help="write the results here")
+    parser.add_argument("--figures", metavar="FOLDER", default=".", help="write surfaces-*.png here")
+    add_publish(parser, NAME)
+    chosen = parser.parse_args(arguments)
+    for one in chosen.cases:
+        if one not in names:
+            parser.error(f"--cases: unknown {one!r}; known: {'; '.join(names)}")
+    if chosen.publish and chosen.quick:
+        parser.error("--publish needs the full run, got --quick")
+    claims: list[Claim] = []
+    known: dict[str, tuple[list[AssignmentProblem], Floats]] = {}
+    for case in CASES:
+        if case.name not in chosen.cases:
+            continue
+        if case.problems not in known:
+            problems = [problem(case.problems, number) for number in range(2 if chosen.quick else case.count)]
+            optima, proven = optima_of(problems)
+            known[case.problems] = problems, optima
+            log(f"{case.problems}: {proven} of {len(problems)} optima proven")
+            claims.append(Claim(f"{case.problems}, problems: optima proven of {len(problems)}", "", None, proven))
+            greedy = [assoc.assign(one, "greedy").cost for one in problems]
+            excess = 100.0 * (np.array(greedy) - optima) / np.abs(optima)
+            interval = mean_interval(excess[:, None])
+            claims.append(Claim(f"{case.problems}, greedy: excess", "%", None, float(excess.mean()), interval))
+        problems, optima = known[case.problems]
+        claims += claims_of(case, excesses(case, problems[: case.count], optima[: case.count], chosen.seed))
+        log(f"{case.name}: done")
+    if chosen.publish and result_file(NAME).exists():
+        groups = {claim.quantity.split(": ")[0] for claim in claims}
+        old = load_json(result_file(NAME))
+        claims = [claim for claim in old if claim.quantity.split(": ")[0] not in groups] + claims
+    print_table([claim for claim in claims if not _is_cell(claim)], TITLE)
+    if chosen.json:
+        save_json(chosen.json, claims, NAME, chosen.seed, __doc__ or "")
+    if chosen.publish:
+        publish(claims, NAME, chosen.seed, __doc__)
+    by_name = {claim.quantity: claim for claim in claims}
+    for kind in dict.fromkeys(case.problems for case in CASES):
+        cases = [c for c in CASES if c.problems == kind and f"{c.name}: worst setting" in by_name]
+        if cases:
+            path = Path(chosen.figures) / f"surfaces-{kind.replace(' ', '-')}.png"
+            save_figure(path, draw, (cases, by_name), (9.0, 3.2 * len(cases)))
+            print(f"{path}: written")
+    return 0
+
+
+def _is_cell(claim: Claim) -> bool:
+    """Whether a claim is one cell of a surface."""
+    return claim.quantity.split(": ")[-1].startswith(tuple(f"{names[0]} " for names in SURFACES))
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

@@ -1,0 +1,162 @@
+"""The experiments on the parts and settings of the metaheuristics."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+import assoc
+from assoc.packing.components.component import Component
+from assoc.packing.run import Run
+from experiments.common.claims import Claim
+from experiments.metaheuristics import ablation, parts, running, sweep
+from experiments.metaheuristics.problems import problem
+
+
+def test_sleep_costs_no_processor_time():
+    run = Run(0, time_limit=5.0)
+    with running._by_processor_time(1):
+        time.sleep(0.4)
+        assert run.elapsed() < 0.3
+    assert run.elapsed() >= 0.4
+
+
+def test_what_comes_after_the_budget_does_not_count(monkeypatch):
+    one = problem("ghosts 20", 0)
+    clock = iter(np.arange(0.0, 1e6, 10.0))
+    # ten seconds pass between any two looks at the clock: only the first solution is in time
+    monkeypatch.setattr(running.time, "process_time", lambda: next(clock))
+    traces = []
+    assign = assoc.assign
+
+    def remembering(*arguments, **options):
+        solution = assign(*arguments, **options)
+        traces.append(solution.trace)
+        return solution
+
+    monkeypatch.setattr(running.assoc, "assign", remembering)
+    cost = running.run(one, "genetic", 1.0, 0)
+    assert cost == min(traces[0][0].cost, assoc.assign(one, "greedy").cost)
+
+
+@pytest.mark.parametrize("part", [*parts.PARTS, parts.TWO_WORKERS], ids=lambda part: part.words)
+def test_parts_are_taken_out_and_put_back(part):
+    # two targets' worth of work is enough for what is tested: feasible, not below the optimum, and as before after it
+    one = problem("ghosts 10", 1)
+    optimum = assoc.assign(one).cost
+    before = Component.dives, parts.moves._moves, parts.max_min.walk, parts.Breeding._parent, parts.Breeding._child
+    for solver in part.solvers:
+        with part.without():
+            assert running.run(one, solver, 5.0, 0, iterations=2, **part.parameters) >= optimum - 1e-9
+    after = Component.dives, parts.moves._moves, parts.max_min.walk, parts.Breeding._parent, parts.Breeding._child
+    assert before == after
+
+
+def test_kernels_are_rewritten_where_they_say():
+    with pytest.raises(ValueError, match="once"):
+        parts._rewritten(parts.moves._moves, "no such text", "")
+
+
+def test_inverted_selection_takes_the_worst():
+    breeding = parts.Breeding.__new__(parts.Breeding)
+    breeding.parameters = type("Parameters", (), {"tournament": 200})()
+    breeding.fitness = np.array([3.0, -7.0, 5.0, 0.0])
+    rng = np.random.default_rng(0)
+    with next(part for part in parts.PARTS if part.words == "selection inverted").without():
+        assert breeding._parent(rng) == 2
+    assert breeding._parent(rng) == 1
+    assert breeding.fitness.tolist() == [3.0, -7.0, 5.0, 0.0]
+
+
+def test_ablation_reports_every_part(tmp_path, capsys):
+    file = tmp_path / "results.json"
+    words = ["--problems", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
+    assert ablation.program([*words, "--json", str(file)]) == 0
+    capsys.readouterr()
+    found = {claim["quantity"] for claim in json.loads(file.read_text())["claims"]}
+    expected = {part.words for part in parts.PARTS if "genetic" in part.solvers}
+    assert {one.split("genetic, ")[1].rsplit(", above", 1)[0] for one in found if "genetic, " in one} == expected
+
+
+def test_figures_are_differences_from_the_whole():
+    costs = {
+        ("aco", parts.WHOLE): np.array([-100.0, -50.0]),
+        ("aco", parts.OWN[2].words): np.array([-99.0, -50.5]),
+        ("aco", parts.ALONE): np.array([-90.0, -40.0]),
+        ("aco", f"alone, {parts.OWN[2].words}"): np.array([-81.0, -38.0]),
+        ("tabu", parts.WHOLE): np.array([-101.0, -50.0]),
+    }
+    claims = {claim.quantity: claim for claim in ablation.claims_of("ghosts 40", 2.0, costs)}
+    assert claims["ghosts 40, 2 s: problems"].ours == 2
+    whole = claims["ghosts 40, 2 s: aco, all parts, above the best found"]
+    assert whole.ours == pytest.approx(100 * (1 / 101 + 0.5 / 50.5) / 2)
+    alone = claims[f"ghosts 40, 2 s: aco, alone, {parts.OWN[2].words}, above {parts.ALONE}"]
+    assert alone.ours == pytest.approx(7.5) and alone.interval == pytest.approx((5.0, 10.0))
+    part = claims[f"ghosts 40, 2 s: aco, {parts.OWN[2].words}, above all parts"]
+    assert part.ours == pytest.approx(0.0, abs=1e-12) and part.interval == pytest.approx((-1.0, 1.0))
+
+
+def test_published_results_of_other_problems_stay(tmp_path, monkeypatch):
+    path = tmp_path / "file.json"
+    monkeypatch.setattr(ablation, "result_file", lambda name: path)
+    first = [Claim("a, 1 s: x", ours=1.0), Claim("a, 1 s: y", ours=2.0), Claim("b, 1 s: x", ours=3.0)]
+    ablation.save_json(path, ablation.merged(first), ablation.NAME, 0)
+    again = ablation.merged([Claim("a, 1 s: x", ours=9.0), Claim("a, 2 s: x", ours=8.0)])
+    assert [(one.quantity, one.ours) for one in again] == [("b, 1 s: x", 3.0), ("a, 1 s: x", 9.0), ("a, 2 s: x", 8.0)]
+
+
+def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
+    grid = {"alpha": (1.0, 2.0), "beta": (1.0,), "rho": (0.3, 0.9), "ants": (5, 15)}
+    monkeypatch.setattr(sweep, "GRID", grid)
+    cases = tuple(sweep.Case("ghosts 10", 2, how) for how in sweep.HOW)
+    monkeypatch.setattr(sweep, "CASES", cases)
+    file = tmp_path / "results.json"
+    assert sweep.program(["--json", str(file), "--figures", str(tmp_path)]) == 0
+    capsys.readouterr()
+    assert (tmp_path / "surfaces-ghosts-10.png").stat().st_size > 10_000
+    claims = {one["quantity"]: one["ours"] for one in json.loads(file.read_text())["claims"]}
+    # the same runs by hand
+    one = problem("ghosts 10", 0)
+    assert claims["ghosts 10, problems: optima proven of 2"] == 2
+    assert claims["ghosts 10, mmas, full: worst setting"] == pytest.approx(0.0, abs=1e-9)
+    assert claims["ghosts 10, paper: worst setting"] >= claims["ghosts 10, paper: rho 0.3, ants 15"] >= 0.0
+    assert assoc.assign(one, "greedy").cost >= assoc.assign(one).cost
+
+
+def test_claims_of_a_case():
+    case = sweep.Case("ghosts 10", 4, "paper")
+    every = sweep.settings()
+    # the largest alpha is best on all problems but the second, where everything is worse
+    excess = np.array([[9.0 - one["alpha"], 3.0, 3.0 - one["alpha"], 3.0 - one["alpha"]] for one in every])
+    claims = {claim.quantity.split(": ")[1]: claim for claim in sweep.claims_of(case, excess)}
+    best = next(words for words in claims if words.startswith("best setting"))
+    # chosen on the first and the third, judged on the second and the fourth
+    assert "alpha 2" in best and claims[best].ours == pytest.approx(2.0)
+    assert claims["table 1's advice"].ours == pytest.approx(2.0)
+    assert claims["default"].ours == pytest.approx(2.5)
+    assert claims["default less the best setting"].ours == pytest.approx(0.5)
+    assert claims["worst setting"].ours == pytest.approx(4.5)
+    assert claims["alpha 1, beta 1"].ours == pytest.approx((8.0 + 3.0 + 2.0 + 2.0) / 4)
+    # it shares the first places with all of its alpha
+    share = len(every) // 3
+    assert claims[f"rank of table 1's advice of {len(every)}"].ours == (share + 1) / 2
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "said"),
+    [
+        (ablation.program, ["--problems", "nothing"], "unknown 'nothing'"),
+        (ablation.program, ["--solvers", "exact"], "unknown 'exact'"),
+        (ablation.program, ["--count", "1"], "at least 2"),
+        (sweep.program, ["--cases", "nothing"], "unknown 'nothing'"),
+        (sweep.program, ["--quick", "--publish"], "needs the full run"),
+    ],
+)
+def test_bad_arguments(program, words, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        program(words)
+    assert stop.value.code == 2
+    assert said in capsys.readouterr().err

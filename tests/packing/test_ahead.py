@@ -1,0 +1,73 @@
+"""Kernels compiled ahead: all that the search of a hard problem needs, by another process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+_SEARCH = """
+import numpy as np
+import assoc
+from numba.core import event
+from assoc._system.interpreted import compiled_only
+from assoc.packing.branching import search
+from assoc.packing.prepare import prepare
+from assoc.simulation import simulate
+
+problem = assoc.build_problem(simulate("bearing-only", 2, targets=12, scans=1), 0)
+packing = prepare(problem).packing.component(0)
+with compiled_only():
+    search.compile_branching()
+    seen = event.RecordingListener()
+    event.register("numba:compiler_lock", seen)
+    one = search.BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9)
+    one.run(1000)
+assert one.done and one.nodes > 0 and packing.num_columns > 100
+print(len(seen.buffer))
+"""
+
+
+def test_it_is_what_a_hard_problem_needs():
+    done = subprocess.run([sys.executable, "-c", _SEARCH], capture_output=True, text=True, timeout=900)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "0\n")
+
+
+_AHEAD = """
+import subprocess
+from assoc._system import ahead
+from assoc._system.clock import is_over
+from assoc._system.interpreted import compiled_only
+
+started = []
+
+
+class Process(subprocess.Popen):
+    def __init__(self, words, **options):
+        started.append(words[1:])
+        super().__init__(words, **options)
+
+
+ahead.subprocess.Popen = Process
+with compiled_only():
+    ahead.compile_ahead(is_over, prepare_clock)
+assert not started
+ahead.compile_ahead(is_over, prepare_clock)
+assert started == [["-m", "assoc._system.ahead", "prepares", "prepare_clock"]]
+ahead.wait_for_kernels()
+assert not is_over.signatures
+# what is on disk now is not compiled once more
+ahead.compile_ahead(is_over, prepare_clock)
+assert len(started) == 1
+assert not is_over(float("inf")) and sum(is_over.stats.cache_hits.values()) == 1
+"""
+
+
+def test_another_process_compiles_what_is_not_on_disk(tmp_path):
+    source = "from assoc._system.clock import is_over\n\n\ndef prepare_clock():\n    is_over(1e300)\n"
+    (tmp_path / "prepares.py").write_text(source)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cold"), "ASSOC_INTERPRET": "1"}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), *sys.path])
+    code = "from prepares import prepare_clock\n" + _AHEAD
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,140 @@
+"""Ctrl-C in the middle of a program: what is finished is written, and said; and what `-v` tells meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import assoc
+from assoc._cli.progress import ProgressBar
+from assoc._cli.solver_log import SolverLog
+from assoc.association.plan import Plan
+from assoc.packing.run import Run
+from assoc.simulation import simulate
+
+ASLEEP = """
+import time
+from dataclasses import dataclass
+from assoc.solvers import Outcome, Parameters, register
+import numpy as np
+
+@dataclass(frozen=True)
+class Nothing(Parameters):
+    pass
+
+def solve(packing, parameters, run):
+    # takes its time until it is told to end, from the third scan on
+    solve.calls += 1
+    print("scan", solve.calls, flush=True)
+    while solve.calls > 2 and not run.should_stop():
+        time.sleep(0.01)
+    return Outcome(np.zeros(0, dtype=np.int64), 0)
+
+solve.calls = 0
+register("asleep", Nothing, solve)
+"""
+
+
+def interrupted(words, cwd, at, number=signal.SIGINT):
+    """Send a program a signal when it prints a line; returns exit code, the rest of stdout, and stderr."""
+    command = [sys.executable, "-u", "-m", "assoc", *words]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(cwd), os.environ.get("PYTHONPATH", "")])}
+    with subprocess.Popen(command, cwd=cwd, text=True, env=environment, **pipes) as process:
+        for line in process.stdout:
+            if line.strip() == at:
+                break
+        time.sleep(0.3)
+        process.send_signal(number)
+        out, errors = process.communicate(timeout=120)
+    return process.returncode, out, errors
+
+
+@pytest.fixture
+def work(tmp_path):
+    simulate("three-radar", 2, scans=5).save(tmp_path / "scene.npz")
+    (tmp_path / "asleep.py").write_text(ASLEEP)
+    return tmp_path
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+def test_what_is_finished_is_written(work, number, word):
+    words = ["solve", "scene.npz", "--import", "asleep", "--solver", "asleep", "--json", "o.json", "--csv", "o.csv"]
+    code, out, errors = interrupted(words, work, "scan 3", number)
+    assert (code, errors) == (128 + number, f"assoc.solve: {word}; 3 of 5 scans are finished and written\n")
+    scans = json.loads((work / "o.json").read_text())["scans"]
+    assert [one["scan"] for one in scans] == [0, 1, 2] and len((work / "o.csv").read_text().splitlines()) == 4
+    assert "3 scans," in out
+    assert "interrupted" in (work / "o.csv").read_text()
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+def test_tracks_that_are_finished_are_written(work):
+    words = ["track", "scene.npz", "--import", "asleep", "--solver", "asleep", "-o", "t.csv", "--report", "t.html"]
+    code, out, errors = interrupted(words, work, "scan 3")
+    told = re.fullmatch(r"assoc.track: interrupted; the tracks of (\d) of 5 scans are written\n", errors)
+    assert code == 130 and told, errors
+    # a tracker may call its solver twice in a scan
+    assert 1 <= int(told[1]) <= 3 and f"{told[1]} scans" in out
+    assert (work / "t.csv").read_text().startswith("track_id") and (work / "t.html").exists()
+
+
+def test_a_solver_tells_how_far_it_is(capsys):
+    """The log has the last line of every scan, and of long ones the history in between."""
+    scene = simulate("three-radar", 2, scans=3)
+    log = SolverLog(ProgressBar("associating", "scans", shown=False), verbose=True)
+    heard = []
+
+    def watch(scan, point):
+        heard.append((scan, point.cost))
+        log(scan, point._replace(seconds=10.0 * len(heard)))
+
+    plan = Plan((scene,), "exact", watch=watch)
+    for one in plan.run(plan.items()):
+        log.end(one)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].split() == ["scan", "seconds", "iteration", "cost", "bound", "gap"]
+    ends = [line.split() for line in lines if line.endswith("optimal")]
+    assert [row[0] for row in ends] == ["0", "1", "2"]
+    assert {scan for scan, _ in heard} == {0, 1, 2} and len(lines) == 1 + len(heard) + 3
+    for row, one in zip(ends, plan.run(plan.items()), strict=True):
+        assert float(row[3]) == pytest.approx(one.solution.cost, abs=1e-4)
+        assert float(row[4]) == pytest.approx(one.solution.lower_bound, abs=1e-4)
+
+
+def test_long_searches_tell_where_they_are():
+    """A search whose best solution stays the same has news after half a second."""
+    run = Run(0)
+    assert run.is_silent()
+    run.record(1, -1.0, -2.0)
+    assert not run.is_silent()
+    run.trace[-1] = run.trace[-1]._replace(seconds=-10.0)
+    assert run.is_silent()
+
+
+def test_a_search_ends_when_it_is_asked_to(monkeypatch):
+    monkeypatch.setattr("assoc.packing.run.end_is_asked", lambda: True)
+    solution = assoc.assign(assoc.build_problem(simulate("bearing-only", 1, targets=40, scans=1), 0), "aco")
+    assert solution.stopped_by == "interrupted" and solution.status == "feasible"
+    assert solution.lower_bound <= solution.cost < 0
+
+
+def test_parts_of_scenes():
+    scene = simulate("three-radar", 2, scans=5)
+    part = scene.part(1, 3)
+    assert part.num_scans == 2 and part.times.tolist() == scene.times[1:3].tolist()
+    for k in (0, 1):
+        assert part.scan(k).true_tuples().tolist() == scene.scan(k + 1).true_tuples().tolist()
+    from assoc import InvalidInputError
+
+    for start, stop in [(0, 6), (2, 2), (-1, 2), ("0", 1), (0, None)]:
+        with pytest.raises(InvalidInputError, match="part: expected whole numbers"):
+            scene.part(start, stop)
