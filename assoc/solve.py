@@ -79,8 +79,9 @@ def _solve(words: list[str]) -> None:
         raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
     files = parsed["files"]
     check_outputs([parsed["json"], parsed["csv"], parsed["report"], parsed["proof"]], [*files, parsed["config"]])
-    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm"), ("proof", ".json")):
+    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
         check_ending(parsed[option], flag_of(option), *endings, strict=False)
+    check_ending(parsed["proof"], "--proof", ".json")
     if parsed["report"]:
         check_extra("plotly", "report")
 

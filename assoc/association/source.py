@@ -5,11 +5,8 @@ from __future__ import annotations
 import os
 
 from assoc._files.npz import format_of
-<<<<<<< HEAD
 from assoc._files.problem_text import is_text
-=======
 from assoc._system.door import door
->>>>>>> main
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
@@ -36,16 +33,12 @@ def load(path: str | os.PathLike[str]) -> Source:
     InvalidInputError
         It is neither, or cannot be read.
     """
-<<<<<<< HEAD
-    if is_text(path):
-=======
     return load_source(os.fspath(path))
 
 
 def load_source(path: str) -> Source:
     """Load a scene or a problem from a file; see `load`."""
-    if path.endswith(".txt"):
->>>>>>> main
+    if is_text(path):
         return AssignmentProblem.load(path)
     found = format_of(path)
     if found is None and _is_table(path):

@@ -95,7 +95,8 @@ def _solve(picked: list[Instance], seconds: float) -> int:
         rows = store.table()
         row = rows[one.name] = solve(one, rows.get(one.name), seconds, datetime.date.today().isoformat())
         store.write_table(rows)
-        print(f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s", flush=True)
+        words = f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
+        print(words, flush=True)
     return 0
 
 
@@ -130,7 +131,8 @@ def _run(picked: list[Instance], command: str, seconds: float) -> int:
             except OSError as error:
                 print(f"{words[0]}: {error.strerror}", file=sys.stderr)
                 return 2
-            print(json.dumps(_judged(one.name, instance, solution, rows, done, time.perf_counter() - started)), flush=True)
+            taken = time.perf_counter() - started
+            print(json.dumps(_judged(one.name, instance, solution, rows, done, taken)), flush=True)
     return 0
 
 
@@ -138,7 +140,8 @@ def _judged(
     name: str, instance: Path, solution: Path, rows: dict[str, dict[str, object]], done: int | None, seconds: float
 ) -> dict[str, object]:
     """One line of a run: what the verifier says of what a command left behind."""
-    row: dict[str, object] = {"instance": name, "seconds": round(seconds, 3), "exit": done, "cost": None, "excess": None}
+    row: dict[str, object] = {"instance": name, "seconds": round(seconds, 3), "exit": done}
+    row |= {"cost": None, "excess": None}
     try:
         cost = verify.cost_of(*verify.read_instance(str(instance)), verify.read_solution(str(solution))[0])
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""The instances of the set: how each is made, from a seed; costs are rounded to six decimals, so that they are exact."""
+"""The instances of the set: how each is made, from a seed; costs are rounded to six decimals: they are exact."""
 
 from __future__ import annotations
 

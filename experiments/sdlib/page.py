@@ -22,7 +22,8 @@ def tables() -> str:
         families[row["family"]].append(name)
     optimal = sum(row["status"] == "optimal" for row in rows.values())
     share = 100 * optimal / max(len(rows), 1)
-    lines = [f"{len(rows)} instances, {optimal} proved optimal ({share:.0f} %), each with a proof in the repository.", ""]
+    first = f"{len(rows)} instances, {optimal} proved optimal ({share:.0f} %), each with a proof in the repository."
+    lines = [first, ""]
     lines += ["| family | instances | tuples | proved |", "|---|---|---|---|"]
     for family, names in sorted(families.items()):
         counts = [rows[name]["tuples"] for name in names]
@@ -30,7 +31,7 @@ def tables() -> str:
         lines.append(f"| {family} | {len(names)} | {min(counts):,} to {max(counts):,} | {proved} |")
     lines += [
         "",
-        "| instance | sizes | tuples | components | root bound | best value | best bound | status | who, when | seconds |",
+        "| instance | sizes | tuples | components | root bound | best value | best bound | status | found by | seconds |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     lines += [_line(name, rows[name]) for names in families.values() for name in names]

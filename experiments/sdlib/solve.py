@@ -18,7 +18,7 @@ from assoc.solvers.assign import assign
 from experiments.sdlib import store, verify
 from experiments.sdlib.instances import Instance
 
-# tuples of an instance that the writer of proofs can take on in minutes: its linear programs have all rows of a component
+# tuples of an instance that the writer of proofs does in minutes: its linear programs have all rows of a component
 _PROVABLE = 60_000
 # relative distance to which multipliers in floating point may leave a proof short of the optimum
 _CLOSED = 1e-9
