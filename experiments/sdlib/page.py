@@ -31,7 +31,7 @@ def tables() -> str:
         lines.append(f"| {family} | {len(names)} | {min(counts):,} to {max(counts):,} | {proved} |")
     lines += [
         "",
-        "| instance | sizes | tuples | components | root bound | best value | best bound | status | found by | seconds |",
+        "| instance | sizes | tuples | components | root bound | value | best bound | status | found by | seconds |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     lines += [_line(name, rows[name]) for names in families.values() for name in names]

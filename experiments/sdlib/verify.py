@@ -8,8 +8,8 @@ with 0; prints why not and exits with 1; or names what is wrong with a file and 
 An instance begins with the lines ``assoc-problem 1``, ``sizes N ...`` (measurements of each sensor), ``dummies yes``
 or ``dummies no``, ``tuples N``; then a tuple a line: its cost, and an index for each sensor, from 1, 0 where it saw
 nothing. A solution begins with ``assoc-solution 1``, may have a line ``cost C``, and has a chosen tuple a line, without
-its cost. Every measurement must be in exactly one chosen tuple; without dummies only those of the smallest sensors must be in one.
-Lines that begin with # are comments.
+its cost. Every measurement must be in exactly one chosen tuple; without dummies only those of the smallest sensors must
+be in one. Lines that begin with # are comments.
 """
 
 from __future__ import annotations
