@@ -67,7 +67,7 @@ def _run(given: dict[str, Any], speech: dict[str, Any]) -> None:
     if "summary" in given:
         _summary(given)
         return
-    from assoc._cli.sweep_options import check_study_outputs, read_options
+    from assoc._cli.sweep.options import check_study_outputs, read_options
 
     options = read_options(given)
     inputs = [*options.values["files"], options.config]
@@ -146,7 +146,7 @@ def _summary(given: dict[str, Any]) -> None:
             "--summary: runs nothing and can be combined only with --all, --plot, --csv and --report, "
             f"not with {(strange or given['files'])[0]}"
         )
-    from assoc._cli.sweep_options import check_study_outputs
+    from assoc._cli.sweep.options import check_study_outputs
 
     check_study_outputs(given["summary"], [given.get("csv"), given.get("report")], [])
     _check_endings(given)
@@ -155,7 +155,7 @@ def _summary(given: dict[str, Any]) -> None:
 
 def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
     """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
-    from assoc._cli.study_tables import print_study
+    from assoc._cli.sweep.tables import print_study
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
     from assoc.sweeps.summary import summarize
@@ -184,7 +184,7 @@ def _report(folder: str, given: dict[str, Any], study: Study | None) -> None:
 
 
 def _tune(options: Any, given: dict[str, Any], speech: dict[str, Any]) -> None:
-    from assoc._cli.study_tables import print_tuning
+    from assoc._cli.sweep.tables import print_tuning
 
     with _watched(options.output, speech) as progress:
         report = options.tuning(progress)

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from assoc._cli.lines import fitted
-from assoc._cli.study_tables import without_the_same
+from assoc._cli.sweep.tables import without_the_same
 from assoc._cli.table import fitted_lines
 from assoc.simulation import simulate
 from tests.programs.terminal import shown, shown_at
