@@ -144,6 +144,7 @@ class EarlyEnd:
         # the handler may come while the main thread holds it
         self._lock = threading.RLock()
         self._working = False
+        self._insists = False
         self._patience = 0.0
         self._signal = 0
 
@@ -159,6 +160,10 @@ class EarlyEnd:
 
         def end(number: int, frame: object = None) -> None:
             with self._lock:
+                if self._insists:
+                    # Python calls the handler of SIGINT for an interruption of its own
+                    self._insists = False
+                    raise KeyboardInterrupt
                 if self._signal or not self._working:
                     leave(number)
                 self._signal = number
@@ -177,6 +182,7 @@ class EarlyEnd:
     def _insist(self) -> None:
         with self._lock:
             if self._working:
+                self._insists = True
                 _thread.interrupt_main()
 
     @contextmanager
@@ -186,13 +192,15 @@ class EarlyEnd:
         with self._lock:
             self._working = True
         try:
-            yield
+            try:
+                yield
+            finally:
+                # the interrupt may come as late as here
+                with self._lock:
+                    self._working = False
         except KeyboardInterrupt:
             self.say("")
             raise
-        finally:
-            with self._lock:
-                self._working = False
 
     @property
     def asked(self) -> bool:

@@ -10,7 +10,7 @@ from tests.costs.reference import CIRCLE, constant, residuals
 from tests.sizes import few_or_all
 
 
-@few_or_all("count", 24, 400)
+@few_or_all("count", 24, 120)
 def test_no_start_leads_to_a_much_better_position(count):
     found = [one[1] for number in range(count) if (one := excess(11, number)) is not None]
     assert len(found) > count // 3

@@ -1,5 +1,6 @@
 """`python -m assoc.track` as a program."""
 
+import inspect
 import re
 
 import numpy as np
@@ -171,8 +172,8 @@ def test_too_many_tuples_is_code_3(scene_file, tmp_path, monkeypatch, capsys):
     from assoc.tracking import tracker
     from assoc.tracking.single_scan import base
 
-    monkeypatch.setattr(tracker.Tracker.__init__, "__kwdefaults__", {
-        **tracker.Tracker.__init__.__kwdefaults__, "max_tuples": 5})  # fmt: skip
+    begin = inspect.unwrap(tracker.Tracker.__init__)
+    monkeypatch.setattr(begin, "__kwdefaults__", {**begin.__kwdefaults__, "max_tuples": 5})
     assert base
     assert track.main([str(scene_file), "-o", str(tmp_path / "tracks.csv")]) == 3
     assert "more than max_tuples = 5" in capsys.readouterr().err
