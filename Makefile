@@ -24,7 +24,8 @@ OLDEST := .venv-oldest
 NEWEST := .venv-newest
 NEWER ?= $(shell for p in python3.13 python3.12 $(HOME)/.pyenv/versions/3.13*/bin/python $(HOME)/.pyenv/versions/3.12*/bin/python; do \
 	if "$$p" -c '' >/dev/null 2>&1; then command -v "$$p"; break; fi; done)
-TESTS ?= $(UNCOMPILED) tests/ranking tests/proofs tests/filters/test_gaussian_filters.py
+TESTS ?= tests/sensors tests/test_problem.py tests/packing/test_matching.py tests/solvers/test_reduction.py tests/proofs \
+	"tests/solvers/test_against_brute_force.py::test_small_problems[1.0-exact]"
 # tests with much behind them that are quick without a compiler
 UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tests/simulation/test_observation.py \
 	tests/solvers/test_reduction.py tests/packing/test_matching.py tests/packing/test_dimensionwise.py \
