@@ -90,11 +90,13 @@ def _prepare_with_dummies(
 
 @njit
 def _whole_numbers(weights: NDArray[np.float64]) -> bool:
-    """Whether all weights are whole numbers, small enough for sums of them to be exact."""
+    """Whether all weights are whole numbers, so small that tolerances relative to their sums stay below 1."""
     if weights.size == 0:
         return False
+    total = 0.0
     for j in range(weights.size):
-        if not (abs(weights[j]) < 1e9 and weights[j] == math.floor(weights[j])):
+        total += abs(weights[j])
+        if not (total < 9e8 and weights[j] == math.floor(weights[j])):
             return False
     return True
 

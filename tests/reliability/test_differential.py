@@ -92,3 +92,10 @@ def test_the_judge_sees_faults():
     assert "not feasible" in found([Wrong(tuples=right.tuples[:1], indices=right.indices[:1])])
     assert "bound nan" in found([Wrong(lower_bound=float("nan"))])
     assert "twice" in found([right, right])
+
+
+def test_whole_numbers_that_are_large():
+    """Bounds were closed to the cost found, 2 above the optimum: tolerances relative to 2.7e9 are more than 1."""
+    case = draw(42, 5122)
+    for solver in ("exact", "tabu", "genetic", "aco", "lagrangian"):
+        assert assign(case.problem, solver, seed=0).lower_bound <= -2.7e9

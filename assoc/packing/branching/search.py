@@ -106,8 +106,9 @@ class BranchAndBound:
     @property
     def lower_bound(self) -> float:
         """No solution weighs less."""
-        # whole-numbered weights: what is not better by the tolerance is not better at all
-        proved = self.weight if self._packing.granularity else self.weight - self.tolerance
+        # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
+        whole = self.tolerance < self._packing.granularity
+        proved = self.weight if whole else self.weight - self.tolerance
         return min(proved, self._open.least_bound)
 
     def run(self, nodes: int) -> None:
