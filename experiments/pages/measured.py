@@ -1,4 +1,4 @@
-"""Tables of measured figures for docs/filters.md, docs/recordings.md and docs/sweeps.md."""
+"""Tables of measured figures for docs/filters.md, docs/recordings.md, docs/sweeps.md and docs/concepts.md."""
 
 from __future__ import annotations
 
@@ -223,6 +223,22 @@ def readings() -> str:
     return table(["reading", "mean cycles", "95 % interval"], rows)
 
 
+def prior() -> str:
+    """What a certified optimum of bearings is worth, with and without a prior of positions."""
+    r = Results("ambiguous_bearings")
+    heads = ("targets found of each 100 there", "true tuples found", "chosen tuples that are true")
+
+    def cell(claim: Claim) -> str:
+        low, high = claim.interval or (claim.ours, claim.ours)
+        return f"{claim.ours:.0f} ± {(high - low) / 2:.0f}{' %' if claim.unit else ''}"
+
+    rows = []
+    for case in (f"{targets} targets, {cost}" for targets in (5, 20) for cost in ("equation 5", "with a prior")):
+        proven = f"{r[f'{case}: proven optima'].ours:.0f} %"
+        rows.append([case, *(cell(r[f"{case}: {head}"]) for head in heads), proven])
+    return table(["scene, cost", *heads, "proven optima"], rows)
+
+
 FILTERS = {
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
@@ -234,3 +250,4 @@ FILTERS = {
 }
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
+CONCEPTS = {"prior": prior}
