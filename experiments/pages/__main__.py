@@ -24,6 +24,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "solvers.md": metaheuristics.SOLVERS,
     "ant_colony.md": metaheuristics.ANT_COLONY,
     "concepts.md": measured.CONCEPTS,
+    "tracking.md": measured.TRACKING,
 }
 """Page -> name of the table -> what makes it."""
 

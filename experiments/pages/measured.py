@@ -1,4 +1,4 @@
-"""Tables of measured figures for docs/filters.md, docs/recordings.md, docs/sweeps.md and docs/concepts.md."""
+"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers, and concepts."""
 
 from __future__ import annotations
 
@@ -239,6 +239,19 @@ def prior() -> str:
     return table(["scene, cost", *heads, "proven optima"], rows)
 
 
+def warm_starts() -> str:
+    """CPU time of a tracker's problem without a start, with what its tracks suggest, and with the optimum."""
+    r = Results("trackers.warm_starts")
+    cells: dict[str, dict[str, list[str]]] = {}
+    for claim in r.claims:
+        if claim.quantity.endswith("CPU time of a problem"):
+            case, solver, _ = claim.quantity.split(": ")[0].rsplit(", ", 2)
+            cells.setdefault(case, {}).setdefault(solver, []).append(number(claim.ours, 2))
+    solvers = [*next(iter(cells.values()))]
+    rows = [[case, *(" / ".join(times[solver]) for solver in solvers)] for case, times in cells.items()]
+    return table(["scene, tracker", *(f"`{solver}`" for solver in solvers)], rows)
+
+
 FILTERS = {
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
@@ -251,3 +264,4 @@ FILTERS = {
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
 CONCEPTS = {"prior": prior}
+TRACKING = {"warm-starts": warm_starts}
