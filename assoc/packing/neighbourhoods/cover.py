@@ -68,7 +68,7 @@ class Cover:
         insert_and_eject(search_arrays(self.packing), self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
-        """Cover all rows without slack, by ejections and then by a search; False when that is impossible or time is over.
+        """Cover all rows without slack, by ejections and then by a search; False where that fails.
 
         Raises
         ------
