@@ -118,7 +118,7 @@ def test_a_crowd_fills_the_view(browser, tmp_path):
     scene = simulate("crowd", 0, targets=100, scans=3, sensor="radar", width=20_000.0)
     truth = scene.truth
     rows = [
-        {"track_id": t, "time": time, "x": p[t, 0], "y": p[t, 1], "z": p[t, 2]}
+        {"track_id": t, "time": time, "x": p[t, 0], "y": p[t, 1], "z": p[t, 2], "altitude": p[t, 2]}
         for time, p in zip(scene.times, truth.positions, strict=True)
         for t in range(100)
     ]
