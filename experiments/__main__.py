@@ -132,6 +132,11 @@ EXPERIMENTS = (
         "experiments/results/metaheuristics.ablation.json",
     ),
     Experiment(
+        "metaheuristics.against_peers",
+        "aco, genetic and tabu after seconds, other programs after a minute, on ghosts",
+        "with --publish experiments/results/metaheuristics.against_peers.json",
+    ),
+    Experiment(
         "metaheuristics.sweep",
         "alpha, beta, rho, ants and refinement of the ant colony on problems that are not easy",
         "docs/ant_colony.md and its figures; with --publish experiments/results/metaheuristics.sweep.json",

@@ -6,6 +6,7 @@ computed by `experiments.common.checking`, not by the peer.
 
 ======================  ==========================================================================
 ``cp_sat``              OR-Tools CP-SAT, two workers, costs times 1e6 rounded to integers
+``cp_sat_1``            the same with one worker
 ``scip``, ``scip_1``    SCIP through OR-Tools MathOpt on two threads (concurrent mode), and on one
 ``highs``               HiGHS through ``scipy.optimize.milp``, relative gap 1e-9
 ``sequential``          sensor by sensor, one 2-D assignment each: what most trackers do
@@ -91,7 +92,7 @@ def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int
     return row, column.astype(np.int64), must.astype(np.bool_)
 
 
-def _cp_sat(problem: AssignmentProblem, time_limit: float) -> Chosen:
+def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int) -> Chosen:
     from ortools.sat import cp_model_pb2
     from ortools.sat.python import cp_model
 
@@ -109,7 +110,7 @@ def _cp_sat(problem: AssignmentProblem, time_limit: float) -> Chosen:
     scaled = np.round(problem.costs * CP_SAT_SCALE).astype(np.int64)
     model.minimize(cp_model.LinearExpr.weighted_sum(take, scaled.tolist()))
     solver = cp_model.CpSolver()
-    solver.parameters.num_workers = 2
+    solver.parameters.num_workers = workers
     solver.parameters.max_time_in_seconds = time_limit
     solver.parameters.relative_gap_limit = 0.0
     status = solver.solve(model)
@@ -230,7 +231,12 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
 
 def cp_sat(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     """OR-Tools CP-SAT with two workers, costs scaled by 1e6 and rounded."""
-    return _answer(_cp_sat, problem, time_limit)
+    return _answer(lambda p, limit: _cp_sat(p, limit, 2), problem, time_limit)
+
+
+def cp_sat_1(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """OR-Tools CP-SAT with one worker."""
+    return _answer(lambda p, limit: _cp_sat(p, limit, 1), problem, time_limit)
 
 
 def scip(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
@@ -272,6 +278,7 @@ def _packing_peer(solve: Callable[[AssignmentProblem, float], Chosen]) -> Peer:
 
 PEERS: dict[str, Peer] = {
     "cp_sat": cp_sat,
+    "cp_sat_1": cp_sat_1,
     "scip": scip,
     "scip_1": scip_1,
     "highs": highs,

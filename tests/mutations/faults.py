@@ -132,7 +132,7 @@ FAULTS = (
         "                        fits = j != node\n",
         _OF_PAPER,
     ),
-    Fault("the last best tour wins, not the cheapest", _PAPER, "if weight < best_weight:", "if True:", _OF_PAPER),
+    Fault("the last best tour wins, not the cheapest", _PAPER, "if walked[k] < best_weight:", "if True:", _OF_PAPER),
     # mode mmas
     Fault(
         "the default mode has no ants",
@@ -317,7 +317,7 @@ FAULTS = (
     ),
     Fault("never a new cover", _TABU, "if self.restarts % _FRESH == 0:", "if False:", _OF_TABU),
     Fault("the tabu list outlives a restart", _TABU, "            self.until[:] = 0\n", "", _OF_TABU),
-    Fault("rows are forced whatever they cost", _TABU, "p=excess / excess.sum()", "p=None", _OF_TABU),
+    Fault("rows are forced whatever they cost", _TABU, "p=excess / total", "p=None", _OF_TABU),
     # what the three share
     Fault(
         "patience has no end",

@@ -102,7 +102,11 @@ class TabuSearch:
         packing, owner = component.packing, self.owner
         excess = np.where(owner >= 0, component.reduced[owner], -component.duals) + 1e-3 * component.temperature
         excess = np.maximum(excess, 0.0)
-        row = int(rng.choice(excess.size, p=excess / excess.sum()))
+        total = excess.sum()
+        if total == 0.0:
+            # multipliers that are large and cancel: what a row costs more is lost in their rounding
+            return -1
+        row = int(rng.choice(excess.size, p=excess / total))
         columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
         columns = columns[columns != owner[row]]
         if columns.size == 0:
