@@ -1,26 +1,31 @@
 """A tree that proves how little a component can weigh: multipliers at its leaves, pairs of rows at its nodes.
 
-Each node is a linear program. Where its bound does not reach the weight of the best cover, the node asks whether two
-rows are in one column (Ryan and Foster's branching): either no column remains that has just one of them, or none that
-has both. The pair is the one whose answers raise the bound the most, of those on which the linear program is undecided.
+Each node is a linear program, with the cuts that the root has. Where its bound does not reach what is to be proved, the
+node asks whether two rows are in one column (Ryan and Foster's branching), as the search of `exact` does: either no
+column remains that has just one of them, or none that has both. Columns too dear for anything below the target are left
+out before.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
+from assoc.packing.branching.pairs import answer, any_open_pair, decide, doubtful_pairs, new_trials
+from assoc.packing.branching.root import basis_of, root_with_cuts
 from assoc.packing.packing import Packing
-from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
+from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
+from assoc.packing.simplex.program import Allowed, all_allowed, all_reduced_costs, certified, make_feasible
 
-# pairs that are tried at a node, and steps of the simplex method for each answer
-_TRIED = 8
-_STEPS = 60
-# a share of a pair that is as good as none or all of it
-_WHOLE = 1e-6
+# exchanges of the simplex method at a node, and in trials of which nothing is known yet
+_EXCHANGES = 100_000
+# digits after the point with which multipliers are tried, the shortest first
+_DIGITS = (2, 4, 6, 9)
 
 
 @dataclass(slots=True)
@@ -29,8 +34,8 @@ class Node:
 
     Attributes
     ----------
-    duals : float array, shape (R,)
-        Multipliers of the component's rows.
+    duals : float array, shape (rows and cuts,), or None
+        Multipliers; at a node with a pair they say which columns are left out, if any are.
     bound : float
         What they prove below this node.
     pair : (int, int) or None
@@ -39,22 +44,57 @@ class Node:
         Places in the list of nodes: the rows together, the rows apart.
     """
 
-    duals: Floats
+    duals: Floats | None
     bound: float
     pair: tuple[int, int] | None = None
     children: tuple[int, int] = (0, 0)
 
 
 @dataclass(slots=True)
+class Tree:
+    """Cuts as odd sets of rows, bool array of shape (cuts, R), and nodes: the root first, children after parents."""
+
+    sets: NDArray[np.bool_]
+    nodes: list[Node] = field(default_factory=list)
+
+    @property
+    def bound(self) -> float:
+        """The least bound of the leaves."""
+        return min(node.bound for node in self.nodes if node.pair is None)
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What a tree is to prove.
+
+    Attributes
+    ----------
+    target : float
+        The weight that is known.
+    enough : float
+        A node is closed when its bound has reached this.
+    nodes : int
+        At the most; what is then open stays a leaf, with what it proves.
+    deadline : float
+        When time is over (clock.py).
+    """
+
+    target: float
+    enough: float
+    nodes: int
+    deadline: float
+
+
+@dataclass(slots=True)
 class _Open:
     place: int
-    columns: NDArray[np.bool_]
-    slack: NDArray[np.bool_]
-    relaxed: Relaxation
+    allowed: Allowed
+    variable: NDArray[np.int32]
+    duals: Floats
 
 
-def prove_by_tree(component: Packing, duals: Floats, weight: float, nodes: int) -> list[Node]:
-    """Return the nodes of a tree; its first is the root, and children come after their parents.
+def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> Tree:
+    """Return a tree that proves as much as can be proved within its aim.
 
     Parameters
     ----------
@@ -62,66 +102,73 @@ def prove_by_tree(component: Packing, duals: Floats, weight: float, nodes: int) 
         One component.
     duals : float array, shape (R,)
         Multipliers to start from.
-    weight : float
-        A node is not divided when its bound has reached this.
-    nodes : int
-        At the most; what is then open stays a leaf, with what it proves.
+    aim : Aim
+    base : float array, shape (R,)
+        What is added to the multipliers where they are written: their sums are what is rounded.
     """
-    program = LinearProgram(component)
-    columns, slack = np.ones(component.num_columns, np.bool_), component.slack.copy()
-    root = program.solve(duals=duals)
-    tree = [Node(root.duals, root.bound)]
-    waiting = [_Open(0, columns, slack, root)]
+    root = root_with_cuts(component, duals, aim.enough, aim.deadline)
+    program, num = root.program, component.num_columns
+    everything = np.concatenate([base, np.zeros(len(root.sets))])
+    slack_rows = np.zeros(root.slack.size, np.bool_)
+    slack_rows[: component.num_rows] = True
+    margin = 1e-9 * max(1.0, abs(aim.target))
+    trials = new_trials(program, component.num_rows)
+    room = np.empty(component.num_rows, np.int32)
+    tree = Tree(root.sets)
+    waiting = [_Open(0, all_allowed(program, root.slack), root.variable, root.duals)]
+    tree.nodes.append(Node(None, -np.inf))
     while waiting:
         task = waiting.pop()
-        if task.relaxed.bound >= weight or len(tree) + 2 > nodes:
+        node, allowed = tree.nodes[task.place], task.allowed
+        basis = basis_of(program, allowed, task.variable, task.duals)
+        status, _ = solve_dual(program, allowed, basis, Effort(aim.enough + 0.1 * margin, _EXCHANGES, aim.deadline))
+        found = basis.duals.copy()
+        make_feasible(program, allowed, found)
+        node.bound = float(certified(program, allowed, found))
+        node.duals = found
+
+        def proves(multipliers: Floats, allowed: Allowed = allowed) -> float:
+            make_feasible(program, allowed, multipliers)
+            return float(certified(program, allowed, multipliers))
+
+        if node.bound >= aim.enough:
+            node.duals, node.bound = _shortened(found, everything, aim.enough, proves)
             continue
-        pair = _pair(program, component, task, weight)
-        if pair is None:
+        if len(tree.nodes) + 2 > aim.nodes or time.monotonic() > aim.deadline or status != OPTIMAL:
             continue
-        tree[task.place].pair = pair
-        tree[task.place].children = len(tree), len(tree) + 1
-        for together in (True, False):
-            columns, slack = _divided(component, task, pair, together)
-            relaxed = program.solve(columns=columns, slack=slack, duals=task.relaxed.duals)
-            waiting.append(_Open(len(tree), columns, slack, relaxed))
-            tree.append(Node(relaxed.duals, relaxed.bound))
+        # nothing below the target has columns or slack that cost so much more
+        most = aim.target - node.bound + margin
+        reduced = all_reduced_costs(program, found)
+        columns = allowed.columns & (reduced <= most)
+        slack = allowed.slack & ((-found <= most) | ~slack_rows)
+        fewer = int(columns.sum()) < allowed.active.size or bool((slack != allowed.slack).any())
+        kept = Allowed(np.flatnonzero(columns).astype(np.int32), columns, slack)
+        count = doubtful_pairs(component.cols, basis, trials)
+        if count:
+            which, _ = decide(program, component.cols, kept, basis, trials, count, Effort(aim.enough, 0, aim.deadline))
+            pair = int(trials.pairs[which, 0]), int(trials.pairs[which, 1])
+        else:
+            one, two = any_open_pair(component.cols, kept, room)
+            if one < 0:
+                continue
+            pair = int(one), int(two)
+        node.pair, node.children = pair, (len(tree.nodes), len(tree.nodes) + 1)
+        if not fewer:
+            node.duals = None
+        for joined in (True, False):
+            side = Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(slack.size, np.bool_))
+            size = answer(component.cols, kept, pair, joined, side)
+            side = side._replace(active=side.active[:size].copy())
+            waiting.append(_Open(len(tree.nodes), side, basis.variable.copy(), basis.duals.copy()))
+            tree.nodes.append(Node(None, node.bound))
     return tree
 
 
-def _divided(
-    component: Packing, task: _Open, pair: tuple[int, int], together: bool
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Columns and slack that remain when the rows of a pair are in one column, or in different ones."""
-    one, other = ((component.cols == row).any(axis=1) for row in pair)
-    if not together:
-        return task.columns & ~(one & other), task.slack
-    slack = task.slack.copy()
-    slack[list(pair)] = False
-    return task.columns & (one == other), slack
-
-
-def _pair(program: LinearProgram, component: Packing, task: _Open, weight: float) -> tuple[int, int] | None:
-    """The pair on which to divide a node; None where the linear program is undecided about none."""
-    shares: dict[tuple[int, int], float] = {}
-    primal = task.relaxed.primal
-    for j in np.flatnonzero(task.columns & (primal > _WHOLE)):
-        rows = component.cols[j][component.cols[j] >= 0].tolist()
-        for k, row in enumerate(rows):
-            for other in rows[k + 1 :]:
-                shares[row, other] = shares.get((row, other), 0.0) + float(primal[j])
-    undecided = sorted((abs(share - 0.5), pair) for pair, share in shares.items() if _WHOLE < share < 1.0 - _WHOLE)
-    best, gain = None, -np.inf
-    program.mark()
-    for _, pair in undecided[:_TRIED]:
-        rises = []
-        for together in (True, False):
-            columns, slack = _divided(component, task, pair, together)
-            relaxed = program.solve(columns=columns, slack=slack, duals=task.relaxed.duals, exchanges=_STEPS)
-            rises.append(min(relaxed.bound, weight) - task.relaxed.bound)
-        # both answers count: a node is done when both are
-        value = max(rises[0], 1e-9) * max(rises[1], 1e-9)
-        if value > gain:
-            best, gain = pair, value
-    program.back()
-    return best
+def _shortened(duals: Floats, base: Floats, enough: float, proves: Callable[[Floats], float]) -> tuple[Floats, float]:
+    """Return multipliers with as few digits as still prove enough, and what they prove."""
+    for digits in _DIGITS:
+        short = np.round(duals + base, digits) - base
+        bound = proves(short.copy())
+        if bound >= enough:
+            return short, bound
+    return duals, proves(duals.copy())

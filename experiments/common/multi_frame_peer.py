@@ -5,8 +5,8 @@ none), each measurement is used once, and what no track uses is a false alarm at
 decomposition, a 2-D assignment a scan, and SCIP on what the scans do not agree about; at a gap of 2 % it stops.
 
 Here the first sensor's measurements are the tracks, and each tuple without one is a track of its own that may also use
-nothing. Costs are against false alarms; a track's are raised together so that its cheapest is at 0, since the rule of 2 %
-is meant for costs above 0.
+nothing. Costs are against false alarms; a track's are raised together so that its cheapest is at 0, since the rule of
+2 % is meant for costs above 0.
 """
 
 from __future__ import annotations

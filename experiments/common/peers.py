@@ -243,8 +243,7 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
     tensor[tuple(slice(size, None) for size in sizes)] = 0.0
     for key, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
         place = tuple(
-            slice(index - 1, index) if index else slice(size, None)
-            for index, size in zip(key, sizes, strict=True)
+            slice(index - 1, index) if index else slice(size, None) for index, size in zip(key, sizes, strict=True)
         )
         np.minimum(tensor[place], cost, out=tensor[place])
 

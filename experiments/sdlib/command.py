@@ -17,7 +17,7 @@ from experiments.benchmarks.run import one_core
 from experiments.sdlib import store, verify
 from experiments.sdlib.instances import Instance
 
-# seconds from one look at a running command to the next; wall time at the most, as a multiple of CPU time and seconds more
+# seconds from one look at a running command to the next; wall time at the most: a multiple of CPU time, and more
 _LOOK = 0.05
 _PATIENT, _START = 12.0, 60.0
 
@@ -41,7 +41,8 @@ def run_command(picked: list[Instance], command: str, seconds: float) -> Iterato
             solution.unlink(missing_ok=True)
             instance = verify.read_instance(str(path))
             words = [word.format(instance=path, solution=solution) for word in shlex.split(command)]
-            row: dict[str, Any] = {"instance": one.name, "solver": "command", **_watched(words, solution, seconds, instance)}
+            row: dict[str, Any] = {"instance": one.name, "solver": "command"}
+            row |= _watched(words, solution, seconds, instance)
             best = known.get(one.name, {}).get("value")
             row["excess"] = None if best is None or row["cost"] is None else float(row["cost"]) - float(best)
             yield row
@@ -52,7 +53,10 @@ def _watched(words: list[str], solution: Path, seconds: float, instance: tuple[A
     seen, used, started = 0, 0.0, time.perf_counter()
     with one_core():
         process = subprocess.Popen(
-            words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            words,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
             env={**os.environ, "OMP_NUM_THREADS": "1"},
         )
     while True:

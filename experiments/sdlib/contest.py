@@ -1,8 +1,8 @@
 """A comparison of solvers on the set: each alone on one core, for so much CPU time, judged by verify.py.
 
-Every run is a process of its own, forked from one in which all kernels are compiled: it begins with the problem read, and
-its time is CPU time, so that other programs on the machine hardly matter. What it finds it writes down at once; should it
-not keep its time, the system stops it.
+Every run is a process of its own, forked from one in which all kernels are compiled: it begins with the problem read,
+and its time is CPU time, so that other programs on the machine hardly matter. What it finds it writes down at once;
+should it not keep its time, the system stops it.
 """
 
 from __future__ import annotations
@@ -20,15 +20,17 @@ from typing import Any
 
 from assoc.errors import AssocError
 from assoc.problem import AssignmentProblem
-from experiments.benchmarks.run import one_core, warm_up
+from experiments.benchmarks.run import one_core
+from experiments.benchmarks.run import warm_up as compile_kernels
 from experiments.sdlib import store, verify
-from experiments.sdlib.contestants import CHECKPOINTS, CONTESTANTS, OURS, Log, is_installed, takes
+from experiments.sdlib.contestants import CONTESTANTS, OURS, Log, is_installed, takes, warm_up
 from experiments.sdlib.instances import Instance
 
 Row = dict[str, Any]
-# who does not keep the time is stopped at this many times as much CPU time, or wall time; and seconds more
-_LATE, _PATIENT, _START = 1.5, 12.0, 5.0
-_FAULTS = (AssocError, ArithmeticError, AssertionError, ImportError, LookupError, MemoryError, RuntimeError, TypeError, ValueError)
+# who does not keep the time is stopped at this many times as much CPU time, or wall time
+_TWICE, _PATIENT = 2.0, 12.0
+_FAULTS = (AssocError, ArithmeticError, AssertionError, ImportError, LookupError)
+_FAULTS += (MemoryError, RuntimeError, TypeError, ValueError)
 
 
 def representatives(every: list[Instance]) -> list[Instance]:
@@ -50,7 +52,7 @@ def contest(picked: list[Instance], names: list[str], seconds: float) -> Iterato
     for name in sorted(set(names) - set(present)):
         print(f"{name}: is not installed, and left out", file=sys.stderr)
     # forked processes have the kernels that are compiled here; peers, which start threads, must not have run before
-    warm_up({name for name in present if name in OURS}, set())
+    compile_kernels({name for name in present if name in OURS}, set())
     known = store.table()
     for one in picked:
         problem = store.load(one.name)
@@ -89,8 +91,6 @@ def _run(name: str, problem: AssignmentProblem, seconds: float, best: float) -> 
 def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: float, path: Path) -> None:
     """What happens in a contestant's process."""
     os.environ["OMP_NUM_THREADS"] = "1"
-    most = math.ceil(_LATE * (seconds + sum(CHECKPOINTS)) + _START)
-    resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with open(path, "a") as file, open(os.devnull, "w") as nowhere:
         # what a peer prints is no part of our output
@@ -103,7 +103,9 @@ def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: flo
 
         # a new problem: nothing that a solver prepared before may be left in it
         fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
+        warm_up(name)
         log = Log(best, lambda point: write(point) if math.isfinite(point[1] or 0.0) else None)
+        log.allow(_TWICE * seconds)
         try:
             tuples, proven = CONTESTANTS[name](fresh, seconds, log)
             write({"seconds": round(log.elapsed(), 4), "tuples": tuples.tolist(), "proved": proven})

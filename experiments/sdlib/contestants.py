@@ -1,13 +1,15 @@
 """Who takes part in a comparison: our solvers, and the peers that are installed, on one core each.
 
-A contestant is given a problem, seconds, and a `Log`, to which it tells what it has found and when; it returns the tuples
-that it has chosen, and whether it says that they are optimal. Peers that tell of nothing before their end are started
-anew, with 1, 5 and all seconds.
+A contestant is given a problem, seconds, and a `Log`, to which it tells what it has found and when; it returns the
+tuples that it has chosen, and whether it says that they are optimal. Peers that tell of nothing before their end are
+started anew, with 1, 5 and all seconds. Most can be limited by the wall's clock alone: on a machine that others use,
+too, they are given as much more of that as they got less of the processor shortly before.
 """
 
 from __future__ import annotations
 
 import math
+import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,8 +28,10 @@ CHECKPOINTS = (1.0, 5.0)
 _WITHOUT_END = ("aco", "genetic", "tabu")
 _PROVING = ("exact", "milp", "lagrangian")
 _UNLIMITED = 1_000_000_000
-# limits are of the wall's clock, which goes on while others have the processor: so much more than of CPU time
-_SLACK = 2.0
+# wall time at the most, as a multiple of CPU time, and CPU seconds that the first guess takes
+_SLACK, _PROBE = 3.0, 0.05
+# who does not keep a limit is stopped at this many times as much CPU time, and seconds more
+_LATE, _START = 1.2, 3.0
 # a share of its limit within which a peer has ended by itself
 _EARLY = 0.7
 # a cost this near to the best one that is known, relatively, is the best one
@@ -49,6 +53,19 @@ class Log:
     best: float
     tell: Callable[[list[float | None]], None]
     started: float = field(default_factory=time.process_time)
+
+    def allow(self, seconds: float) -> None:
+        """Have the system stop this process after so much more CPU time, and some: not all keep their limits."""
+        most = math.ceil(time.process_time() + _LATE * seconds + _START)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+
+    def wall(self, seconds: float) -> float:
+        """Wall time in which this process will have had about so much CPU time, going by the last moments."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        while time.process_time() - cpu < _PROBE:
+            pass
+        share = (time.process_time() - cpu) / (time.perf_counter() - wall)
+        return seconds / min(max(share, 1.0 / _SLACK), 1.0)
 
     def elapsed(self) -> float:
         """CPU seconds of this process since the start."""
@@ -88,12 +105,14 @@ def _peer(name: str, problem: AssignmentProblem, seconds: float, log: Log, *, li
     """A peer that tells of nothing before its end."""
     best, tuples, proven = math.inf, problem.tuples[:0], False
     for limit in (*(one for one in CHECKPOINTS if limited and one < seconds), seconds):
-        answer = peers.PEERS[name](problem, limit)
-        log.point(answer.cost, answer.bound, answer.cpu)
+        log.allow(limit)
+        most = log.wall(limit) if limited else limit
+        answer = peers.PEERS[name](problem, most)
+        log.point(answer.cost, answer.bound, min(answer.cpu, limit) if limited else answer.cpu)
         proven = answer.proven
         if answer.cost < best:
             best, tuples = answer.cost, answer.tuples
-        if proven or answer.cpu < _EARLY * limit or (answer.bound is None and log.is_best(best)):
+        if proven or answer.seconds < _EARLY * most or (answer.bound is None and log.is_best(best)):
             break
     return tuples, proven
 
@@ -103,7 +122,7 @@ def _cp_sat(problem: AssignmentProblem, seconds: float, log: Log) -> Answer:
         log.point(cost, bound)
         return log.elapsed() >= seconds
 
-    answer = peers.cp_sat_1(problem, _SLACK * seconds, told)
+    answer = peers.cp_sat_1(problem, log.wall(seconds), told)
     log.point(answer.cost, answer.bound, answer.cpu)
     return answer.tuples, answer.proven
 
@@ -117,13 +136,20 @@ PEERS: dict[str, Contestant] = {
     **{name: partial(_peer, name) for name in ("highs", "chils", "branch_reduce", "mmwis")},
     **{name: partial(_peer, name, limited=False) for name in ("kap", "nrl_tracker", "stone_soup", "sequential")},
 }
+_PEER_NAMES = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
 CONTESTANTS = OURS | PEERS
 """By name. "sequential" is scipy's 2-D assignment, sensor by sensor, as most trackers do it."""
 
 
 def takes(name: str, problem: AssignmentProblem) -> bool:
     """Whether a contestant is installed and can take a problem."""
-    return name in OURS or peers.available({"cp_sat": "cp_sat_1", "scip": "scip_1"}.get(name, name), problem)
+    return name in OURS or peers.available(_PEER_NAMES.get(name, name), problem)
+
+
+def warm_up(name: str) -> None:
+    """Import a peer's package, by solving a tiny problem with it; our solvers are warm already."""
+    if name in PEERS:
+        peers.warm_up([_PEER_NAMES.get(name, name)])
 
 
 def is_installed(name: str) -> bool:
