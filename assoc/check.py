@@ -25,10 +25,11 @@ import lzma
 import math
 import re
 import sys
+from collections import Counter
 
 DECIMALS = 60
 NUMBER = re.compile(r"[+-]?[0-9]{1,60}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
-MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
+MOST_ROWS, MOST_BYTES, DEEPEST = 1_000_000, 200_000_000, 1_000
 Row = tuple[int, int]  # sensor, index from 1; cuts are (-1, number)
 Column = tuple[int, tuple[Row, ...]]  # cost, rows
 
@@ -176,15 +177,15 @@ def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list
     cuts_of, sides = {row: list[Row]() for row in rows}, dict[Row, int]()
     for place, cut in enumerate(_listed(cuts)):
         inside = [_as_row(one) for one in _listed(cut)]
-        if len(inside) % 2 == 0 or len(set(inside)) != len(inside) or not rows.issuperset(inside):
-            raise RefusedError(f"cut {place} does not follow: it needs an odd number of the tree's rows, each once")
+        if len(inside) % 2 == 0 or len({*inside}) != len(inside) or not rows.issuperset(inside) or place >= len(rows):
+            raise RefusedError(f"cut {place} does not follow: it needs an odd number of its tree's rows, each once")
         sides[-1, place] = len(inside) // 2
         for row in inside:
             cuts_of[row].append((-1, place))
     longer = []
     for cost, own in columns:
         hits = [cut for row in own for cut in cuts_of[row]]
-        pairs = [cut for cut in dict.fromkeys(hits) for _ in range(hits.count(cut) // 2)]
+        pairs = [cut for cut, count in Counter(hits).items() for _ in range(count // 2)]
         longer.append((cost, (*own, *pairs)))
     return longer, sides
 
@@ -199,8 +200,8 @@ def tree_bound(tree: dict[str, object], columns: list[Column], rows: list[Row], 
         at = todo.pop()
         columns, needed = states.pop(at)
         node = nodes[at] if at < len(nodes) else None
-        if not isinstance(node, dict):
-            raise ValueError(f"a tree lacks node {at}")
+        if not isinstance(node, dict) or len(todo) > DEEPEST:
+            raise ValueError(f"a tree lacks node {at}, or is deeper than {DEEPEST}")
         if "multipliers" in node or "pair" not in node:
             values = node.get("multipliers")
             if not isinstance(values, list) or len(values) != len(names):
@@ -287,7 +288,7 @@ def main(words: list[str]) -> int:
     except RefusedError as error:
         print(f"{path}: refused: {error}", file=sys.stderr)
         return 1
-    except (OSError, ValueError, RecursionError, AttributeError, MemoryError, lzma.LZMAError, EOFError) as error:
+    except (OSError, ValueError, TypeError, RecursionError, MemoryError, lzma.LZMAError, EOFError) as error:
         print(f"{path}: {getattr(error, 'strerror', None) or error}".splitlines()[0], file=sys.stderr)
         return 2
     return 0

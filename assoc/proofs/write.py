@@ -120,9 +120,10 @@ def _proved(
         bound = check.bounded(columns, exact.needed, u, {})
         if bound is None or cost - bound <= max(CLOSED * max(abs(cost), _ONE), exact.unit - 1):
             return stages, []
-        if len(stages) == _STAGES:
+        left = check.cheap(columns, u, cost - bound)
+        if len(stages) == _STAGES or len(left) == len(columns):
             break
-        columns = check.cheap(columns, u, cost - bound)
+        columns = left
         packing = packing_of(columns, exact, alone, prepared.packing.granularity)
     own = {tuple((s, i) for s, i in enumerate(one) if i): exact.costs[one] for one in chosen}
     return stages, trees_of(Parts(packing, duals, alone, exact.rows, exact.unit / _ONE), own, aim)

@@ -45,9 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make.add_argument("--recording", metavar="FILE", help="of air traffic: without it, recorded ones stay as they are")
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
-        part.add_argument("--seconds", type=float, default=60.0, help="limit for each instance (default 60)")
+        part.add_argument("--seconds", type=_seconds, default=60.0, help="limit for each instance (default 60)")
         part.add_argument("--family", help="only this family")
         part.add_argument("names", nargs="*", metavar="NAME", help="only these instances")
+    improve = parts.choices["solve"]
+    improve.add_argument("--solver", default="exact", help="of ours (default exact, which alone proves)")
     run = parts.choices["run"]
     who = run.add_mutually_exclusive_group()
     who.add_argument("--command", help="your solver, with {instance} and {solution} in it")
@@ -60,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     if chosen.part == "make":
         if chosen.recording is not None:
+            if not Path(chosen.recording).is_file():
+                print(f"{chosen.recording}: there is no such file", file=sys.stderr)
+                return 2
             os.environ[recorded.PATH] = chosen.recording
         return _make(compare=chosen.compare)
     if chosen.part == "page":
@@ -67,14 +72,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     picked = list(_picked(parser, chosen.names, getattr(chosen, "family", None)))
     if chosen.part == "solve":
-        return _solve(picked, chosen.seconds)
+        return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
         return _check(picked)
     if chosen.command is not None and not ("{instance}" in chosen.command and "{solution}" in chosen.command):
         parser.error("--command: must have {instance} and {solution} in it")
     if not (chosen.all or chosen.names or chosen.family):
         picked = representatives(picked)
-    return _run(picked, chosen)
+    return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < 1e6:
+        raise argparse.ArgumentTypeError(f"expected seconds above 0, got {text}")
+    return seconds
 
 
 def _solvers(text: str) -> list[str]:
@@ -115,10 +127,10 @@ def _make(*, compare: bool) -> int:
     return 1 if different else 0
 
 
-def _solve(picked: list[Instance], seconds: float) -> int:
+def _solve(picked: list[Instance], solver: str, seconds: float) -> int:
     for one in picked:
         rows = store.table()
-        row = rows[one.name] = solve(one, rows.get(one.name), seconds, datetime.date.today().isoformat())
+        row = rows[one.name] = solve(one, rows.get(one.name), solver, seconds, datetime.date.today().isoformat())
         store.write_table(rows)
         words = f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
         print(words, flush=True)
@@ -140,19 +152,20 @@ def _check(picked: list[Instance]) -> int:
     return 1 if wrong else 0
 
 
-def _run(picked: list[Instance], chosen: argparse.Namespace) -> int:
+def _run(picked: list[Instance], chosen: argparse.Namespace, arguments: Sequence[str]) -> int:
     if chosen.command is not None:
         rows = run_command(picked, chosen.command, chosen.seconds)
     else:
         rows = contest(picked, chosen.solvers, chosen.seconds)
     done = []
+    words = " ".join(["python -m experiments.sdlib", *arguments])
     try:
         for row in rows:
             print(json.dumps({key: value for key, value in row.items() if key != "trace"}), flush=True)
             done.append(row)
             # every now and then: a run of everything takes long
             if chosen.output is not None:
-                write_comparison(chosen.output, done, chosen.seconds)
+                write_comparison(chosen.output, done, chosen.seconds, words)
     except OSError as error:
         print(f"{error.filename or chosen.command}: {error.strerror}", file=sys.stderr)
         return 2

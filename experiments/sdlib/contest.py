@@ -104,7 +104,11 @@ def _contestant(name: str, problem: AssignmentProblem, seconds: float, best: flo
         # a new problem: nothing that a solver prepared before may be left in it
         fresh = AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
         warm_up(name)
-        log = Log(best, lambda point: write(point) if math.isfinite(point[1] or 0.0) else None)
+        log = Log(
+            best,
+            tell=lambda point: write(point) if math.isfinite(point[1] or 0.0) else None,
+            keep=lambda tuples: write({"tuples": tuples.tolist()}),
+        )
         log.allow(_TWICE * seconds)
         try:
             tuples, proven = CONTESTANTS[name](fresh, seconds, log)

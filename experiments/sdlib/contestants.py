@@ -48,10 +48,13 @@ class Log:
         The best cost that is known: a solver that gives no bound has nothing left to find there.
     tell : callable
         Called with each point: seconds, cost, and bound or None.
+    keep : callable
+        Called with tuples that are an answer, should no better one follow.
     """
 
     best: float
     tell: Callable[[list[float | None]], None]
+    keep: Callable[[NDArray[np.int32]], None]
     started: float = field(default_factory=time.process_time)
 
     def allow(self, seconds: float) -> None:
@@ -112,6 +115,7 @@ def _peer(name: str, problem: AssignmentProblem, seconds: float, log: Log, *, li
         proven = answer.proven
         if answer.cost < best:
             best, tuples = answer.cost, answer.tuples
+            log.keep(tuples)
         if proven or answer.seconds < _EARLY * most or (answer.bound is None and log.is_best(best)):
             break
     return tuples, proven
