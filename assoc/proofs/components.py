@@ -104,7 +104,7 @@ def _written(tree: Tree, rows: list[list[int]], alone: Floats, target: int) -> d
     nodes: list[dict[str, Any]] = []
     for node in tree.nodes:
         written: dict[str, Any] = {}
-        if node.duals is not None:
+        if node.duals.size:
             # what rounding to some digits had made short is short again
             written["multipliers"] = np.round(node.duals + base, 12).tolist()
         if node.pair is not None:

@@ -9,8 +9,8 @@ out before.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,14 @@ from assoc._types import Floats
 from assoc.packing.branching.pairs import answer, any_open_pair, decide, doubtful_pairs, new_trials
 from assoc.packing.branching.root import basis_of, root_with_cuts
 from assoc.packing.packing import Packing
+from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, all_reduced_costs, certified, make_feasible
 
-# exchanges of the simplex method at a node, and in trials of which nothing is known yet
+# exchanges of the simplex method at a node
 _EXCHANGES = 100_000
+# a share of the target that is rounding
+_ROUNDING = 1e-9
 # digits after the point with which multipliers are tried, the shortest first
 _DIGITS = (2, 4, 6, 9)
 
@@ -34,8 +37,8 @@ class Node:
 
     Attributes
     ----------
-    duals : float array, shape (rows and cuts,), or None
-        Multipliers; at a node with a pair they say which columns are left out, if any are.
+    duals : float array, shape (rows and cuts,)
+        Multipliers; at a node with a pair they say which columns are left out, and are empty if none are.
     bound : float
         What they prove below this node.
     pair : (int, int) or None
@@ -44,7 +47,7 @@ class Node:
         Places in the list of nodes: the rows together, the rows apart.
     """
 
-    duals: Floats | None
+    duals: Floats
     bound: float
     pair: tuple[int, int] | None = None
     children: tuple[int, int] = (0, 0)
@@ -85,8 +88,9 @@ class Aim:
     deadline: float
 
 
-@dataclass(slots=True)
-class _Open:
+class _Open(NamedTuple):
+    """A node that waits: what it allows, and the basis of its parent with its multipliers."""
+
     place: int
     allowed: Allowed
     variable: NDArray[np.int32]
@@ -106,69 +110,83 @@ def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> 
     base : float array, shape (R,)
         What is added to the multipliers where they are written: their sums are what is rounded.
     """
-    root = root_with_cuts(component, duals, aim.enough, aim.deadline)
-    program, num = root.program, component.num_columns
-    everything = np.concatenate([base, np.zeros(len(root.sets))])
-    slack_rows = np.zeros(root.slack.size, np.bool_)
-    slack_rows[: component.num_rows] = True
-    margin = 1e-9 * max(1.0, abs(aim.target))
-    trials = new_trials(program, component.num_rows)
-    room = np.empty(component.num_rows, np.int32)
-    tree = Tree(root.sets)
-    waiting = [_Open(0, all_allowed(program, root.slack), root.variable, root.duals)]
-    tree.nodes.append(Node(None, -np.inf))
-    while waiting:
-        task = waiting.pop()
-        node, allowed = tree.nodes[task.place], task.allowed
-        basis = basis_of(program, allowed, task.variable, task.duals)
-        status, _ = solve_dual(program, allowed, basis, Effort(aim.enough + 0.1 * margin, _EXCHANGES, aim.deadline))
-        found = basis.duals.copy()
-        make_feasible(program, allowed, found)
-        node.bound = float(certified(program, allowed, found))
-        node.duals = found
+    search = _Search(component, duals, aim, base)
+    while search.waiting:
+        search.visit(search.waiting.pop())
+    return search.tree
 
-        def proves(multipliers: Floats, allowed: Allowed = allowed) -> float:
-            make_feasible(program, allowed, multipliers)
-            return float(certified(program, allowed, multipliers))
 
+class _Search:
+    """A depth-first search that writes down its nodes."""
+
+    def __init__(self, component: Packing, duals: Floats, aim: Aim, base: Floats) -> None:
+        root = root_with_cuts(component, duals, aim.enough, aim.deadline)
+        self._component, self._aim, self._program = component, aim, root.program
+        self._base = np.concatenate([base, np.zeros(len(root.sets))])
+        # slack of cuts is never left out
+        self._is_cut = np.arange(root.slack.size) >= component.num_rows
+        self._margin = _ROUNDING * max(1.0, abs(aim.target))
+        self._trials = new_trials(root.program, component.num_rows)
+        self.tree = Tree(root.sets, [Node(np.empty(0), -np.inf)])
+        self.waiting = [_Open(0, all_allowed(root.program, root.slack), root.variable, root.duals)]
+
+    def visit(self, task: _Open) -> None:
+        """Bound a node, and divide it where that is not enough."""
+        program, aim, tree = self._program, self._aim, self.tree
+        node = tree.nodes[task.place]
+        basis = basis_of(program, task.allowed, task.variable, task.duals)
+        effort = Effort(aim.enough + 0.1 * self._margin, _EXCHANGES, aim.deadline)
+        status, _ = solve_dual(program, task.allowed, basis, effort)
+        node.duals = basis.duals.copy()
+        node.bound = self._bound(task.allowed, node.duals)
         if node.bound >= aim.enough:
-            node.duals, node.bound = _shortened(found, everything, aim.enough, proves)
-            continue
-        if len(tree.nodes) + 2 > aim.nodes or time.monotonic() > aim.deadline or status != OPTIMAL:
-            continue
-        # nothing below the target has columns or slack that cost so much more
-        most = aim.target - node.bound + margin
-        reduced = all_reduced_costs(program, found)
-        columns = allowed.columns & (reduced <= most)
-        slack = allowed.slack & ((-found <= most) | ~slack_rows)
-        fewer = int(columns.sum()) < allowed.active.size or bool((slack != allowed.slack).any())
-        kept = Allowed(np.flatnonzero(columns).astype(np.int32), columns, slack)
-        count = doubtful_pairs(component.cols, basis, trials)
-        if count:
-            which, _ = decide(program, component.cols, kept, basis, trials, count, Effort(aim.enough, 0, aim.deadline))
-            pair = int(trials.pairs[which, 0]), int(trials.pairs[which, 1])
-        else:
-            one, two = any_open_pair(component.cols, kept, room)
-            if one < 0:
-                continue
-            pair = int(one), int(two)
-        node.pair, node.children = pair, (len(tree.nodes), len(tree.nodes) + 1)
-        if not fewer:
-            node.duals = None
+            self._shorten(node, task.allowed)
+            return
+        if status != OPTIMAL or len(tree.nodes) + 2 > aim.nodes or time.monotonic() > aim.deadline:
+            return
+        left = self._left(task.allowed, node)
+        node.pair = self._question(left, basis)
+        if node.pair is None:
+            return
+        if left.active.size == task.allowed.active.size and (left.slack == task.allowed.slack).all():
+            node.duals = np.empty(0)
+        node.children = len(tree.nodes), len(tree.nodes) + 1
         for joined in (True, False):
-            side = Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(slack.size, np.bool_))
-            size = answer(component.cols, kept, pair, joined, side)
-            side = side._replace(active=side.active[:size].copy())
-            waiting.append(_Open(len(tree.nodes), side, basis.variable.copy(), basis.duals.copy()))
-            tree.nodes.append(Node(None, node.bound))
-    return tree
+            side = Allowed(np.empty_like(left.active), np.zeros_like(left.columns), np.zeros_like(left.slack))
+            count = answer(self._component.cols, left, node.pair, joined, side)
+            side = side._replace(active=side.active[:count].copy())
+            self.waiting.append(_Open(len(tree.nodes), side, basis.variable.copy(), basis.duals.copy()))
+            tree.nodes.append(Node(np.empty(0), node.bound))
 
+    def _bound(self, allowed: Allowed, duals: Floats) -> float:
+        """The bound of multipliers, which are made feasible."""
+        make_feasible(self._program, allowed, duals)
+        return float(certified(self._program, allowed, duals))
 
-def _shortened(duals: Floats, base: Floats, enough: float, proves: Callable[[Floats], float]) -> tuple[Floats, float]:
-    """Return multipliers with as few digits as still prove enough, and what they prove."""
-    for digits in _DIGITS:
-        short = np.round(duals + base, digits) - base
-        bound = proves(short.copy())
-        if bound >= enough:
-            return short, bound
-    return duals, proves(duals.copy())
+    def _left(self, allowed: Allowed, node: Node) -> Allowed:
+        """Columns and slack without those that cost too much for anything below the target."""
+        most = self._aim.target - node.bound + self._margin
+        columns = allowed.columns & (all_reduced_costs(self._program, node.duals) <= most)
+        slack = allowed.slack & ((-node.duals <= most) | self._is_cut)
+        return Allowed(np.flatnonzero(columns).astype(np.int32), columns, slack)
+
+    def _question(self, allowed: Allowed, basis: Basis) -> tuple[int, int] | None:
+        """The pair of rows on which to divide; None where there is none."""
+        cols, trials = self._component.cols, self._trials
+        count = doubtful_pairs(cols, basis, trials)
+        if count:
+            effort = Effort(self._aim.enough, 0, self._aim.deadline)
+            which, _ = decide(self._program, cols, allowed, basis, trials, count, effort)
+            one, two = trials.pairs[which]
+        else:
+            one, two = any_open_pair(cols, allowed, np.empty(self._component.num_rows, np.int32))
+        return None if one < 0 else (int(one), int(two))
+
+    def _shorten(self, node: Node, allowed: Allowed) -> None:
+        """Round the multipliers of a leaf to as few digits as still prove enough."""
+        for digits in _DIGITS:
+            short = np.round(node.duals + self._base, digits) - self._base
+            bound = self._bound(allowed, short.copy())
+            if bound >= self._aim.enough:
+                node.duals, node.bound = short, bound
+                return

@@ -19,6 +19,8 @@ _NEAR = 1e-3
 # a claim of optimality is false where the cost is above the best value by more than this share
 _SAME = 1e-6
 _EARLY = (1.0, 5.0)
+# an excess that is rounding
+_ROUNDING = 1e-9
 
 Row = dict[str, Any]
 
@@ -40,7 +42,10 @@ def write_comparison(path: str | Path, rows: list[Row], seconds: float, command:
 def excess(row: Row, best: float, seconds: float) -> float | None:
     """How far above the best value what was found in so many seconds is, as a share of it; None: nothing was."""
     costs = [point[1] for point in row.get("trace", []) if point[0] <= seconds]
-    return max(min(costs) - best, 0.0) / max(1.0, abs(best)) if costs else None
+    if not costs:
+        return None
+    share = (min(costs) - best) / max(1.0, abs(best))
+    return share if share > _ROUNDING else 0.0
 
 
 def time_to_near(row: Row, best: float) -> float | None:

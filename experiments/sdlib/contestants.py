@@ -8,6 +8,7 @@ too, they are given as much more of that as they got less of the processor short
 
 from __future__ import annotations
 
+import importlib
 import math
 import resource
 import time
@@ -151,8 +152,11 @@ def takes(name: str, problem: AssignmentProblem) -> bool:
 
 
 def warm_up(name: str) -> None:
-    """Import a peer's package, by solving a tiny problem with it; our solvers are warm already."""
-    if name in PEERS:
+    """Import a peer's package, by solving a tiny problem where it can; our solvers are warm already."""
+    if name in peers.PACKING_PEERS:
+        # on one tuple KaMIS's programs end the process
+        importlib.import_module("kap" if name == "kap" else "chszlablib")
+    elif name in PEERS:
         peers.warm_up([_PEER_NAMES.get(name, name)])
 
 
