@@ -67,6 +67,9 @@ class TabuSearch:
             else:
                 self.owner = component.best.copy()
                 forced = self._force(component, rng)
+        if component.dives:
+            self.dives += 1
+            component.settle(component.dive(self.dives, rng), rng, p.clusters)
         best = self.owner.copy()
         rules = _Rules(self.clock, p.moves, p.tenure, forced)
         self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
