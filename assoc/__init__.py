@@ -12,7 +12,19 @@ from assoc._version import __version__
 from assoc.errors import AssocError, AssocWarning, InfeasibleError, InvalidInputError, LimitExceededError
 
 if TYPE_CHECKING:
-    from assoc import plotting, solvers, sweeps
+    from assoc import (
+        filters,
+        metrics,
+        plotting,
+        proofs,
+        recordings,
+        registration,
+        sensors,
+        simulation,
+        solvers,
+        sweeps,
+        tracking,
+    )
     from assoc.association.associate import associate
     from assoc.association.association import Association
     from assoc.association.source import load
@@ -39,12 +51,20 @@ __all__ = [
     "assign",
     "associate",
     "build_problem",
+    "filters",
     "kbest",
     "load",
     "marginals",
+    "metrics",
     "plotting",
+    "proofs",
+    "recordings",
+    "registration",
+    "sensors",
+    "simulation",
     "solvers",
     "sweeps",
+    "tracking",
     "warm_up",
 ]
 
@@ -58,12 +78,20 @@ __getattr__, __dir__ = lazy_names(
         "assign": "solvers.assign",
         "associate": "association",
         "build_problem": "costs",
+        "filters": "filters",
         "kbest": "ranking.kbest",
         "load": "association.source",
         "marginals": "ranking.marginals",
+        "metrics": "metrics",
         "plotting": "plotting",
+        "proofs": "proofs",
+        "recordings": "recordings",
+        "registration": "registration",
+        "sensors": "sensors",
+        "simulation": "simulation",
         "solvers": "solvers",
         "sweeps": "sweeps",
+        "tracking": "tracking",
         "warm_up": "solvers.warm_up",
     },
 )

@@ -53,8 +53,9 @@ EXPERIMENTS = (
     ),
     Experiment(
         "pages",
-        "nothing: writes the tables of six pages from the result files",
-        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md, docs/ant_colony.md",
+        "nothing: writes the tables of eight pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md, docs/ant_colony.md, "
+        "docs/concepts.md, docs/tracking.md",
     ),
     Experiment(
         "papers.ant_colony",
@@ -113,6 +114,11 @@ EXPERIMENTS = (
     Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
     Experiment("trackers.biases", "registration of biased radars", "docs/registration.md (measured)"),
     Experiment("trackers.close_targets", "trackers where association is hard", "docs/tracking.md (close targets)"),
+    Experiment(
+        "trackers.warm_starts",
+        "whether trackers would gain by warm starts",
+        "docs/tracking.md (warm starts); with --publish experiments/results/trackers.warm_starts.json",
+    ),
     Experiment("trackers.comparison", "our trackers side by side", "docs/tracking.md (measured)"),
     Experiment(
         "trackers.fusion_in_stone_soup",
@@ -126,12 +132,19 @@ EXPERIMENTS = (
         "experiments/results/metaheuristics.ablation.json",
     ),
     Experiment(
+        "metaheuristics.against_peers",
+        "aco, genetic and tabu after seconds, other programs after a minute, on ghosts",
+        "with --publish experiments/results/metaheuristics.against_peers.json",
+    ),
+    Experiment(
         "metaheuristics.sweep",
         "alpha, beta, rho, ants and refinement of the ant colony on problems that are not easy",
         "docs/ant_colony.md and its figures; with --publish experiments/results/metaheuristics.sweep.json",
     ),
     Experiment(
-        "ambiguous_bearings", "certified optima of bearings with two costs", "docs/concepts.md (prior)"
+        "ambiguous_bearings",
+        "certified optima of bearings with two costs",
+        "docs/concepts.md (prior); with --publish experiments/results/ambiguous_bearings.json",
     ),
     Experiment(
         "sweep_overhead",

@@ -95,7 +95,7 @@ TITLE = "Ambiguous bearings: certified optima with the costs of equation 5 and w
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the measurement; returns its exit code."""
-    return main("ambiguous_bearings", TITLE, experiment, draw, (8, 4), arguments)
+    return main("ambiguous_bearings", TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 """All pictures of the documentation, drawn again: ``python -m experiments.gallery [NAME ...] [-o docs/images]``.
 
-Pictures are of fixed scenes and seeds. Only the report's screenshot shows measured times.
-`stonesoup-fusion.png` takes its experiment's full run, which draws it:
-``experiments.trackers.fusion_in_stone_soup --figure``.
+Pictures are of fixed scenes and seeds, or of published results (surfaces-*). They have two pixels for each of a plain
+screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,10 @@ from assoc.plotting.study_figures import new_figure
 from assoc.simulation import simulate
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
-LARGEST = 100_000
+LARGEST = 250_000
 """Bytes that a picture may take."""
+DPI = 180
+"""Twice what a page shows."""
 
 _COLOURS = 256
 
@@ -39,6 +41,25 @@ def _radars() -> tuple[assoc.Scene, assoc.Association]:
 def _ghosts() -> assoc.AssignmentProblem:
     """Crossing bearings: many tuples are likely, and solvers need some time."""
     return assoc.build_problem(simulate("bearing-only", 0, targets=30, scans=1), 0)
+
+
+def first_sight(figure: Any) -> None:
+    """Draw what goes in and what comes out: plots of three sensors, and which of them are one target."""
+    from assoc.plotting import plot_scene, plot_solution
+
+    figure.set_size_inches(9, 4.9)
+    made = simulate("crowd", 4, targets=12, width=2_000.0, height=1_000.0, noise=50.0, false_alarms_per_target=0.3)
+    # the truth is not known to the package either
+    one = assoc.Scene(made.sensors, made.times, made.measurements, made.region)
+    scan = assoc.associate(one).scans[0]
+    left, right = figure.subplots(1, 2)
+    plot_scene(one, 0, ax=left).set_title("in: what three sensors measured")
+    alone = int((scan.solution.tuples > 0).sum(axis=1).tolist().count(1))
+    found = f"{scan.solution.num_targets} targets, {alone} false alarms"
+    plot_solution(one, scan, ax=right).set_title(f"out: {found}, {scan.solution.status}")
+    for ax in (left, right):
+        ax.set(xlim=(-0.2, 2.2), ylim=(-0.2, 2.2))
+    left.get_legend().remove()
 
 
 def scene(figure: Any) -> None:
@@ -163,7 +184,33 @@ def overview(figure: Any) -> None:
     plot_overview(one, assoc.associate(one, "lagrangian", iterations=40), axes=figure.subplots(2, 2))
 
 
+def surfaces(kind: str) -> Callable[[Any], None]:
+    """Return what draws the published surfaces of the ant colony on one kind of problem."""
+
+    def draw(figure: Any) -> None:
+        from experiments.common.results import Results
+        from experiments.metaheuristics import sweep
+
+        shown, size = sweep.pictures(Results(sweep.NAME).claims)[kind]
+        figure.set_size_inches(*size)
+        sweep.draw(figure, shown)
+
+    return draw
+
+
+def stonesoup_fusion(figure: Any) -> None:
+    """Draw three ways to track in Stone Soup, on the first three scenes of the experiment's full run; takes minutes."""
+    import numpy as np
+
+    from experiments.trackers import fusion_in_stone_soup as fusion
+
+    figure.set_size_inches(11, 4.6)
+    seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()[:3]
+    fusion.draw(figure, (fusion.compare(seeds)[0][:, :, :, 0], fusion.simulate(seeds[0])))
+
+
 PICTURES: dict[str, Callable[[Any], None]] = {
+    "first-sight": first_sight,
     "scene": scene,
     "solution": solution,
     "ghosts": ghosts,
@@ -175,7 +222,11 @@ PICTURES: dict[str, Callable[[Any], None]] = {
     "tracks": tracks,
     "metric": metric,
     "overview": overview,
+    "surfaces-ghosts-20": surfaces("surfaces-ghosts-20"),
+    "surfaces-poor-radars": surfaces("surfaces-poor-radars"),
+    "stonesoup-fusion": stonesoup_fusion,
 }
+_NEEDS = {"report": "chromium and chromedriver are", "stonesoup-fusion": "stonesoup is"}
 
 
 def drawn(draw: Callable[[Any], None]) -> bytes:
@@ -184,7 +235,7 @@ def drawn(draw: Callable[[Any], None]) -> bytes:
     figure.set_size_inches(7, 5.6)
     draw(figure)
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=90, metadata={"Software": None})
+    figure.savefig(content, format="png", dpi=DPI, metadata={"Software": None})
     return small(content.getvalue())
 
 
@@ -213,7 +264,7 @@ def screenshot() -> bytes | None:
         page = Path(folder) / "report.html"
         words = ["scene.npz", "--solver", "aco", "--report", "report.html"]
         write_association_report(page, association, one, ["scene.npz"] * len(association.scans), words=words)
-        show(browser, page, (1100, 950), fragment="#scan-50")
+        show(browser, page, (1100, 950), fragment="#scan-50", scale=2)
         browser.execute_script("document.querySelector('#targets tr[data-row]').click()")
         browser.execute_script("window.scrollTo(0, 0)")
         time.sleep(0.5)
@@ -238,14 +289,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f"no picture is called {name!r}")
     given.output.mkdir(parents=True, exist_ok=True)
     for name in names:
-        picture = screenshot() if name == "report" else drawn(PICTURES[name])
+        if name == "stonesoup-fusion" and find_spec("stonesoup") is None:
+            picture = None
+        else:
+            picture = screenshot() if name == "report" else drawn(PICTURES[name])
         if picture is None:
-            print(f"{name:<12} left out: chromium and chromedriver are not installed")
+            print(f"{name:<20} left out: {_NEEDS[name]} not installed")
             continue
         if len(picture) > LARGEST:
             raise SystemExit(f"{name}: {len(picture)} bytes, more than {LARGEST}")
         write_atomically(given.output / f"{name}.png", lambda file, content=picture: file.write(content))
-        print(f"{name:<12} {len(picture) / 1e3:6.1f} kB")
+        print(f"{name:<20} {len(picture) / 1e3:6.1f} kB")
     return 0
 
 

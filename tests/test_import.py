@@ -36,6 +36,8 @@ def test_public_names_resolve():
     for package in (assoc, assoc.plotting, importlib.import_module("assoc.plotting.report"), assoc.sweeps):
         assert {*package.__all__} <= {*dir(package)}
         assert all(getattr(package, name) is not None for name in package.__all__)
+        # completion offers these and nothing else
+        assert {name for name in dir(package) if not name.startswith("_")} <= {*package.__all__}
     with pytest.raises(AttributeError, match="no attribute 'solve_everything'"):
         assoc.solve_everything  # noqa: B018
 

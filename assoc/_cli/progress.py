@@ -48,8 +48,6 @@ class ProgressBar:
                 BarColumn,
                 MofNCompleteColumn,
                 Progress,
-                ProgressColumn,
-                Task,
                 TextColumn,
                 TimeRemainingColumn,
             )
@@ -58,18 +56,13 @@ class ProgressBar:
             bar = self
 
             class WithNote(Progress):
-                """Shows the note below the bar."""
+                """Shows below the bar the note, or why the first scans take so long, while they do."""
 
                 def get_renderables(self) -> Any:
                     yield self.make_tasks_table(self.tasks)
-                    if bar.note:
-                        yield Text(bar.note, overflow="ellipsis", no_wrap=True)
-
-            class Compiling(ProgressColumn):
-                """Says why the first scans take so long, while they do."""
-
-                def render(self, task: Task) -> Text:
-                    return Text("compiling, once after installation" if is_compiling(_SOON) else "")
+                    note = "compiling, once after installation" if is_compiling(_SOON) else bar.note
+                    if note:
+                        yield Text(note, overflow="ellipsis", no_wrap=True)
 
             self._progress = WithNote(
                 TextColumn("{task.description}"),
@@ -78,7 +71,6 @@ class ProgressBar:
                 TextColumn("{task.fields[rate]}"),
                 TimeRemainingColumn(compact=True),
                 TextColumn("left"),
-                Compiling(),
                 console=Console(file=sys.stderr),
                 transient=True,
             )

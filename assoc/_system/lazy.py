@@ -35,6 +35,7 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
         return value
 
     def names() -> list[str]:
-        return sorted({*content, *homes})
+        # what the package itself imports is not offered
+        return sorted({*homes, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
 
     return load, names

@@ -46,6 +46,8 @@ class Run:
         Seconds from ``started``.
     callback : callable or None
         Called with each TracePoint; a true answer stops the solver.
+    reserve : float
+        Seconds before the limit at which searches end: what follows them takes passes over all columns (fallback.py).
     fallback : int array or None
         The greedy choice of columns, where it was made first (fallback.py).
     start : int array or None
@@ -64,6 +66,7 @@ class Run:
     started: float = field(default_factory=time.perf_counter)
     trace: list[TracePoint] = field(default_factory=list)
     stopped_by: str = ""
+    reserve: float = 0.0
     fallback: NDArray[np.integer] | None = None
     start: NDArray[np.integer] | None = None
     compiled: float = field(default_factory=compile_seconds)
@@ -91,8 +94,8 @@ class Run:
         return time.perf_counter() - self.started - self.compile_time()
 
     def remaining(self) -> float:
-        """Seconds left; infinite without a time limit."""
-        return np.inf if self.time_limit is None else self.time_limit - self.elapsed()
+        """Seconds left for a search; infinite without a time limit."""
+        return np.inf if self.time_limit is None else self.time_limit - self.reserve - self.elapsed()
 
     def deadline(self) -> float:
         """When time is over, in seconds of `time.monotonic`: for kernels (clock.py); infinite without a time limit."""
@@ -100,7 +103,7 @@ class Run:
 
     def should_stop(self) -> bool:
         """Whether the time is over, or the callback or the user asked to stop; ``stopped_by`` says which."""
-        if not self.stopped_by and self.time_limit is not None and self.elapsed() >= self.time_limit:
+        if not self.stopped_by and self.remaining() <= 0.0:
             self.stopped_by = "time_limit"
         elif not self.stopped_by and end_is_asked():
             self.stopped_by = "interrupted"

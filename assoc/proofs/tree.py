@@ -20,11 +20,9 @@ from assoc.packing.branching.pairs import answer, any_open_pair, decide, doubtfu
 from assoc.packing.branching.root import basis_of, root_with_cuts
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import Basis
-from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
+from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, all_reduced_costs, certified, make_feasible
 
-# exchanges of the simplex method at a node
-_EXCHANGES = 100_000
 # a share of the target that is rounding
 _ROUNDING = 1e-9
 # digits after the point with which multipliers are tried, the shortest first
@@ -135,7 +133,7 @@ class _Search:
         program, aim, tree = self._program, self._aim, self.tree
         node = tree.nodes[task.place]
         basis = basis_of(program, task.allowed, task.variable, task.duals)
-        effort = Effort(aim.enough + 0.1 * self._margin, _EXCHANGES, aim.deadline)
+        effort = Effort(aim.enough + 0.1 * self._margin, most_exchanges(program), aim.deadline)
         status, _ = solve_dual(program, task.allowed, basis, effort)
         node.duals = basis.duals.copy()
         node.bound = self._bound(task.allowed, node.duals)

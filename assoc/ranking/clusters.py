@@ -37,20 +37,58 @@ def numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
 
 def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Return the different tuples in lexicographic order, and the place of each tuple among them."""
-    sides = tuples.max(axis=0, initial=0).astype(np.int64) + 1
+    sides = _largest(tuples) + 1
     order = np.arange(len(tuples), dtype=np.int32)
     if float(np.prod(sides, dtype=float)) < 2.0**62:
-        # one number for each tuple
-        order = ascending_whole(np.ravel_multi_index(tuple(tuples.T.astype(np.int64)), tuple(sides)))
+        order = ascending_whole(_as_numbers(tuples, sides))
     else:
         for column in tuples.T[::-1]:
             order = order[ascending_whole(column[order].astype(np.int64))]
-    ordered = tuples[order]
-    new = np.ones(order.size, dtype=np.bool_)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    place = np.empty(order.size, dtype=np.int64)
-    place[order] = np.cumsum(new) - 1
-    return ordered[new], place
+    new, place = _places(tuples, order)
+    return tuples[order[new]], place
+
+
+@njit
+def _largest(tuples: Any) -> Any:
+    """Each sensor's largest measurement number."""
+    num, num_sensors = tuples.shape
+    largest = np.zeros(num_sensors, np.int64)
+    for j in range(num):
+        for s in range(num_sensors):
+            largest[s] = max(largest[s], tuples[j, s])
+    return largest
+
+
+@njit
+def _as_numbers(tuples: Any, sides: Any) -> Any:
+    """One number for each tuple, in lexicographic order."""
+    num, num_sensors = tuples.shape
+    numbers = np.zeros(num, np.int64)
+    for j in range(num):
+        for s in range(num_sensors):
+            numbers[j] = numbers[j] * sides[s] + tuples[j, s]
+    return numbers
+
+
+@njit
+def _places(tuples: Any, order: Any) -> Any:
+    """Which tuples of an order differ from those before them, and each tuple's place among the different ones."""
+    num, num_sensors = tuples.shape
+    new = np.ones(num, np.bool_)
+    place = np.empty(num, np.int64)
+    count = -1
+    for i in range(num):
+        j = order[i]
+        if i > 0:
+            before = order[i - 1]
+            same = True
+            for s in range(num_sensors):
+                same = same and tuples[j, s] == tuples[before, s]
+            new[i] = not same
+        if new[i]:
+            count += 1
+        place[j] = count
+    return new, place
 
 
 @njit

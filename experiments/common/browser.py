@@ -50,10 +50,10 @@ def opened() -> Iterator[Any]:
         browser.quit()
 
 
-def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment: str = "") -> None:
-    """Open a page at a size; a phone's is emulated, for windows cannot be that narrow."""
+def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment: str = "", scale: int = 1) -> None:
+    """Open a page at a size, with so many pixels a unit; a phone's is emulated, for windows cannot be that narrow."""
     phone = size[0] < 500
-    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": phone}
+    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": scale, "mobile": phone}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     browser.get_log("browser")  # what an earlier page said
     browser.get("about:blank")

@@ -104,6 +104,9 @@ def _independent_set(problem: AssignmentProblem, time_limit: float, kind: str) -
         if threads is not None:
             os.environ["OMP_NUM_THREADS"] = threads
     vertices, weights, graph = conflict_graph(problem)
+    if not graph.nnz:
+        # all of them; some of the codes fail on a graph without edges
+        return with_false_alarms(problem, vertices), None, True
     ends, neighbours = graph.indptr, graph.indices.astype(np.int32)
     if kind == "chils":
         _, found = _chils.mwis(ends.astype(np.int64), neighbours, weights, time_limit, _CONCURRENT, 0)

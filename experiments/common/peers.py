@@ -101,7 +101,7 @@ Told = Callable[[float, float], bool]
 """Told of a cost and a bound; a true answer stops the peer."""
 
 
-def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int = 2, told: Told | None = None) -> Chosen:
+def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int, told: Told | None = None) -> Chosen:
     from ortools.sat import cp_model_pb2
     from ortools.sat.python import cp_model
 
@@ -250,7 +250,7 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
 
 def cp_sat(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     """OR-Tools CP-SAT with two workers, costs scaled by 1e6 and rounded."""
-    return _answer(_cp_sat, problem, time_limit)
+    return _answer(lambda p, limit: _cp_sat(p, limit, 2), problem, time_limit)
 
 
 def cp_sat_1(problem: AssignmentProblem, time_limit: float, told: Told | None = None) -> PeerAnswer:

@@ -172,6 +172,17 @@ def draw(figure: Any, shown: tuple[list[Case], dict[str, Claim]]) -> None:
             figure.colorbar(picture, ax=ax, label="mean excess, %")
 
 
+def pictures(claims: list[Claim]) -> dict[str, tuple[Any, tuple[float, float]]]:
+    """Return what `draw` shows of each kind of problem in the claims, and its size in inches, by the picture's name."""
+    by_name = {claim.quantity: claim for claim in claims}
+    found = {}
+    for kind in dict.fromkeys(case.problems for case in CASES):
+        cases = [case for case in CASES if case.problems == kind and f"{case.name}: worst setting" in by_name]
+        if cases:
+            found[f"surfaces-{kind.replace(' ', '-')}"] = ((cases, by_name), (9.0, 3.2 * len(cases)))
+    return found
+
+
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}", description=f"{TITLE}.")
@@ -215,13 +226,10 @@ def program(arguments: Sequence[str] | None = None) -> int:
         save_json(chosen.json, claims, NAME, chosen.seed, __doc__ or "")
     if chosen.publish:
         publish(claims, NAME, chosen.seed, __doc__)
-    by_name = {claim.quantity: claim for claim in claims}
-    for kind in dict.fromkeys(case.problems for case in CASES):
-        cases = [c for c in CASES if c.problems == kind and f"{c.name}: worst setting" in by_name]
-        if cases:
-            path = Path(chosen.figures) / f"surfaces-{kind.replace(' ', '-')}.png"
-            save_figure(path, draw, (cases, by_name), (9.0, 3.2 * len(cases)))
-            print(f"{path}: written")
+    for name, (shown, size) in pictures(claims).items():
+        path = Path(chosen.figures) / f"{name}.png"
+        save_figure(path, draw, shown, size)
+        print(f"{path}: written")
     return 0
 
 

@@ -23,6 +23,8 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
     "ant_colony.md": metaheuristics.ANT_COLONY,
+    "concepts.md": measured.CONCEPTS,
+    "tracking.md": measured.TRACKING,
 }
 """Page -> name of the table -> what makes it."""
 

@@ -1,4 +1,4 @@
-"""Tables of measured figures for docs/filters.md, docs/recordings.md and docs/sweeps.md."""
+"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers, and concepts."""
 
 from __future__ import annotations
 
@@ -223,6 +223,35 @@ def readings() -> str:
     return table(["reading", "mean cycles", "95 % interval"], rows)
 
 
+def prior() -> str:
+    """What a certified optimum of bearings is worth, with and without a prior of positions."""
+    r = Results("ambiguous_bearings")
+    heads = ("targets found of each 100 there", "true tuples found", "chosen tuples that are true")
+
+    def cell(claim: Claim) -> str:
+        low, high = claim.interval or (claim.ours, claim.ours)
+        return f"{claim.ours:.0f} ± {(high - low) / 2:.0f}{' %' if claim.unit else ''}"
+
+    rows = []
+    for case in (f"{targets} targets, {cost}" for targets in (5, 20) for cost in ("equation 5", "with a prior")):
+        proven = f"{r[f'{case}: proven optima'].ours:.0f} %"
+        rows.append([case, *(cell(r[f"{case}: {head}"]) for head in heads), proven])
+    return table(["scene, cost", *heads, "proven optima"], rows)
+
+
+def warm_starts() -> str:
+    """CPU time of a tracker's problem without a start, with what its tracks suggest, and with the optimum."""
+    r = Results("trackers.warm_starts")
+    cells: dict[str, dict[str, list[str]]] = {}
+    for claim in r.claims:
+        if claim.quantity.endswith("CPU time of a problem"):
+            case, solver, _ = claim.quantity.split(": ")[0].rsplit(", ", 2)
+            cells.setdefault(case, {}).setdefault(solver, []).append(number(claim.ours, 2))
+    solvers = [*next(iter(cells.values()))]
+    rows = [[case, *(" / ".join(times[solver]) for solver in solvers)] for case, times in cells.items()]
+    return table(["scene, tracker", *(f"`{solver}`" for solver in solvers)], rows)
+
+
 FILTERS = {
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
@@ -234,3 +263,5 @@ FILTERS = {
 }
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
+CONCEPTS = {"prior": prior}
+TRACKING = {"warm-starts": warm_starts}

@@ -13,8 +13,18 @@ from experiments import gallery
 
 def test_committed_pictures_are_those_of_the_gallery():
     committed = {path.stem: path for path in gallery.FOLDER.glob("*.png")}
-    assert {*gallery.PICTURES, "report"} <= {*committed}
+    assert {*gallery.PICTURES, "report"} == {*committed}
     assert max(path.stat().st_size for path in committed.values()) <= gallery.LARGEST
+
+
+def test_every_picture_is_on_a_page_and_sharp():
+    root = gallery.FOLDER.parents[1]
+    pages = "".join(path.read_text(encoding="utf-8") for path in [root / "README.md", *(root / "docs").rglob("*.md")])
+    for path in gallery.FOLDER.iterdir():
+        assert f"images/{path.name})" in pages, path.name
+        if path.suffix == ".png":
+            with Image.open(path) as image:
+                assert image.width >= 1_250, path.name
 
 
 def test_a_picture_is_drawn_anew(tmp_path, capsys):

@@ -12,7 +12,7 @@ import assoc
 from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 from experiments.common.claims import Claim
-from experiments.metaheuristics import ablation, parts, running, sweep
+from experiments.metaheuristics import ablation, against_peers, parts, running, sweep
 from experiments.metaheuristics.problems import problem
 
 
@@ -71,6 +71,7 @@ def test_inverted_selection_takes_the_worst():
     assert breeding.fitness.tolist() == [3.0, -7.0, 5.0, 0.0]
 
 
+@pytest.mark.slow
 def test_ablation_reports_every_part(tmp_path, capsys):
     file = tmp_path / "results.json"
     words = ["--problems", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
@@ -108,6 +109,7 @@ def test_published_results_of_other_problems_stay(tmp_path, monkeypatch):
     assert [(one.quantity, one.ours) for one in again] == [("b, 1 s: x", 3.0), ("a, 1 s: x", 9.0), ("a, 2 s: x", 8.0)]
 
 
+@pytest.mark.slow
 def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
     grid = {"alpha": (1.0, 2.0), "beta": (1.0,), "rho": (0.3, 0.9), "ants": (5, 15)}
     monkeypatch.setattr(sweep, "GRID", grid)
@@ -145,12 +147,49 @@ def test_claims_of_a_case():
     assert claims[f"rank of table 1's advice of {len(every)}"].ours == (share + 1) / 2
 
 
+def test_answers_of_ours_and_peers(tmp_path, monkeypatch, capsys):
+    entries = (against_peers.Entry("tabu", 0.3), against_peers.Entry("highs", 20.0))
+    monkeypatch.setattr(against_peers, "ENTRIES", entries)
+    kept, file = tmp_path / "answers.json", tmp_path / "results.json"
+    words = ["--problems", "ghosts 10", "--count", "2", "--answers", str(kept), "--json", str(file)]
+    assert against_peers.program([*words, "--only", "tabu", "highs"]) == 0
+    claims = {one["quantity"]: one for one in json.loads(file.read_text())["claims"]}
+    assert claims["ghosts 10: problems"]["ours"] == 2
+    # both find the optimum of so small a scene
+    assert claims["ghosts 10: tabu, 0.3 s, excess"]["ours"] == pytest.approx(0.0, abs=1e-6)
+    assert claims["ghosts 10: highs, 20 s, excess"]["ours"] == pytest.approx(0.0, abs=1e-6)
+    assert claims["ghosts 10: tabu, 0.3 s, worst less the best peer"]["holds"]
+    optima = [assoc.assign(problem("ghosts 10", against_peers.FIRST + number)).cost for number in range(2)]
+    answers = json.loads(kept.read_text())
+    assert [answers[f"ghosts 10 {against_peers.FIRST + i}: highs, 20 s"][0] for i in range(2)] == pytest.approx(optima)
+    # what is kept is not run again
+    monkeypatch.setattr(against_peers, "_ask", lambda *_: pytest.fail("asked again"))
+    assert against_peers.program([*words, "--only", "tabu", "highs"]) == 0
+    capsys.readouterr()
+
+
+def test_claims_against_peers():
+    ours, peer = against_peers.Entry("aco", 5.0), against_peers.Entry("chils", 60.0)
+    lost = against_peers.Entry("highs", 60.0)
+    costs = {ours: [-99.0, -50.0], peer: [-100.0, -49.0], lost: [np.inf, -50.0]}
+    taken = {one: [1.0, 3.0] for one in costs}
+    claims = {claim.quantity: claim for claim in against_peers.claims_of("ghosts 40", costs, taken)}
+    assert claims["ghosts 40: aco, 5 s, excess"].ours == pytest.approx(0.5)
+    assert claims["ghosts 40: highs, 60 s, problems without an answer"].ours == 1
+    assert "ghosts 40: highs, 60 s, excess" not in claims
+    assert claims["ghosts 40: chils, 60 s, processor time"].ours == 2.0
+    worst = claims["ghosts 40: aco, 5 s, worst less the best peer"]
+    assert worst.ours == pytest.approx(1.0) and not worst.holds
+
+
 @pytest.mark.parametrize(
     ("program", "words", "said"),
     [
         (ablation.program, ["--problems", "nothing"], "unknown 'nothing'"),
         (ablation.program, ["--solvers", "exact"], "unknown 'exact'"),
         (ablation.program, ["--count", "1"], "at least 2"),
+        (against_peers.program, ["--only", "nothing"], "unknown 'nothing'"),
+        (against_peers.program, ["--count", "1"], "at least 2"),
         (sweep.program, ["--cases", "nothing"], "unknown 'nothing'"),
         (sweep.program, ["--quick", "--publish"], "needs the full run"),
     ],

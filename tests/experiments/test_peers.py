@@ -9,7 +9,7 @@ from assoc.problem import AssignmentProblem
 from experiments.common import oracles, packing_peers, peers
 from experiments.common.instances import synthetic
 
-EXACT = ["cp_sat", "scip", "scip_1", "highs"]
+EXACT = ["cp_sat", "cp_sat_1", "scip", "scip_1", "highs"]
 
 
 def problems() -> list[AssignmentProblem]:
@@ -77,6 +77,14 @@ def test_independent_sets_are_associations(name: str) -> None:
         answer = peers.PEERS[name](problem, 0.5)
         # a graph of some ten vertices: each of them finds its heaviest set, to the rounding of weights
         assert answer.cost == pytest.approx(oracles.brute_force(problem), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["chils", "mmwis", "branch_reduce"])
+def test_a_graph_without_edges_is_taken_whole(name: str) -> None:
+    pytest.importorskip("chszlablib")
+    problem = AssignmentProblem([[1, 1], [2, 2]], [-3.0, -1.0], [2, 2])
+    answer = peers.PEERS[name](problem, 0.5)
+    assert (answer.cost, answer.proven) == (-4.0, True)
 
 
 def test_conflict_graph() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from assoc.tracking import NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import load_json
-from experiments.trackers import benchmark, close_scenes, close_targets, comparison, plane
+from experiments.trackers import benchmark, close_scenes, close_targets, comparison, plane, warm_starts
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
 
@@ -60,3 +60,16 @@ def test_close_targets_and_the_oracle():
     oracle, mht = (close_targets.judge(name, scene) for name in ("oracle", "mht"))
     assert oracle[1] == 0 and mht[1] <= 2
     assert mht[0] == pytest.approx(oracle[0], rel=0.3)
+
+
+def test_starts_for_the_problems_of_trackers():
+    """What the tracks suggest is a solution of the problem, and answers with and without a start cost the same."""
+    scene = close_scenes.simulate(close_scenes.SETTINGS["formations"], 100, 3)
+    for name in ("multi-sensor", "mht"):
+        given = warm_starts.problems(name, scene)
+        assert len(given) == 3 and [known is not None for _, known in given] == [name == "mht"] * 3
+        found = warm_starts.compare(given, "exact")
+        assert found.shape == (3, 3, 2) and (found[:, :, 0] > 0).all()
+        assert np.abs(found[:, :, 1]).max() < 1e-6
+    start = warm_starts.by_tracks(given[-1][0])
+    assert (start.tuples[:, 0] > 0).any() and (np.count_nonzero(start.tuples, axis=1) > 1).any()

@@ -46,6 +46,10 @@ _OF_PAPER = "tests/solvers/test_aco_paper.py"
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
 _OF_TABU = "tests/solvers/test_tabu.py"
+_LARGE = "assoc/packing/neighbourhoods/large.py"
+_SIMPLEX = "assoc/packing/simplex/dual.py"
+
+_OF_LARGE = "tests/packing/test_large.py"
 _OF_DIVES = "tests/packing/test_diving.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
@@ -132,7 +136,7 @@ FAULTS = (
         "                        fits = j != node\n",
         _OF_PAPER,
     ),
-    Fault("the last best tour wins, not the cheapest", _PAPER, "if weight < best_weight:", "if True:", _OF_PAPER),
+    Fault("the last best tour wins, not the cheapest", _PAPER, "if walked[k] < best_weight:", "if True:", _OF_PAPER),
     # mode mmas
     Fault(
         "the default mode has no ants",
@@ -317,7 +321,7 @@ FAULTS = (
     ),
     Fault("never a new cover", _TABU, "if self.restarts % _FRESH == 0:", "if False:", _OF_TABU),
     Fault("the tabu list outlives a restart", _TABU, "            self.until[:] = 0\n", "", _OF_TABU),
-    Fault("rows are forced whatever they cost", _TABU, "p=excess / excess.sum()", "p=None", _OF_TABU),
+    Fault("rows are forced whatever they cost", _TABU, "p=excess / total", "p=None", _OF_TABU),
     # what the three share
     Fault(
         "patience has no end",
@@ -359,9 +363,51 @@ FAULTS = (
         "            pass\n",
         _OF_GENETIC,
     ),
-    Fault("divers ignore the pheromone", _DIVER, "trail[open_columns] * relaxed", "relaxed", _OF_DIVES),
-    Fault("divers ignore the linear program", _DIVER, "relaxed.primal[open_columns] ** strictness", "1.0", _OF_DIVES),
-    Fault("divers fix nothing", _DIVER, "                slack[r] = False\n", "", _OF_DIVES),
+    Fault("divers ignore the pheromone", _DIVER, "trail[at.origin[open_columns]] * at", "at", _OF_DIVES),
+    Fault(
+        "divers ignore the linear program",
+        _DIVER,
+        "at.relaxed.primal[open_columns] ** strictness",
+        "1.0",
+        _OF_DIVES,
+    ),
+    Fault("divers fix nothing", _DIVER, "            self._slack[r] = False\n", "", _OF_DIVES),
+    Fault(
+        "a diver takes any price",
+        _DIVER,
+        "relaxed.bound + _AIM * (cutoff - relaxed.bound)",
+        "cutoff",
+        _OF_DIVES,
+    ),
+    Fault("a diver never goes back", _DIVER, "self._columns, self._slack = columns, slack\n", "return\n", _OF_DIVES),
+    Fault(
+        "a diver never aims at less",
+        _DIVER,
+        "self._aim = min(before.bound + 2.0 * room, self._cutoff)",
+        "break",
+        _OF_DIVES,
+    ),
+    Fault(
+        "a smaller program forgets what was fixed",
+        _DIVER,
+        "[*self._chosen, *self.origin[fixed].tolist()]",
+        "[*self._chosen]",
+        _OF_DIVES,
+    ),
+    Fault(
+        "tabu search does not dive",
+        _TABU,
+        "        if component.dives:\n            self.dives += 1",
+        "        if False:\n            self.dives += 1",
+        _OF_DIVES,
+    ),
+    Fault(
+        "breeding does not dive",
+        _BREEDING,
+        "        if component.dives:\n            self.dives += 1",
+        "        if False:\n            self.dives += 1",
+        _OF_DIVES,
+    ),
     Fault(
         "what a diver fixed is not excluded", _DIVER, "row_ptr[r + 1]]] = False", "row_ptr[r + 1]]] = True", _OF_DIVES
     ),
@@ -389,4 +435,25 @@ FAULTS = (
         _OF_SEARCH,
     ),
     Fault("refinement none inserts", _COMPONENT, 'return self.refinement != "none"', "return True", _OF_SEARCH),
+    Fault(
+        "what a large neighbourhood finds is lost",
+        _LARGE,
+        "                own_all(packing.cols, smaller.origin[part.origin[search.columns]], owner)\n",
+        "",
+        _OF_LARGE,
+    ),
+    Fault(
+        "large neighbourhoods have no columns beyond the bound",
+        _LARGE,
+        "limit = max(weight - priced.bound, 0.0) + priced.tolerance",
+        "limit = priced.tolerance",
+        _OF_LARGE,
+    ),
+    Fault(
+        "the simplex method moves its multipliers the other way",
+        _SIMPLEX,
+        "basis.duals[r] += sign * step * basis.row[r]",
+        "basis.duals[r] -= sign * step * basis.row[r]",
+        _OF_DIVES,
+    ),
 )

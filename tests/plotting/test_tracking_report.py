@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pandas as pd
@@ -108,4 +109,28 @@ def test_it_works_in_a_browser(browser, page, pictures, size):
     press(browser, browser.find_element("id", "after"))
     assert "t = 3 s" in browser.find_element("id", "slider-label").text
     screenshot(browser, pictures / f"tracks-{size[0]}.png")
+    assert complaints(browser) == []
+
+
+@pytest.mark.slow
+def test_a_crowd_fills_the_view(browser, tmp_path):
+    """With hundreds of tracks the view is theirs, not that of the sensors around them, and no legend lists them all."""
+    scene = simulate("crowd", 0, targets=100, scans=3, sensor="radar", width=20_000.0)
+    truth = scene.truth
+    rows = [
+        {"track_id": t, "time": time, "x": p[t, 0], "y": p[t, 1], "z": p[t, 2], "altitude": p[t, 2]}
+        for time, p in zip(scene.times, truth.positions, strict=True)
+        for t in range(100)
+    ]
+    write_tracking_report(tmp_path / "crowd.html", pd.DataFrame(rows), scene)
+    show(browser, tmp_path / "crowd.html")
+    layout = "return document.getElementById('scene-plot').layout"
+    low, high = browser.execute_script(f"{layout}.yaxis.range")
+    assert high - low < 1.6 * 20.0 < 0.001 * np.ptp([sensor.position[1] for sensor in scene.sensors])
+    last = "return document.getElementById('altitude-plot').layout?.showlegend ?? null"
+    for _ in range(100):
+        if browser.execute_script(last) is not None:
+            break
+        time.sleep(0.1)
+    assert browser.execute_script(last) is False
     assert complaints(browser) == []

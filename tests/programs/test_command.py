@@ -140,6 +140,7 @@ MISTYPED = [
     (sweep.main, ["s.npz", "--repeat", "2"], "did you mean --repeats"),
     (simulate.main, ["crowd", "-o", "x.npz", "--target", "2"], "did you mean --targets"),
     (simulate.main, ["thre-radar", "-o", "x.npz"], "did you mean three-radar"),
+    (solve.main, ["s.npz", "--sovler", "aco"], "--sovler aco; did you mean --solver? "),
 ]
 
 

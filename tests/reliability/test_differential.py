@@ -99,3 +99,8 @@ def test_whole_numbers_that_are_large():
     case = draw(42, 5122)
     for solver in ("exact", "tabu", "genetic", "aco", "lagrangian"):
         assert assign(case.problem, solver, seed=0).lower_bound <= -2.7e9
+
+
+def test_multipliers_that_are_large_and_cancel():
+    """Tabu search divided by the sum of excesses, which rounding had made zero."""
+    assert judge(draw(42, 3362), ["tabu"]) == []

@@ -137,7 +137,7 @@ def test_probability_of_a_cycle():
 @pytest.mark.parametrize("mode", ["paper", "mmas"])
 def test_pheromone_by_tuple(mode):
     """Histories are in the problem's tuples, and end where `assign` does."""
-    problem = assoc.build_problem(assoc.simulation.simulate("crowd", 0, targets=30, scans=1), 0)
+    problem = assoc.build_problem(assoc.simulation.simulate("crowd", 0, targets=12, scans=1), 0)
     limits = {"mode": mode, "iterations": 12, "refinement": "none"}
     cycles = []
     history = assoc.solvers.pheromone(problem, seed=2, watch=cycles.append, **limits)

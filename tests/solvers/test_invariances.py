@@ -130,7 +130,8 @@ def test_time_limit(name, hard):
     elapsed = time.perf_counter() - started
     assert elapsed < 2.0
     check_answer(hard, solution.tuples)
-    assert solution.runtime == pytest.approx(elapsed, abs=0.1)
+    # what the first call met no kernel of is loaded in the second
+    assert solution.runtime + solution.compile_time == pytest.approx(elapsed, abs=0.1)
     assert solution.lower_bound <= solution.cost
     assert -1.0 <= solution.lower_bound <= 2.0
     if solution.status != "optimal":

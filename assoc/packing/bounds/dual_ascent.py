@@ -109,7 +109,8 @@ def _ascend(
 ) -> int:
     """Cool through levels until all are done or the visits are used up; how many are done (-1: none, not begun)."""
     levels, passes = course
-    if done < 0:
+    begun = done >= 0
+    if not begun:
         hard_sweeps(packing, point.duals, point.reduced, 1)
         done = 0
     total = 0
@@ -119,7 +120,8 @@ def _ascend(
             total += smooth_passes(packing, point, temperature, passes, deadline)
         temperature *= COOLING
         done += 1
-    if done == levels:
+    # where time was over from the beginning, the first pass stands: another would find the same
+    if done == levels and (begun or total > 0):
         hard_sweeps(packing, point.duals, point.reduced, 2)
     return done
 

@@ -16,7 +16,7 @@ from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
 from assoc.packing.packing import PackingArrays
 from assoc.packing.simplex.basis import Basis, new_basis, refactor
-from assoc.packing.simplex.dual import Effort, restart, solve_dual
+from assoc.packing.simplex.dual import Effort, most_exchanges, restart, solve_dual
 from assoc.packing.simplex.program import (
     Allowed,
     Program,
@@ -26,9 +26,6 @@ from assoc.packing.simplex.program import (
     reduced_cost,
     weight_limit,
 )
-
-# exchanges of the simplex method at one node, at the most
-_EXCHANGES = 100_000
 
 
 class Work(NamedTuple):
@@ -133,7 +130,7 @@ def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
     """Solve the linear program of the node at work; how that ended, and a bound that holds."""
     allowed = allowed_at(work, num)
     restart(work.program, allowed, work.basis)
-    status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, _EXCHANGES, deadline))
+    status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, most_exchanges(work.program), deadline))
     work.duals[:] = work.basis.duals
     make_feasible(work.program, allowed, work.duals)
     return status, certified(work.program, allowed, work.duals)

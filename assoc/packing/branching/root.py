@@ -12,7 +12,7 @@ from assoc._types import Floats
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import Basis, begin_from_duals, new_basis, refactor
 from assoc.packing.simplex.cuts import odd_sets, with_cuts
-from assoc.packing.simplex.dual import OPTIMAL, Effort, restart, solve_dual
+from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, restart, solve_dual
 from assoc.packing.simplex.program import Allowed, Program, all_allowed, make_feasible, program_of, weight_limit
 
 # rounds of cuts at the most; of them in a row that may gain less than this share of the gap; cuts for each row
@@ -22,8 +22,6 @@ MOST_ROWS = 1.0 + _CUTS
 """Rows of a program with cuts, as a multiple of those without."""
 # what whole-numbered weights of a solution are lowered by at the most, as a share of the least difference
 _LOWERED = 5e-4
-# exchanges of the simplex method at the most
-_EXCHANGES = 100_000
 
 
 class Root(NamedTuple):
@@ -86,7 +84,7 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
     rows = packing.num_rows
     root = plain_root(packing, duals)
     program = root.program
-    effort = Effort(min(cutoff, float(weight_limit(program))), _EXCHANGES, deadline)
+    effort = Effort(min(cutoff, float(weight_limit(program))), most_exchanges(program), deadline)
     sets = np.zeros((0, rows), dtype=np.bool_)
     basis = new_basis(program)
     allowed = all_allowed(program, root.slack)

@@ -59,7 +59,7 @@ NEIGHBOURHOODS = (
     # some twenty targets that lie close together are solved exactly
     Move(ClusterSearch, lambda clusters: clusters, lambda clusters, rows: clusters * max(1, rows // 30), at_once=10),
     # half of all rows or more are covered anew by branch and bound
-    Move(LargeNeighbourhood, lambda clusters: 0, lambda clusters, rows: clusters if rows >= _LARGE else 0),
+    Move(LargeNeighbourhood, lambda clusters: 0, lambda clusters, rows: -(-clusters // 3) if rows >= _LARGE else 0),
 )
 """The moves that improve covers, in the order in which they are tried. Insertion with ejection (insertion.py)
 is not among them: covers are built with it."""

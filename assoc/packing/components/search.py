@@ -59,8 +59,9 @@ def search_components(
     parts: list[Component] = []
     for component in components:
         component.deadline, component.refinement = deadline, parameters.refinement
-        component.offer_start(run)
         component.offer_greedy()
+        if not component.closed:
+            component.offer_start(run)
         if component.closed:
             parts.append(component)
             continue

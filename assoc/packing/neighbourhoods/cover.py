@@ -68,7 +68,7 @@ class Cover:
         insert_and_eject(search_arrays(self.packing), self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
-        """Cover all rows without slack, by ejections and then by a search; False when that is impossible.
+        """Cover all rows without slack, by ejections and then by a search; False where that fails.
 
         Raises
         ------
@@ -81,6 +81,9 @@ class Cover:
         self.improve(max(run.deadline(), time.monotonic() + _GRACE))
         if self.is_complete:
             return True
+        if run.fallback is not None and run.should_stop():
+            # there is something else to return
+            return False
         columns = first_solution(self.packing, run)
         if columns is None:
             return False

@@ -29,7 +29,9 @@ from assoc.packing.packing import assemble
 # shares of the rows that are set free: at first, at the least and at the most (all would be an exact solver)
 _START, _LEAST, _MOST = 0.5, 0.2, 0.92
 # nodes of one try, and those up to which it was easy
-_NODES, _EASY = 20, 5
+_NODES, _EASY = 8, 3
+# columns for each row that come into question, those of least reduced cost
+_CORE = 40
 # tries on one cover: then only another one helps
 _TRIES = 300
 
@@ -68,6 +70,9 @@ class LargeNeighbourhood:
         packing = priced.packing
         # the present cover's own columns are within it, but for rounding
         limit = max(weight - priced.bound, 0.0) + priced.tolerance
+        few = _CORE * packing.num_rows
+        if packing.num_columns > few:
+            limit = min(limit, float(np.partition(priced.reduced, few)[few]))
         free = _set_free(packing.cols, owner, rng.permutation(packing.num_rows), self.share)
         inside = np.flatnonzero(_inside(packing.cols, priced.reduced, free, limit)).astype(np.int32)
         # rows that are not free are covered as they should be
@@ -92,7 +97,7 @@ class LargeNeighbourhood:
                 own_all(packing.cols, smaller.origin[part.origin[search.columns]], owner)
                 found = True
         if not done:
-            self.share = max(self.share - 0.02, _LEAST)
+            self.share = max(0.9 * self.share, _LEAST)
         elif nodes <= _EASY:
             self.share = min(self.share + 0.005, _MOST)
         return found

@@ -45,6 +45,8 @@ _COST = 1e-12
 _LOOK = 20
 _FRESH = 400
 _RESIDUAL = 1e-9
+# exchanges for each row, many times what it takes: among costs of many magnitudes rounding can lead round in circles
+_A_ROW = 200
 
 
 class Effort(NamedTuple):
@@ -53,6 +55,12 @@ class Effort(NamedTuple):
     cutoff: float
     exchanges: int
     deadline: float
+
+
+@njit
+def most_exchanges(program: Program) -> int:
+    """Exchanges after which an optimum that has not been found is given up."""
+    return _A_ROW * program.sides.size
 
 
 @njit

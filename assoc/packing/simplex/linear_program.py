@@ -77,7 +77,7 @@ class LinearProgram:
         self._packing = packing
         self._program = program_of(packing.arrays)
         self._basis: Basis = new_basis(self._program)
-        self._marked: Basis | None = None
+        self._marked: dict[int, Basis] = {}
         self._begun = False
 
     @staticmethod
@@ -135,16 +135,16 @@ class LinearProgram:
         reduced = all_reduced_costs(program, found)
         return Relaxation(status, np.inf if bound >= limit else bound, found, reduced, primal, done)
 
-    def mark(self) -> None:
-        """Remember the basis, for `back`; takes as much memory again."""
-        if self._marked is None:
-            self._marked = new_basis(self._program)
-        copy_basis(self._basis, self._marked)
+    def mark(self, number: int = 0) -> None:
+        """Remember the basis, for `back`; takes as much memory again for each number."""
+        if number not in self._marked:
+            self._marked[number] = new_basis(self._program)
+        copy_basis(self._basis, self._marked[number])
 
-    def back(self) -> None:
-        """Return to the basis that was marked."""
-        assert self._marked is not None, "nothing was marked"
-        copy_basis(self._marked, self._basis)
+    def back(self, number: int = 0) -> None:
+        """Return to the basis that was marked with this number."""
+        assert number in self._marked, "nothing was marked"
+        copy_basis(self._marked[number], self._basis)
 
     def _from_duals(self, allowed: Allowed, duals: Floats, effort: Effort) -> Any:
         """Solve from multipliers: first with the columns of small reduced cost, then with those that this leaves out.

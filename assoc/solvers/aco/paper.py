@@ -62,12 +62,12 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
         owners = _cycle(nodes, value, cycle == 0, starts, tours, lengths, run.rng, run.deadline())
         cycle += 1
         complete = (owners[:, ~packing.slack] >= 0).all(axis=1)
-        for k in np.flatnonzero(complete):
+        walked = np.where(complete, _weights(costs, tours, lengths), np.inf)
+        k = int(walked.argmin())
+        if walked[k] < best_weight:
             tour = tours[k, : lengths[k]]
-            weight = float(costs[tour].sum())
-            if weight < best_weight:
-                best, best_weight = tour[tour < packing.num_columns].copy(), weight
-                run.record(cycle, weight, -np.inf)
+            best, best_weight = tour[tour < packing.num_columns].copy(), float(walked[k])
+            run.record(cycle, best_weight, -np.inf)
         _lay(pheromone, positive, tours, lengths, parameters.rho)
         if run.watch is not None:
             value = pheromone**parameters.alpha * visibility**parameters.beta
@@ -114,6 +114,16 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
     if costs.min() <= 0:
         raise InvalidInputError("visibility: 'reciprocal' needs positive costs; take 'exponential' or 'shifted'")
     return costs
+
+
+@njit
+def _weights(costs: Floats, tours: Any, lengths: Any) -> Floats:
+    """Sum of the costs of each ant's tour."""
+    weights = np.zeros(lengths.size)
+    for k in range(lengths.size):
+        for i in range(lengths[k]):
+            weights[k] += costs[tours[k, i]]
+    return weights
 
 
 @njit

@@ -162,6 +162,9 @@ def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
 
 def _sharpen(component: Component, run: Run) -> list[Component]:
     """Ascend anew, with time enough at every temperature, on a component that the reduction left open."""
+    if run.should_stop():
+        # one pass over a million columns takes longer than a short limit allows
+        return [component]
     component.take_over(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():
         component.sharpen(run)
@@ -198,7 +201,8 @@ def _improve(tasks: list[_Task], patience: int, run: Run, show: Callable[[list[_
     # whatever the patience, branching should start on as few columns as the incumbents allow
     split: list[_Task] = []
     for task in result:
-        smaller = None if task.component.closed else split_component(task.component, share=0.9)
+        done = task.component.closed or run.should_stop()
+        smaller = None if done else split_component(task.component, share=0.9)
         split.extend([task] if smaller is None else [_Task(one) for one in smaller])
     return split
 

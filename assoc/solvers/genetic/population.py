@@ -42,6 +42,7 @@ class Breeding:
         self.fitness = np.empty(0)
         # the least weight known after the last generation
         self.known = np.inf
+        self.dives = 0
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One generation; the first one fills the population."""
@@ -55,6 +56,10 @@ class Breeding:
         if self.fitness.size == 0:
             self._populate(component, rng)
             return
+        if component.dives:
+            self.dives += 1
+            owner = component.dive(self.dives, rng)
+            self._admit(component, owner, component.settle(owner, rng, self.parameters.clusters))
         for _ in range(self.parameters.offspring):
             one, two = self._parent(rng), self._parent(rng)
             owner = self._child(component, one, two, rng)

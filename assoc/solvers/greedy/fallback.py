@@ -12,6 +12,8 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 from assoc.solvers.greedy.solve import greedy_choice
 
+# of the time that preparing took: about what ends a run takes, a bound and the answer
+_RESERVE = 0.25
 # columns from which the choice takes so long that it must be made first, not last: some milliseconds
 LARGE = 20_000
 
@@ -20,6 +22,7 @@ def prepare_fallback(packing: Packing, run: Run) -> None:
     """Make the greedy choice first, where a time limit would leave no time for it afterwards."""
     if run.time_limit is not None and run.fallback is None and packing.num_columns >= LARGE:
         run.fallback = greedy_choice(packing, run)
+        run.reserve = min(_RESERVE * run.runtime(), 0.5 * run.time_limit)
 
 
 def better_of(packing: Packing, columns: NDArray[np.integer], run: Run) -> NDArray[np.integer]:

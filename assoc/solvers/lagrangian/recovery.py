@@ -56,6 +56,25 @@ def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
 
 
 @njit
+def _keep_cheapest(indptr: Any, indices: Any, column: Any, costs: Floats, num_right: int) -> None:
+    """Leave one edge for each pair that edges join, the cheapest: dense problems have as many as a sensor has rows."""
+    place = np.full(num_right, -1, np.int64)
+    end = first = 0
+    for p in range(indptr.size - 1):
+        begin, first = first, indptr[p + 1]
+        indptr[p] = end
+        for e in range(begin, first):
+            q = indices[e]
+            if place[q] < indptr[p]:
+                place[q] = end
+                indices[end], column[end], costs[end] = q, column[e], costs[e]
+                end += 1
+            elif costs[e] < costs[place[q]]:
+                column[place[q]], costs[place[q]] = column[e], costs[e]
+    indptr[indptr.size - 1] = end
+
+
+@njit
 def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
     """Assign the tuples so far to the next sensor, from the second to the last; False at a dead end."""
     cols, weights, slack, sensor, _, _ = arranged
@@ -117,6 +136,7 @@ def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
                 indices[e] = right[j]
                 column[e] = j
                 costs[e] = price[j]
+        _keep_cheapest(indptr, indices, column, costs, num_right)
         drop_needless_prices(left_alone, right_alone)
         row_edge = np.empty(num_partial, np.int64)
         u, v = np.empty(num_partial), np.empty(num_right)

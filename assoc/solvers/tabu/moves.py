@@ -67,6 +67,9 @@ class TabuSearch:
             else:
                 self.owner = component.best.copy()
                 forced = self._force(component, rng)
+        if component.dives:
+            self.dives += 1
+            component.settle(component.dive(self.dives, rng), rng, p.clusters)
         best = self.owner.copy()
         rules = _Rules(self.clock, p.moves, p.tenure, forced)
         self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
@@ -102,7 +105,11 @@ class TabuSearch:
         packing, owner = component.packing, self.owner
         excess = np.where(owner >= 0, component.reduced[owner], -component.duals) + 1e-3 * component.temperature
         excess = np.maximum(excess, 0.0)
-        row = int(rng.choice(excess.size, p=excess / excess.sum()))
+        total = excess.sum()
+        if total == 0.0:
+            # multipliers that are large and cancel: what a row costs more is lost in their rounding
+            return -1
+        row = int(rng.choice(excess.size, p=excess / total))
         columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
         columns = columns[columns != owner[row]]
         if columns.size == 0:

@@ -117,13 +117,15 @@ const drawScans = () => {
   const [name, title, label] = MEASURES.find((one) => one[0] === byId('measure').value);
   const x = data.scans.map((_, i) => i);
   const many = data.scans.length > 60;
+  // signs for thousands of scans cover one another, and drawing them takes a second
+  const signs = data.scans.length <= 300;
   const traces = [{
-    type: 'scatter', mode: 'lines+markers', name: title, x, y: valuesOf(name), line: { color: COLOURS[0], width: 1.2 }, marker: { size: many ? 4 : 7 },
+    type: 'scatter', mode: signs ? 'lines+markers' : 'lines', name: title, x, y: valuesOf(name), line: { color: COLOURS[0], width: 1.2 }, marker: { size: many ? 4 : 7 },
     hovertext: x.map((i) => plain(scanLabel(i))), hovertemplate: '%{hovertext}<br>%{y}<extra></extra>',
   }];
   if (name === 'cost') {
     traces[0].name = 'cost';
-    traces.push({ type: 'scatter', mode: 'markers', name: 'lower bound', x, y: valuesOf('bound'), marker: { symbol: 'x-thin', size: 8, line: { width: 1.5, color: COLOURS[5] } }, hoverinfo: 'skip' });
+    traces.push({ type: 'scatter', mode: signs ? 'markers' : 'lines', name: 'lower bound', x, y: valuesOf('bound'), line: { color: COLOURS[5], width: 1.2, dash: 'dash' }, marker: { symbol: 'x-thin', size: 8, line: { width: 1.5, color: COLOURS[5] } }, hoverinfo: 'skip' });
   }
   const here = { type: 'line', x0: state.scan, x1: state.scan, yref: 'paper', y0: 0, y1: 1, line: { color: THEME.soft, width: 1.5, dash: 'dot' } };
   const layout = layoutOf(data.sources.length > 1 ? 'row' : 'scan', label, { hovermode: 'closest', shapes: [here], showlegend: name === 'cost' });

@@ -3,13 +3,18 @@ const TRAIL = 20;
 const now = { index: 0, track: null, zoom: null };
 const trackTable = byId('track-table');
 
+// Where hundreds fly, they fill the view, sensors around them or not, and signs shrink.
+const most = Math.max(data.truth.length, data.tracks.length);
+const crowded = most > 60;
+const sign = (size) => Math.max(0.45, Math.min(1, Math.sqrt(60 / Math.max(most, 1)))) * size;
+
 const near = (() => {
   const box = [[Infinity, -Infinity], [Infinity, -Infinity]];
   const take = (x, y) => [[x, 0], [y, 1]].forEach(([value, axis]) => {
     box[axis] = [Math.min(box[axis][0], value), Math.max(box[axis][1], value)];
   });
   data.truth.forEach((one) => one.x.forEach((x, i) => take(x, one.y[i])));
-  data.sensors.forEach((one) => take(one.place[0], one.place[1]));
+  if (!crowded) data.sensors.forEach((one) => take(one.place[0], one.place[1]));
   const points = data.tracks.flatMap((one) => one.x.map((x, i) => [x, one.y[i]]));
   // most of the tracks as well, but not the few farthest
   [0, 1].forEach((axis) => {
@@ -58,18 +63,18 @@ const drawTracks = () => {
   const since = data.instants[Math.max(0, now.index - TRAIL)];
   const traces = [];
   if (data.truth.length) {
-    traces.push({ ...linesOf(data.truth.map((one) => stretch(one, 0, one.t.length))), name: 'truth', line: { color: THEME.faint, width: 6 } });
+    traces.push({ ...linesOf(data.truth.map((one) => stretch(one, 0, one.t.length))), name: 'truth', line: { color: THEME.faint, width: sign(6) } });
   }
   const scan = data.measured.find((one) => Math.abs(one.t - time) < 1e-6);
   if (data.measured.length) {
     const at = scan ? scan.at : [];
-    traces.push({ type: 'scatter', mode: 'markers', name: 'measurements', x: at.map((p) => p[0] * unit.factor), y: at.map((p) => p[1] * unit.factor), hoverinfo: 'skip', marker: { symbol: 'x-thin', size: 6, line: { width: 1, color: THEME.line } } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'measurements', x: at.map((p) => p[0] * unit.factor), y: at.map((p) => p[1] * unit.factor), hoverinfo: 'skip', marker: { symbol: 'x-thin', size: sign(6), line: { width: 1, color: THEME.line } } });
   }
   traces.push({ ...linesOf(data.tracks.map((one) => stretch(one, 0, one.t.length))), name: 'whole tracks', line: { color: '#7aa6c8', width: 1, dash: 'dot' } });
   COLOURS.forEach((colour, c) => {
     const group = data.tracks.filter((_, i) => i % COLOURS.length === c);
     const parts = group.map((one) => { const last = until(one, time); return stretch(one, Math.max(0, until(one, since) - 1), last); });
-    traces.push({ ...linesOf(parts), name: `last ${TRAIL} steps`, showlegend: c === 0, legendgroup: 'trail', line: { color: colour, width: 2.5, dash: dashOf(c) } });
+    traces.push({ ...linesOf(parts), name: `last ${TRAIL} steps`, showlegend: c === 0, legendgroup: 'trail', line: { color: colour, width: sign(2.5), dash: dashOf(c) } });
   });
   if (now.track !== null) {
     const one = data.tracks[now.track];
@@ -77,14 +82,14 @@ const drawTracks = () => {
   }
   const here = data.truth.map((one) => [one, present(one, time)]).filter(([, i]) => i >= 0);
   if (data.truth.length) {
-    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target id ${one.id}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: 14, line: { width: 2, color: THEME.ink } } });
+    traces.push({ type: 'scatter', mode: 'markers', name: 'targets', x: here.map(([one, i]) => one.x[i] * unit.factor), y: here.map(([one, i]) => one.y[i] * unit.factor), hovertext: here.map(([one]) => `target id ${one.id}`), hoverinfo: 'text', marker: { symbol: 'cross-thin', size: sign(14), line: { width: sign(2), color: THEME.ink } } });
   }
   const live = data.tracks.map((one, number) => [one, present(one, time), number]).filter(([, i]) => i >= 0);
   const named = live.length <= 40;
   traces.push({
     type: 'scatter', mode: named ? 'markers+text' : 'markers', name: 'tracks', x: live.map(([one, i]) => one.x[i] * unit.factor), y: live.map(([one, i]) => one.y[i] * unit.factor),
     text: live.map(([one]) => String(one.id)), textposition: 'top right', textfont: { size: 11 }, customdata: live.map(([, , number]) => number),
-    hovertext: live.map(([one, i]) => trackHover(one, i)), hoverinfo: 'text', marker: { symbol: 'circle', size: 8, color: live.map(([, , number]) => colourOf(number)), line: { width: 1, color: THEME.paper } },
+    hovertext: live.map(([one, i]) => trackHover(one, i)), hoverinfo: 'text', marker: { symbol: 'circle', size: sign(8), color: live.map(([, , number]) => colourOf(number)), line: { width: 1, color: THEME.paper } },
   });
   if (data.sensors.length) {
     traces.push({ type: 'scatter', mode: 'markers', name: 'sensors', x: data.sensors.map((one) => one.place[0] * unit.factor), y: data.sensors.map((one) => one.place[1] * unit.factor), hovertext: data.sensors.map((one) => plain(one.name)), hoverinfo: 'text', marker: { symbol: 'triangle-up', size: 10, color: THEME.soft } });
@@ -109,6 +114,8 @@ const marker = () => ({ type: 'line', x0: data.instants[now.index], x1: data.ins
 const overTime = (id, curves, label) => {
   const layout = layoutOf('time (s)', label, { hovermode: 'closest', shapes: [marker()] });
   layout.yaxis.rangemode = 'tozero';
+  // a line of many says its name under the pointer: their legend would fill the plot
+  layout.showlegend = curves.length <= 12;
   Plotly.react(id, curves.map(([name, x, y], i) => ({ type: 'scatter', mode: 'lines', name, x, y, line: { color: colourOf(i), dash: dashOf(i), width: 1.8 } })), layout, CONFIG);
   const plot = byId(id);
   if (!plot.dataset.listens) {
