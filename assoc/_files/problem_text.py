@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FIRST_LINE = "assoc-problem 1"
 ENDINGS = (".txt", ".txt.xz")
-_LARGEST = 2_000_000_000
+_LARGEST = 500_000_000
 
 
 def write_problem_text(
@@ -60,7 +60,7 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
         with lzma.open(path) if os.fspath(path).endswith(".xz") else open(path, "rb") as file:
             content = file.read(_LARGEST + 1)  # a packed file may be small and hold more than there is memory for
         if len(content) > _LARGEST:
-            raise InvalidInputError(f"{path}: is larger than 2 GB")
+            raise InvalidInputError(f"{path}: is larger than 500 MB")
         text = content.decode()
     except (lzma.LZMAError, EOFError):
         raise InvalidInputError(f"{path}: is damaged, or not packed by xz") from None

@@ -1,26 +1,32 @@
 """A tree that proves how little a component can weigh: multipliers at its leaves, pairs of rows at its nodes.
 
-Each node is a linear program. Where its bound does not reach the weight of the best cover, the node asks whether two
-rows are in one column (Ryan and Foster's branching): either no column remains that has just one of them, or none that
-has both. The pair is the one whose answers raise the bound the most, of those on which the linear program is undecided.
+Each node is a linear program, with the cuts that the root has. Where its bound does not reach what is to be proved, the
+node asks whether two rows are in one column (Ryan and Foster's branching), as the search of `exact` does: either no
+column remains that has just one of them, or none that has both. Columns too dear for anything below the target are left
+out before.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
+from assoc.packing.branching.pairs import answer, any_open_pair, decide, doubtful_pairs, new_trials
+from assoc.packing.branching.root import basis_of, root_with_cuts
 from assoc.packing.packing import Packing
-from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
+from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
+from assoc.packing.simplex.program import Allowed, all_allowed, all_reduced_costs, certified, make_feasible
 
-# pairs that are tried at a node, and steps of the simplex method for each answer
-_TRIED = 8
-_STEPS = 60
-# a share of a pair that is as good as none or all of it
-_WHOLE = 1e-6
+# a share of the target that is rounding
+_ROUNDING = 1e-9
+# digits after the point with which multipliers are tried, the shortest first
+_DIGITS = (2, 4, 6, 9)
 
 
 @dataclass(slots=True)
@@ -29,8 +35,8 @@ class Node:
 
     Attributes
     ----------
-    duals : float array, shape (R,)
-        Multipliers of the component's rows.
+    duals : float array, shape (rows and cuts,)
+        Multipliers; at a node with a pair they say which columns are left out, and are empty if none are.
     bound : float
         What they prove below this node.
     pair : (int, int) or None
@@ -46,15 +52,51 @@ class Node:
 
 
 @dataclass(slots=True)
-class _Open:
+class Tree:
+    """Cuts as odd sets of rows, bool array of shape (cuts, R), and nodes: the root first, children after parents."""
+
+    sets: NDArray[np.bool_]
+    nodes: list[Node] = field(default_factory=list)
+
+    @property
+    def bound(self) -> float:
+        """The least bound of the leaves."""
+        return min(node.bound for node in self.nodes if node.pair is None)
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What a tree is to prove.
+
+    Attributes
+    ----------
+    target : float
+        The weight that is known.
+    enough : float
+        A node is closed when its bound has reached this.
+    nodes : int
+        At the most; what is then open stays a leaf, with what it proves.
+    deadline : float
+        When time is over (clock.py).
+    """
+
+    target: float
+    enough: float
+    nodes: int
+    deadline: float
+
+
+class _Open(NamedTuple):
+    """A node that waits: what it allows, and the basis of its parent with its multipliers."""
+
     place: int
-    columns: NDArray[np.bool_]
-    slack: NDArray[np.bool_]
-    relaxed: Relaxation
+    allowed: Allowed
+    variable: NDArray[np.int32]
+    duals: Floats
 
 
-def prove_by_tree(component: Packing, duals: Floats, weight: float, nodes: int) -> list[Node]:
-    """Return the nodes of a tree; its first is the root, and children come after their parents.
+def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> Tree:
+    """Return a tree that proves as much as can be proved within its aim.
 
     Parameters
     ----------
@@ -62,66 +104,87 @@ def prove_by_tree(component: Packing, duals: Floats, weight: float, nodes: int) 
         One component.
     duals : float array, shape (R,)
         Multipliers to start from.
-    weight : float
-        A node is not divided when its bound has reached this.
-    nodes : int
-        At the most; what is then open stays a leaf, with what it proves.
+    aim : Aim
+    base : float array, shape (R,)
+        What is added to the multipliers where they are written: their sums are what is rounded.
     """
-    program = LinearProgram(component)
-    columns, slack = np.ones(component.num_columns, np.bool_), component.slack.copy()
-    root = program.solve(duals=duals)
-    tree = [Node(root.duals, root.bound)]
-    waiting = [_Open(0, columns, slack, root)]
-    while waiting:
-        task = waiting.pop()
-        if task.relaxed.bound >= weight or len(tree) + 2 > nodes:
-            continue
-        pair = _pair(program, component, task, weight)
-        if pair is None:
-            continue
-        tree[task.place].pair = pair
-        tree[task.place].children = len(tree), len(tree) + 1
-        for together in (True, False):
-            columns, slack = _divided(component, task, pair, together)
-            relaxed = program.solve(columns=columns, slack=slack, duals=task.relaxed.duals)
-            waiting.append(_Open(len(tree), columns, slack, relaxed))
-            tree.append(Node(relaxed.duals, relaxed.bound))
-    return tree
+    search = _Search(component, duals, aim, base)
+    while search.waiting:
+        search.visit(search.waiting.pop())
+    return search.tree
 
 
-def _divided(
-    component: Packing, task: _Open, pair: tuple[int, int], together: bool
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Columns and slack that remain when the rows of a pair are in one column, or in different ones."""
-    one, other = ((component.cols == row).any(axis=1) for row in pair)
-    if not together:
-        return task.columns & ~(one & other), task.slack
-    slack = task.slack.copy()
-    slack[list(pair)] = False
-    return task.columns & (one == other), slack
+class _Search:
+    """A depth-first search that writes down its nodes."""
 
+    def __init__(self, component: Packing, duals: Floats, aim: Aim, base: Floats) -> None:
+        root = root_with_cuts(component, duals, aim.enough, aim.deadline)
+        self._component, self._aim, self._program = component, aim, root.program
+        self._base = np.concatenate([base, np.zeros(len(root.sets))])
+        # slack of cuts is never left out
+        self._is_cut = np.arange(root.slack.size) >= component.num_rows
+        self._margin = _ROUNDING * max(1.0, abs(aim.target))
+        self._trials = new_trials(root.program, component.num_rows)
+        self.tree = Tree(root.sets, [Node(np.empty(0), -np.inf)])
+        self.waiting = [_Open(0, all_allowed(root.program, root.slack), root.variable, root.duals)]
 
-def _pair(program: LinearProgram, component: Packing, task: _Open, weight: float) -> tuple[int, int] | None:
-    """The pair on which to divide a node; None where the linear program is undecided about none."""
-    shares: dict[tuple[int, int], float] = {}
-    primal = task.relaxed.primal
-    for j in np.flatnonzero(task.columns & (primal > _WHOLE)):
-        rows = component.cols[j][component.cols[j] >= 0].tolist()
-        for k, row in enumerate(rows):
-            for other in rows[k + 1 :]:
-                shares[row, other] = shares.get((row, other), 0.0) + float(primal[j])
-    undecided = sorted((abs(share - 0.5), pair) for pair, share in shares.items() if _WHOLE < share < 1.0 - _WHOLE)
-    best, gain = None, -np.inf
-    program.mark()
-    for _, pair in undecided[:_TRIED]:
-        rises = []
-        for together in (True, False):
-            columns, slack = _divided(component, task, pair, together)
-            relaxed = program.solve(columns=columns, slack=slack, duals=task.relaxed.duals, exchanges=_STEPS)
-            rises.append(min(relaxed.bound, weight) - task.relaxed.bound)
-        # both answers count: a node is done when both are
-        value = max(rises[0], 1e-9) * max(rises[1], 1e-9)
-        if value > gain:
-            best, gain = pair, value
-    program.back()
-    return best
+    def visit(self, task: _Open) -> None:
+        """Bound a node, and divide it where that is not enough."""
+        program, aim, tree = self._program, self._aim, self.tree
+        node = tree.nodes[task.place]
+        basis = basis_of(program, task.allowed, task.variable, task.duals)
+        effort = Effort(aim.enough + 0.1 * self._margin, most_exchanges(program), aim.deadline)
+        status, _ = solve_dual(program, task.allowed, basis, effort)
+        node.duals = basis.duals.copy()
+        node.bound = self._bound(task.allowed, node.duals)
+        if node.bound >= aim.enough:
+            self._shorten(node, task.allowed)
+            return
+        if status != OPTIMAL or len(tree.nodes) + 2 > aim.nodes or time.monotonic() > aim.deadline:
+            return
+        left = self._left(task.allowed, node)
+        node.pair = self._question(left, basis)
+        if node.pair is None:
+            return
+        if left.active.size == task.allowed.active.size and (left.slack == task.allowed.slack).all():
+            node.duals = np.empty(0)
+        node.children = len(tree.nodes), len(tree.nodes) + 1
+        for joined in (True, False):
+            side = Allowed(np.empty_like(left.active), np.zeros_like(left.columns), np.zeros_like(left.slack))
+            count = answer(self._component.cols, left, node.pair, joined, side)
+            side = side._replace(active=side.active[:count].copy())
+            self.waiting.append(_Open(len(tree.nodes), side, basis.variable.copy(), basis.duals.copy()))
+            tree.nodes.append(Node(np.empty(0), node.bound))
+
+    def _bound(self, allowed: Allowed, duals: Floats) -> float:
+        """The bound of multipliers, which are made feasible."""
+        make_feasible(self._program, allowed, duals)
+        return float(certified(self._program, allowed, duals))
+
+    def _left(self, allowed: Allowed, node: Node) -> Allowed:
+        """Columns and slack without those that cost too much for anything below the target."""
+        most = self._aim.target - node.bound + self._margin
+        columns = allowed.columns & (all_reduced_costs(self._program, node.duals) <= most)
+        slack = allowed.slack & ((-node.duals <= most) | self._is_cut)
+        return Allowed(np.flatnonzero(columns).astype(np.int32), columns, slack)
+
+    def _question(self, allowed: Allowed, basis: Basis) -> tuple[int, int] | None:
+        """The pair of rows on which to divide; None where there is none."""
+        cols, trials = self._component.cols, self._trials
+        count = doubtful_pairs(cols, basis, trials)
+        if count:
+            effort = Effort(self._aim.enough, 0, self._aim.deadline)
+            which, _ = decide(self._program, cols, allowed, basis, trials, count, effort)
+            one, two = trials.pairs[which]
+        else:
+            one, two = any_open_pair(cols, allowed, np.empty(self._component.num_rows, np.int32))
+        return None if one < 0 else (int(one), int(two))
+
+    def _shorten(self, node: Node, allowed: Allowed) -> None:
+        """Round the multipliers of a leaf to as few digits as still prove enough."""
+        for digits in _DIGITS:
+            short = np.round(node.duals + self._base, digits) - self._base
+            bound = self._bound(allowed, short.copy())
+            if bound >= self._aim.enough:
+                node.duals, node.bound = short, bound
+                return

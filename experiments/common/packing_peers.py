@@ -51,14 +51,14 @@ def _singletons(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[
     return where, cost
 
 
-def _savings(problem: AssignmentProblem) -> NDArray[np.float64]:
+def savings(problem: AssignmentProblem) -> NDArray[np.float64]:
     """What each tuple saves against its measurements as false alarms."""
     rows = _numbered(problem)
     _, alone = _singletons(problem)
     return np.where(rows >= 0, alone[rows], 0.0).sum(axis=1) - problem.costs
 
 
-def _with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+def with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
     """Chosen tuples, and the false alarms that are left; places in the problem."""
     where, _ = _singletons(problem)
     rows = _numbered(problem)[chosen]
@@ -77,7 +77,7 @@ def conflict_graph(problem: AssignmentProblem) -> tuple[NDArray[np.intp], NDArra
     """
     if not problem.dummy:
         raise ValueError("expected a problem with dummies")
-    saved = _savings(problem)
+    saved = savings(problem)
     rows = _numbered(problem)
     vertices = np.flatnonzero((saved > 0) & ((rows >= 0).sum(axis=1) > 1))
     inside, saved = rows[vertices], saved[vertices]
@@ -106,14 +106,14 @@ def _independent_set(problem: AssignmentProblem, time_limit: float, kind: str) -
     vertices, weights, graph = conflict_graph(problem)
     if not graph.nnz:
         # all of them; some of the codes fail on a graph without edges
-        return _with_false_alarms(problem, vertices), None, True
+        return with_false_alarms(problem, vertices), None, True
     ends, neighbours = graph.indptr, graph.indices.astype(np.int32)
     if kind == "chils":
         _, found = _chils.mwis(ends.astype(np.int64), neighbours, weights, time_limit, _CONCURRENT, 0)
     else:
         search = _kamis_wmis.branch_reduce if kind == "branch_reduce" else _kamis_mmwis.mmwis_solver
         _, found = search(ends.astype(np.int32), neighbours, weights.astype(np.int32), time_limit, 0)
-    return _with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
+    return with_false_alarms(problem, vertices[np.asarray(found, dtype=np.intp)]), None, False
 
 
 def chils(problem: AssignmentProblem, time_limit: float) -> Chosen:
@@ -135,7 +135,7 @@ def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
     """Multiple Hungarian method on the costs of pairs, algorithm "Fm"; it takes no time limit."""
     from kap import k_assignment  # type: ignore[import-untyped,unused-ignore]
 
-    saved = _savings(problem)
+    saved = savings(problem)
     count = (problem.tuples > 0).sum(axis=1)
     matrices = []
     for one, two in itertools.combinations(range(problem.num_sensors), 2):
@@ -152,7 +152,7 @@ def kap(problem: AssignmentProblem, time_limit: float) -> Chosen:
         place = listed.get(tuple(row))
         if place is not None and saved[place] > 0:
             chosen.append(place)
-    return _with_false_alarms(problem, np.array(sorted(chosen), dtype=np.intp)), None, False
+    return with_false_alarms(problem, np.array(sorted(chosen), dtype=np.intp)), None, False
 
 
 def available(name: str, problem: AssignmentProblem) -> bool:

@@ -15,6 +15,7 @@ computed by `experiments.common.checking`, not by the peer.
 ``branch_reduce``       KaMIS's branch and reduce for it
 ``mmwis``               KaMIS's memetic algorithm for it
 ``kap``                 PyPI ``kap``: multiple Hungarian method on the costs of pairs
+``stone_soup``          the optimiser of Stone Soup's multi-frame assignment (multi_frame_peer.py)
 ======================  ==========================================================================
 """
 
@@ -25,6 +26,7 @@ import importlib.util
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +34,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csc_array
 
 from assoc.problem import AssignmentProblem
-from experiments.common import packing_peers
+from experiments.common import multi_frame_peer, packing_peers
 from experiments.common.checking import check_answer
 from experiments.common.sequential import assign_in_turn
 
@@ -57,6 +59,8 @@ class PeerAnswer:
         The chosen tuples.
     proven : bool
         Whether the peer itself says that this is the optimum.
+    cpu : float
+        The same time as the process's CPU time, all threads together.
     """
 
     cost: float
@@ -64,6 +68,7 @@ class PeerAnswer:
     seconds: float
     tuples: NDArray[np.int32]
     proven: bool = False
+    cpu: float = 0.0
 
 
 Chosen = tuple[NDArray[np.intp] | None, float | None, bool]
@@ -73,13 +78,13 @@ Peer = Callable[[AssignmentProblem, float], PeerAnswer]
 def _answer(
     solve: Callable[[AssignmentProblem, float], Chosen], problem: AssignmentProblem, limit: float
 ) -> PeerAnswer:
-    start = time.perf_counter()
+    start, before = time.perf_counter(), time.process_time()
     indices, bound, proven = solve(problem, limit)
-    seconds = time.perf_counter() - start
+    seconds, cpu = time.perf_counter() - start, time.process_time() - before
     if indices is None:
-        return PeerAnswer(float("inf"), bound, seconds, problem.tuples[:0])
+        return PeerAnswer(float("inf"), bound, seconds, problem.tuples[:0], cpu=cpu)
     tuples = problem.tuples[indices]
-    return PeerAnswer(check_answer(problem, tuples), bound, seconds, tuples, proven)
+    return PeerAnswer(check_answer(problem, tuples), bound, seconds, tuples, proven, cpu)
 
 
 def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -92,7 +97,11 @@ def _rows(problem: AssignmentProblem) -> tuple[NDArray[np.int64], NDArray[np.int
     return row, column.astype(np.int64), must.astype(np.bool_)
 
 
-def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int) -> Chosen:
+Told = Callable[[float, float], bool]
+"""Told of a cost and a bound; a true answer stops the peer."""
+
+
+def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int, told: Told | None = None) -> Chosen:
     from ortools.sat import cp_model_pb2
     from ortools.sat.python import cp_model
 
@@ -113,13 +122,24 @@ def _cp_sat(problem: AssignmentProblem, time_limit: float, workers: int) -> Chos
     solver.parameters.num_workers = workers
     solver.parameters.max_time_in_seconds = time_limit
     solver.parameters.relative_gap_limit = 0.0
-    status = solver.solve(model)
+    status = solver.solve(model, None if told is None else _listener(told))
     # Each of at most sum(sizes) chosen tuples is off by half a unit at most.
     bound = solver.best_objective_bound / CP_SAT_SCALE - 0.5 * float(problem.sizes.sum()) / CP_SAT_SCALE
     if status not in (cp_model_pb2.CpSolverStatus.OPTIMAL, cp_model_pb2.CpSolverStatus.FEASIBLE):
         return None, bound, False
     values = np.fromiter((solver.boolean_value(x) for x in take), dtype=bool, count=len(take))
     return np.flatnonzero(values), bound, status == cp_model_pb2.CpSolverStatus.OPTIMAL
+
+
+def _listener(told: Told) -> Any:
+    from ortools.sat.python import cp_model
+
+    class Listener(cp_model.CpSolverSolutionCallback):
+        def on_solution_callback(self) -> None:
+            if told(self.objective_value / CP_SAT_SCALE, self.best_objective_bound / CP_SAT_SCALE):
+                self.stop_search()
+
+    return Listener()
 
 
 def _scip(problem: AssignmentProblem, time_limit: float, threads: int) -> Chosen:
@@ -223,8 +243,7 @@ def _fill_with_dummies(tensor: NDArray[np.float64], problem: AssignmentProblem) 
     tensor[tuple(slice(size, None) for size in sizes)] = 0.0
     for key, cost in zip(problem.tuples.tolist(), problem.costs.tolist(), strict=True):
         place = tuple(
-            slice(index - 1, index) if index else slice(size, None)
-            for index, size in zip(key, sizes, strict=True)
+            slice(index - 1, index) if index else slice(size, None) for index, size in zip(key, sizes, strict=True)
         )
         np.minimum(tensor[place], cost, out=tensor[place])
 
@@ -234,9 +253,9 @@ def cp_sat(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     return _answer(lambda p, limit: _cp_sat(p, limit, 2), problem, time_limit)
 
 
-def cp_sat_1(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
-    """OR-Tools CP-SAT with one worker."""
-    return _answer(lambda p, limit: _cp_sat(p, limit, 1), problem, time_limit)
+def cp_sat_1(problem: AssignmentProblem, time_limit: float, told: Told | None = None) -> PeerAnswer:
+    """CP-SAT with one worker, which may be listened to as it finds solutions."""
+    return _answer(lambda p, limit: _cp_sat(p, limit, 1, told), problem, time_limit)
 
 
 def scip(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
@@ -272,6 +291,11 @@ def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     return _answer(_nrl_tracker, problem, time_limit)
 
 
+def stone_soup(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
+    """Stone Soup's dual decomposition (it takes no time limit)."""
+    return _answer(multi_frame_peer.multi_frame, problem, time_limit)
+
+
 def _packing_peer(solve: Callable[[AssignmentProblem, float], Chosen]) -> Peer:
     return lambda problem, time_limit: _answer(solve, problem, time_limit)
 
@@ -284,6 +308,7 @@ PEERS: dict[str, Peer] = {
     "highs": highs,
     "sequential": sequential,
     "nrl_tracker": nrl_tracker,
+    "stone_soup": stone_soup,
     **{name: _packing_peer(getattr(packing_peers, name)) for name in PACKING_PEERS},
 }
 
@@ -300,6 +325,8 @@ def available(name: str, problem: AssignmentProblem) -> bool:
     """Whether a peer is installed and can take this problem."""
     if name == "nrl_tracker":
         return importlib.util.find_spec("pytcl") is not None and dense_elements(problem) <= DENSE_LIMIT
+    if name == "stone_soup":
+        return multi_frame_peer.available(problem)
     if name in PACKING_PEERS:
         return packing_peers.available(name, problem)
     return name in PEERS

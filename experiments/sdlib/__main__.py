@@ -3,11 +3,13 @@
     python -m experiments.sdlib make [--compare]
     python -m experiments.sdlib solve --seconds 60 [NAME ...]
     python -m experiments.sdlib check [NAME ...]
-    python -m experiments.sdlib run --command "mysolver {instance} {solution}" --seconds 60 [NAME ...]
+    python -m experiments.sdlib run [--solvers exact,highs] --seconds 60 [--all | NAME ...]
+    python -m experiments.sdlib run --command "mysolver {instance} {solution}" --seconds 60 [--all | NAME ...]
     python -m experiments.sdlib page
 
-``run`` starts the command once for each instance, with the paths of an instance (plain text) and of the solution that
-it must write; solutions are judged by verify.py. docs/benchmark_set.md describes the set and the files.
+``run`` compares our solvers with each other and with the peers that are installed, or runs a command, once for each
+instance, with the paths of an instance (plain text) and of the solution that it must write. Each has one core and so
+many seconds of CPU time; solutions are judged by verify.py. docs/benchmark_set.md describes the set and the files.
 """
 
 from __future__ import annotations
@@ -16,15 +18,17 @@ import argparse
 import datetime
 import json
 import lzma
-import shlex
-import subprocess
+import os
 import sys
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from experiments.sdlib import store, verify
+from experiments.sdlib import recorded, store
+from experiments.sdlib.command import run_command
+from experiments.sdlib.comparison import write_comparison
+from experiments.sdlib.contest import contest, representatives
+from experiments.sdlib.contestants import CONTESTANTS
 from experiments.sdlib.instances import Instance, instances
 from experiments.sdlib.page import write_page
 from experiments.sdlib.solve import check_row, solve
@@ -38,29 +42,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parts = parser.add_subparsers(dest="part", required=True)
     make = parts.add_parser("make", help="write the instances")
     make.add_argument("--compare", action="store_true", help="write nothing: compare them with what is stored")
+    make.add_argument("--recording", metavar="FILE", help="of air traffic: without it, recorded ones stay as they are")
     for name, text in (("solve", "improve and prove what is known"), ("run", "run a solver of any kind")):
         part = parts.add_parser(name, help=text)
-        part.add_argument("--seconds", type=float, default=60.0, help="limit for each instance (default 60)")
+        part.add_argument("--seconds", type=_seconds, default=60.0, help="limit for each instance (default 60)")
         part.add_argument("--family", help="only this family")
         part.add_argument("names", nargs="*", metavar="NAME", help="only these instances")
-    parts.choices["run"].add_argument("--command", required=True, help="with {instance} and {solution} in it")
+    improve = parts.choices["solve"]
+    improve.add_argument("--solver", default="exact", help="of ours (default exact, which alone proves)")
+    run = parts.choices["run"]
+    who = run.add_mutually_exclusive_group()
+    who.add_argument("--command", help="your solver, with {instance} and {solution} in it")
+    who.add_argument("--solvers", type=_solvers, default=list(CONTESTANTS), help="names, with commas (default: all)")
+    run.add_argument("--all", action="store_true", help="all instances, not two of each family")
+    run.add_argument("--output", metavar="FILE", help="write the rows, with what was found when, as JSON")
     check = parts.add_parser("check", help="check every solution and proof")
     check.add_argument("names", nargs="*", metavar="NAME")
     parts.add_parser("page", help="write the tables of docs/benchmark_set.md")
     chosen = parser.parse_args(arguments)
     if chosen.part == "make":
+        if chosen.recording is not None:
+            if not Path(chosen.recording).is_file():
+                print(f"{chosen.recording}: there is no such file", file=sys.stderr)
+                return 2
+            os.environ[recorded.PATH] = chosen.recording
         return _make(compare=chosen.compare)
     if chosen.part == "page":
         write_page()
         return 0
     picked = list(_picked(parser, chosen.names, getattr(chosen, "family", None)))
     if chosen.part == "solve":
-        return _solve(picked, chosen.seconds)
+        return _solve(picked, chosen.solver, chosen.seconds)
     if chosen.part == "check":
         return _check(picked)
-    if "{instance}" not in chosen.command or "{solution}" not in chosen.command:
+    if chosen.command is not None and not ("{instance}" in chosen.command and "{solution}" in chosen.command):
         parser.error("--command: must have {instance} and {solution} in it")
-    return _run(picked, chosen.command, chosen.seconds)
+    if not (chosen.all or chosen.names or chosen.family):
+        picked = representatives(picked)
+    return _run(picked, chosen, sys.argv[1:] if arguments is None else arguments)
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < 1e6:
+        raise argparse.ArgumentTypeError(f"expected seconds above 0, got {text}")
+    return seconds
+
+
+def _solvers(text: str) -> list[str]:
+    names = text.split(",")
+    for name in names:
+        if name not in CONTESTANTS:
+            raise argparse.ArgumentTypeError(f"{name}: expected some of {', '.join(CONTESTANTS)}")
+    return names
 
 
 def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | None) -> Iterator[Instance]:
@@ -77,8 +111,9 @@ def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | Non
 
 def _make(*, compare: bool) -> int:
     different = 0
+    every = [one for one in instances() if recorded.PATH in os.environ or not one.recorded]
     with tempfile.TemporaryDirectory() as folder:
-        for one in instances():
+        for one in every:
             target = store.instance_file(one.name)
             path = Path(folder) / target.name if compare else target
             path.parent.mkdir(exist_ok=True)
@@ -86,14 +121,16 @@ def _make(*, compare: bool) -> int:
             if compare and lzma.open(path).read() != lzma.open(target).read():
                 different += 1
                 print(f"{one.name}: differs from what is stored", file=sys.stderr)
-    print(f"{len(instances())} instances" + (f", {different} differ" if compare else ""))
+    left = len(instances()) - len(every)
+    without = f", {left} left out for want of a recording" if left else ""
+    print(f"{len(every)} instances{without}" + (f", {different} differ" if compare else ""))
     return 1 if different else 0
 
 
-def _solve(picked: list[Instance], seconds: float) -> int:
+def _solve(picked: list[Instance], solver: str, seconds: float) -> int:
     for one in picked:
         rows = store.table()
-        row = rows[one.name] = solve(one, rows.get(one.name), seconds, datetime.date.today().isoformat())
+        row = rows[one.name] = solve(one, rows.get(one.name), solver, seconds, datetime.date.today().isoformat())
         store.write_table(rows)
         words = f"{one.name:32} {row['tuples']:8} {row['value']:>20} {row['status']:8} {row['seconds']:8.2f} s"
         print(words, flush=True)
@@ -115,42 +152,24 @@ def _check(picked: list[Instance]) -> int:
     return 1 if wrong else 0
 
 
-def _run(picked: list[Instance], command: str, seconds: float) -> int:
-    rows = store.table()
-    with tempfile.TemporaryDirectory() as folder:
-        for one in picked:
-            instance, solution = Path(folder) / "instance.txt", Path(folder) / "solution.txt"
-            instance.write_bytes(lzma.open(store.instance_file(one.name)).read())
-            solution.unlink(missing_ok=True)
-            words = [word.format(instance=instance, solution=solution) for word in shlex.split(command)]
-            started = time.perf_counter()
-            try:
-                done = subprocess.run(words, timeout=seconds, capture_output=True, check=False).returncode
-            except subprocess.TimeoutExpired:
-                done = None
-            except OSError as error:
-                print(f"{words[0]}: {error.strerror}", file=sys.stderr)
-                return 2
-            taken = time.perf_counter() - started
-            print(json.dumps(_judged(one.name, instance, solution, rows, done, taken)), flush=True)
-    return 0
-
-
-def _judged(
-    name: str, instance: Path, solution: Path, rows: dict[str, dict[str, object]], done: int | None, seconds: float
-) -> dict[str, object]:
-    """One line of a run: what the verifier says of what a command left behind."""
-    row: dict[str, object] = {"instance": name, "seconds": round(seconds, 3), "exit": done}
-    row |= {"cost": None, "excess": None}
+def _run(picked: list[Instance], chosen: argparse.Namespace, arguments: Sequence[str]) -> int:
+    if chosen.command is not None:
+        rows = run_command(picked, chosen.command, chosen.seconds)
+    else:
+        rows = contest(picked, chosen.solvers, chosen.seconds)
+    done = []
+    words = " ".join(["python -m experiments.sdlib", *arguments])
     try:
-        cost = verify.cost_of(*verify.read_instance(str(instance)), verify.read_solution(str(solution))[0])
-    except FileNotFoundError:
-        return {**row, "fault": "no solution was written"}
-    except (OSError, ValueError, verify.NoSolutionError) as error:
-        return {**row, "fault": str(error)}
-    best = rows.get(name, {}).get("value")
-    excess = None if best is None else float(cost) - float(str(best))
-    return {**row, "cost": verify.decimal(cost), "excess": excess}
+        for row in rows:
+            print(json.dumps({key: value for key, value in row.items() if key != "trace"}), flush=True)
+            done.append(row)
+            # every now and then: a run of everything takes long
+            if chosen.output is not None:
+                write_comparison(chosen.output, done, chosen.seconds, words)
+    except OSError as error:
+        print(f"{error.filename or chosen.command}: {error.strerror}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":

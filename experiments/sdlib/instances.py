@@ -16,6 +16,7 @@ from assoc.solution import Solution
 from assoc.tracking import TRACKERS
 from assoc.tracking.filter_choice import make_filter
 from experiments.common.instances import scenes, synthetic
+from experiments.sdlib.recorded import WATCHES
 
 DECIMALS = 6
 
@@ -31,11 +32,14 @@ class Instance:
     family : str
     raw : callable
         Makes the problem before its costs are rounded.
+    recorded : bool
+        Whether the recording of recorded.py is needed to make it.
     """
 
     name: str
     family: str
     raw: Callable[[], AssignmentProblem]
+    recorded: bool = False
 
     def make(self) -> AssignmentProblem:
         """Make the problem: the same on every machine, as far as its mathematical library rounds alike."""
@@ -46,7 +50,8 @@ class Instance:
 
 def instances() -> list[Instance]:
     """Return all instances, family by family."""
-    return [*_from_scenes(), *_from_trackers(), *_synthetic()]
+    recorded = [Instance(name, "recorded traffic", watch.make, recorded=True) for name, watch in WATCHES.items()]
+    return [*_from_scenes(), *recorded, *_from_trackers(), *_synthetic()]
 
 
 def _scan(make: Callable[[], Scene], scan: int = 0, **gating: float) -> Callable[[], AssignmentProblem]:

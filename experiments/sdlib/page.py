@@ -1,4 +1,4 @@
-"""The tables of docs/benchmark_set.md, from what is known."""
+"""The tables of docs/benchmark_set.md, from what is known and what was compared."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Any
 
 from assoc._files.output import write_text
 from experiments.sdlib import store
+from experiments.sdlib.comparison import comparison_tables
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmark_set.md"
 BEGIN = "<!-- tables: written by python -m experiments.sdlib page -->"
 END = "<!-- end of tables -->"
+BEGIN_COMPARISON = "<!-- comparison: written by python -m experiments.sdlib page -->"
+END_COMPARISON = "<!-- end of comparison -->"
 
 
 def tables() -> str:
@@ -49,7 +52,11 @@ def _line(name: str, row: dict[str, Any]) -> str:
 
 def write_page() -> None:
     """Put the tables into the page."""
-    text = PAGE.read_text()
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
-    write_text(PAGE, f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}")
+    text = _filled(PAGE.read_text(), BEGIN, END, tables())
+    write_text(PAGE, _filled(text, BEGIN_COMPARISON, END_COMPARISON, comparison_tables()))
+
+
+def _filled(text: str, begin: str, end: str, content: str) -> str:
+    before, rest = text.split(begin)
+    after = rest.split(end)[1]
+    return f"{before}{begin}\n\n{content}\n\n{end}{after}"

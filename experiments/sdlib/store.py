@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import lzma
 from pathlib import Path
@@ -28,6 +29,12 @@ def solution_file(name: str) -> Path:
 def proof_file(name: str) -> Path:
     """Where the proof lies that the best solution is optimal, if it is."""
     return FOLDER / "proofs" / f"{name}.json.xz"
+
+
+def digest(name: str) -> str:
+    """SHA-256 of an instance as text."""
+    with lzma.open(instance_file(name)) as file:
+        return hashlib.sha256(file.read()).hexdigest()
 
 
 def load(name: str) -> AssignmentProblem:

@@ -19,7 +19,7 @@ import re
 import sys
 from fractions import Fraction
 
-MOST = 2_000_000_000
+MOST, MOST_ROWS = 200_000_000, 1_000_000
 NUMBER = re.compile(r"[+-]?[0-9]{1,60}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
 INDEX = re.compile(r"[0-9]{1,9}")
 
@@ -34,7 +34,7 @@ def lines_of(path: str) -> list[list[str]]:
     with opened as file:
         content = file.read(MOST + 1)
     if len(content) > MOST:
-        raise ValueError("is larger than 2 GB")
+        raise ValueError("is larger than 200 MB")
     text = content.decode("utf-8")
     return [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
 
@@ -61,6 +61,8 @@ def read_instance(path: str) -> tuple[list[int], bool, dict[tuple[int, ...], Fra
     if lines[0][1:] != ["1"] or lines[2][1:] not in (["yes"], ["no"]) or not lines[1][1:]:
         raise ValueError("expected version 1, sizes, and 'dummies yes' or 'dummies no'")
     sizes, dummies = [index(word) for word in lines[1][1:]], lines[2][1:] == ["yes"]
+    if sum(sizes) > MOST_ROWS:
+        raise ValueError(f"has more than {MOST_ROWS} measurements")
     if [str(len(lines) - 4)] != lines[3][1:]:
         raise ValueError("the number of tuples is not the one that is announced")
     costs: dict[tuple[int, ...], Fraction] = {}

@@ -138,6 +138,7 @@ def test_processes_do_not_change_the_answer():
         assert np.array_equal(a.positions, b.positions)
 
 
+@pytest.mark.slow
 def test_errors_in_processes_come_through():
     scene = simulate("three-radar", scans=4)
     with pytest.raises(assoc.LimitExceededError, match="tuples"):

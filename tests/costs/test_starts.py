@@ -1,16 +1,17 @@
 import math
 
 import numpy as np
+import pytest
 
 from assoc.costs import tuple_costs
 from assoc.scene import Scene
 from assoc.sensors import PositionSensor, Radar2D
 from tests.costs.dense_starts import excess
 from tests.costs.reference import CIRCLE, constant, residuals
-from tests.sizes import few_or_all
 
 
-@few_or_all("count", 24, 120)
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [120])
 def test_no_start_leads_to_a_much_better_position(count):
     found = [one[1] for number in range(count) if (one := excess(11, number)) is not None]
     assert len(found) > count // 3

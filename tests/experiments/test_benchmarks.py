@@ -15,9 +15,7 @@ from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_case
 from experiments.common.instances import synthetic
 
-ROW = Row(
-    "gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True
-)
+ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
 PEER = replace(ROW, solver="highs", peer=True, seconds=0.3)
 
 
@@ -153,9 +151,7 @@ def test_shares_and_scale_and_kbest() -> None:
 
 
 def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
-    text = markdown.render(
-        [ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], 1.0, "make bench"
-    )
+    text = markdown.render([ROW, PEER, replace(ROW, family="planted", size="S=3", solver="tabu")], 1.0, "make bench")
     assert "## gated" in text
     assert "## planted" in text
     assert "| 3x300 | 9,000 | exact | 60 | 1 | 1 | 0 | 0 | 0 | 10 ms | - | 30 |" in text
@@ -165,9 +161,7 @@ def test_run_case_checks_and_compares() -> None:
     def make(seed: int):  # type: ignore[no-untyped-def]
         yield Instance(*synthetic.planted(3, seed, targets=6))
 
-    case = Case(
-        "planted", "S=3", make, (Entry("greedy", 5.0),), (Entry("highs", 5.0), Entry("sequential", 5.0)), 2
-    )
+    case = Case("planted", "S=3", make, (Entry("greedy", 5.0),), (Entry("highs", 5.0), Entry("sequential", 5.0)), 2)
     found = run_case(case)
     assert {row.seed for row in found} == {FIRST_SEED, FIRST_SEED + 1}
     assert [row.solver for row in found[:3]] == ["highs", "sequential", "greedy"]

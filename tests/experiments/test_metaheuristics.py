@@ -71,6 +71,7 @@ def test_inverted_selection_takes_the_worst():
     assert breeding.fitness.tolist() == [3.0, -7.0, 5.0, 0.0]
 
 
+@pytest.mark.slow
 def test_ablation_reports_every_part(tmp_path, capsys):
     file = tmp_path / "results.json"
     words = ["--problems", "ghosts 10", "--seconds", "0.2", "--count", "2", "--solvers", "genetic"]
@@ -108,6 +109,7 @@ def test_published_results_of_other_problems_stay(tmp_path, monkeypatch):
     assert [(one.quantity, one.ours) for one in again] == [("b, 1 s: x", 3.0), ("a, 1 s: x", 9.0), ("a, 2 s: x", 8.0)]
 
 
+@pytest.mark.slow
 def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
     grid = {"alpha": (1.0, 2.0), "beta": (1.0,), "rho": (0.3, 0.9), "ants": (5, 15)}
     monkeypatch.setattr(sweep, "GRID", grid)

@@ -23,9 +23,7 @@ BLACKMAN_POPOLI = (
 def blackman_popoli() -> AssignmentProblem:
     """Tables 7.4-7.6 of Blackman & Popoli: three sensors with two measurements each, cost = -score."""
     rows = [entry.split(":") for entry in BLACKMAN_POPOLI.split()]
-    return AssignmentProblem(
-        [[int(i) for i in key] for key, _ in rows], [-float(v) for _, v in rows], [2, 2, 2]
-    )
+    return AssignmentProblem([[int(i) for i in key] for key, _ in rows], [-float(v) for _, v in rows], [2, 2, 2])
 
 
 def test_blackman_popoli_ranking(blackman_popoli: AssignmentProblem) -> None:

@@ -21,9 +21,7 @@ PARAMETERS = {
     "papers.fuzzy_ekf.tune_published": ROOT / "experiments" / "papers" / "fuzzy_ekf" / "published_rules.json",
 }
 WORD = r"(?:equations?|tables?|figures?|fig\.|eqs?\.|sections?|rows?|conclusions?|rules|appendix|step|place)"
-REFERENCES = re.compile(
-    rf"{WORD}\s+[\d.]*\d(?:(?:,| and| to|,? but)\s+(?:{WORD}\s+)?[\d.]*\d)*", re.IGNORECASE
-)
+REFERENCES = re.compile(rf"{WORD}\s+[\d.]*\d(?:(?:,| and| to|,? but)\s+(?:{WORD}\s+)?[\d.]*\d)*", re.IGNORECASE)
 NUMBER = re.compile(r"(?<![\w.^])\d+(?:,\d{3})*(?:\.\d+)?(?:e-?\d+)?(?![\w^]|\.\d)")
 
 
@@ -133,9 +131,7 @@ def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):
     with pytest.raises(ValueError, match="expected the marks"):
         insert("no marks", {"x": lambda: "table"})
     monkeypatch.setattr("experiments.pages.__main__.DOCS", tmp_path)
-    monkeypatch.setattr(
-        "experiments.pages.__main__.TABLES", {"p.md": {"x": lambda: "| a |"}}
-    )
+    monkeypatch.setattr("experiments.pages.__main__.TABLES", {"p.md": {"x": lambda: "| a |"}})
     page = tmp_path / "p.md"
     page.write_text("before\n<!-- table x: written by python -m experiments.pages -->\nold\n<!-- end of x -->\nafter\n")
     assert main(["--check"]) == 1 and "old" in page.read_text()

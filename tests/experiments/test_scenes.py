@@ -14,8 +14,7 @@ def test_same_seed_same_scene() -> None:
     one, two, other = scenes.ghost(10, 3).scan(0), scenes.ghost(10, 3).scan(0), scenes.ghost(10, 4).scan(0)
     assert all((a == b).all() for a, b in zip(one.measurements, two.measurements, strict=True))
     assert (
-        one.measurements[0].shape != other.measurements[0].shape
-        or (one.measurements[0] != other.measurements[0]).any()
+        one.measurements[0].shape != other.measurements[0].shape or (one.measurements[0] != other.measurements[0]).any()
     )
 
 
@@ -27,9 +26,7 @@ def test_detections_and_false_alarms(make, probability: float) -> None:  # type:
     assert scan.truth_positions is not None
     for sensor, z, source in zip(scene.sensors, scan.measurements, scan.sources, strict=True):
         assert (source >= 0).sum() == pytest.approx(300 * probability, abs=25)
-        assert (source < 0).sum() == pytest.approx(
-            sensor.false_alarm_rate, abs=4 * sensor.false_alarm_rate**0.5
-        )
+        assert (source < 0).sum() == pytest.approx(sensor.false_alarm_rate, abs=4 * sensor.false_alarm_rate**0.5)
         seen = source >= 0
         residual = sensor.residual(z[seen], sensor.measure(scan.truth_positions[source[seen]]))
         normalised = residual / np.sqrt(np.diag(sensor.covariance))

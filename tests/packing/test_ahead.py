@@ -6,8 +6,11 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 _SEARCH = """
 import numpy as np
+import pytest
 import assoc
 from numba.core import event
 from assoc._system.interpreted import compiled_only
@@ -28,6 +31,7 @@ print(len(seen.buffer))
 """
 
 
+@pytest.mark.slow
 def test_it_is_what_a_hard_problem_needs():
     done = subprocess.run([sys.executable, "-c", _SEARCH], capture_output=True, text=True, timeout=900)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "0\n")

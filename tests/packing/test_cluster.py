@@ -67,6 +67,7 @@ def test_small_clusters_never_lie():
         assert found >= brute_force(problem) - 1e-9
 
 
+@pytest.mark.slow
 def test_axial_ones_to_the_optimum():
     rng = np.random.default_rng(2)
     known, optimum = axial_known_optimum(12, 100)

@@ -72,6 +72,7 @@ def test_sets_are_odd_violated_and_spare_every_solution():
     assert found > 30
 
 
+@pytest.mark.slow
 def test_the_root_is_tighter_and_below_every_solution():
     """Its program is the LP with those cuts, by HiGHS; its multipliers prove a bound that holds."""
     tighter, closed = 0, 0

@@ -170,6 +170,7 @@ def test_views_beyond_the_budget_are_thinned_evenly():
     assert thin(({"x": "y" * 92} for _ in range(10)), scans, budget=10_000) == 10
 
 
+@pytest.mark.slow
 def test_a_hundred_scans_stay_below_eight_megabytes(tmp_path):
     scene = simulate("crowd", 0, targets=60, scans=100)
     path = tmp_path / "out.html"

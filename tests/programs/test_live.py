@@ -55,6 +55,7 @@ def check(text):
     return table
 
 
+@pytest.mark.slow
 def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     scene = Scene.load(scene_file)
     bad = ["what is this", "nobody,3.0,1,2,3", '{"sensor": "radar 1", "time": 4.0}', "radar 1,4.0,1", "x" * 20_000]

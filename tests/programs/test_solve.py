@@ -64,6 +64,7 @@ def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
     assert results[0]["seed"] == 3 and results[0]["parameters"]["mode"] == "paper"
 
 
+@pytest.mark.slow
 def test_scans_are_a_range(run, scene_file, tmp_path):
     whole, part, one = tmp_path / "whole.json", tmp_path / "part.json", tmp_path / "one.json"
     for path, words in ((whole, []), (part, ["--scans", "2:4"]), (one, ["--scans", "3"])):

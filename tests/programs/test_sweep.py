@@ -60,6 +60,7 @@ def test_a_study_is_run_summarised_and_drawn(whole, run):
     )
 
 
+@pytest.mark.slow
 def test_the_same_command_again_runs_nothing_and_a_larger_grid_the_rest(whole, run, scene_file):
     folder, _ = whole
     before = (folder / "runs.jsonl").read_bytes()
@@ -93,6 +94,7 @@ def long_scene(tmp_path_factory):
 LONG = [*GRID, "ants=60", "--repeats", "20", "-o", "study"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_killed_at_any_moment_it_goes_on(run, long_scene, tmp_path, jobs):
     (tmp_path / "temporary").mkdir()
@@ -115,6 +117,7 @@ def test_killed_at_any_moment_it_goes_on(run, long_scene, tmp_path, jobs):
     assert not frame.duplicated(["setting", "scene", "scan", "repeat"]).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupt_says_how_to_go_on(long_scene, tmp_path, jobs):
     process = start([long_scene, *LONG, "--jobs", jobs], tmp_path, start_new_session=True)
@@ -130,6 +133,7 @@ def test_interrupt_says_how_to_go_on(long_scene, tmp_path, jobs):
     assert said is not None and kept - 200 < int(said[1]) <= kept
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 def test_on_a_terminal_there_is_a_rate_and_the_time_left(long_scene, tmp_path):
     words = ["assoc.sweep", long_scene, *GRID, "--repeats", 4, "-o", "study"]
@@ -137,6 +141,7 @@ def test_on_a_terminal_there_is_a_rate_and_the_time_left(long_scene, tmp_path):
     assert "/640" in text and "runs/s" in text and "left" in text
 
 
+@pytest.mark.slow
 def test_a_full_disk_keeps_what_was_finished(run, long_scene, tmp_path):
     # a limit on the size of files stands for the full disk
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
@@ -152,6 +157,7 @@ def test_a_full_disk_keeps_what_was_finished(run, long_scene, tmp_path):
     assert (done.returncode, done.stderr) == (0, "") and f"{320 - kept} new, {kept} there before" in done.stdout
 
 
+@pytest.mark.slow
 def test_tuning_reports_on_what_was_held_out(run, scene_file, tmp_path):
     words = [scene_file, "--solver", "aco", "--grid", "mode=paper", "alpha=0.5:3", "ants=3:30:log", "-o", "tuned"]
     done = run("assoc.sweep", *words, "--tune", 4, "--target", "time", "--repeats", 2, cwd=tmp_path)

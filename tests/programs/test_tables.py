@@ -13,6 +13,7 @@ from assoc._cli.sweep.tables import without_the_same
 from assoc._cli.table import fitted_lines
 from assoc.simulation import simulate
 from tests.programs.terminal import shown, shown_at
+from tests.sizes import sample
 
 WIDTHS = (60, 80, 120, 200)
 HEADERS = ["solver", "alpha", "runs", "mean cost", "95 %", "mean gap", "95 %", "optimal %", "95 %", "ms", "95 %"]
@@ -92,7 +93,7 @@ PROGRAMS = {
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
-@pytest.mark.parametrize("name", PROGRAMS)
+@sample("name", PROGRAMS, every=3)
 def test_every_program_fits_every_terminal(run, places, name):
     """No line is longer than the terminal, and every number that a pipe gets is there, or dropped as a whole."""
     piped = run(*PROGRAMS[name], cwd=places)
@@ -109,6 +110,7 @@ def test_every_program_fits_every_terminal(run, places, name):
             assert rows == [str(k) for k in range(20)] and "... and 3 more scans" in lines
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 def test_a_study_shows_twenty_settings_and_once_what_is_the_same(run, places):
     piped = run("assoc.sweep", "--summary", "study", cwd=places).stdout

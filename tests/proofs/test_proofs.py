@@ -40,6 +40,15 @@ def odd_cycle() -> assoc.AssignmentProblem:
     return assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [-3.0, -3.0, -2.5], [1, 1, 1])
 
 
+def branched() -> assoc.AssignmentProblem:
+    """A small problem whose proof needs all that proofs have: two stages, a tree, a cut."""
+    rng = np.random.default_rng(105)
+    tuples = np.stack(np.meshgrid(*[np.arange(5)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    tuples = tuples[np.count_nonzero(tuples, axis=1) > 1]
+    tuples = tuples[rng.random(len(tuples)) < 0.35]
+    return assoc.AssignmentProblem(tuples, np.round(rng.normal(-2.0, 2.0, len(tuples)), 2), [4, 4, 4])
+
+
 def run_alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """The checker as others use it: the file alone, without the package, isolated from it."""
     command = [sys.executable, "-I", "-S", str(ALONE), *words]
@@ -55,7 +64,8 @@ def test_what_is_proved_is_the_optimum(tmp_path, dummy):
             problem = random_problem(rng)
         else:
             sizes = (4, 4, 4) if number % 2 else (3, 4, 5)
-            problem = assoc.AssignmentProblem.from_dense(rng.integers(0, 5, sizes).astype(float), dummy=False)
+            costs = rng.integers(0, 100, sizes) / 100.0
+            problem = assoc.AssignmentProblem.from_dense(costs, dummy=False)
         solution = assoc.assign(problem)
         bound = write_proof(tmp_path / "proof.json", problem, solution)
         assert bound == pytest.approx(float(exact_optimum(problem)), abs=1e-7)
@@ -68,17 +78,21 @@ def test_any_solver_s_answer_gets_a_proof_of_its_gap(tmp_path):
     problem = odd_cycle()
     greedy = assoc.assign(problem, "greedy")
     worse = assoc.assign(assoc.AssignmentProblem([[1, 0, 1]], [-2.5], [1, 1, 1]))
-    assert write_proof(tmp_path / "proof.json", problem, greedy) == pytest.approx(-3.0, abs=1e-9)
+    assert write_proof(tmp_path / "proof.json", problem, greedy) == -3.0
     content = json.loads((tmp_path / "proof.json").read_text())
     content["tuples"], content["cost"] = worse.tuples.tolist(), "-2.5"
     lines = check.check(exact_problem(problem), json.dumps(content))
     assert lines[0] == "feasible, cost -2.500000000" and "gap 0.5" in lines[1]
 
 
-def test_too_few_nodes_leave_a_gap(tmp_path):
-    problem = odd_cycle()
-    bound = write_proof(tmp_path / "proof.json", problem, assoc.assign(problem), nodes=1)
-    assert bound == pytest.approx(-4.25, abs=1e-6)  # the bound of the linear program
+@pytest.mark.parametrize("limit", [{"nodes": 1}, {"time_limit": 1e-9}])
+def test_too_few_nodes_and_too_little_time_leave_a_gap(tmp_path, limit):
+    problem = branched()
+    solution = assoc.assign(problem)
+    bound = write_proof(tmp_path / "proof.json", problem, solution, **limit)
+    assert solution.cost - 2.0 < bound < solution.cost - 0.001
+    done = json.loads((tmp_path / "proof.json").read_text())
+    assert f"gap {solution.cost - bound:.6f}" in check.check(exact_problem(problem), json.dumps(done))[1]
 
 
 def test_the_file_alone_checks_what_the_package_writes(tmp_path):
@@ -116,23 +130,25 @@ def test_the_bound_is_that_of_fractions():
     packing = prepare(problem).packing
     u = LinearProgram(packing).solve().duals.tolist()
     exact = exact_problem(problem)
-    ((rows, columns),) = check.components(exact)
+    ((rows, columns),) = check.components(exact.rows, exact.columns)
     values = {row: check.number(repr(one)) for row, one in zip(rows, u, strict=True)}
     total = {row: Fraction(one) for row, one in zip(rows, map(repr, u), strict=True)}
     for cost, own in columns:
         lack = Fraction(cost, 10**60) - sum(total[row] for row in own)
         total[own[0]] += min(lack, Fraction(0))
-    assert Fraction(check.leaf_bound(columns, rows, exact.needed, values) or 0, 10**60) == sum(total.values())
+    assert Fraction(check.bounded(columns, exact.needed, values, {}) or 0, 10**60) == sum(total.values())
 
 
 @pytest.fixture(scope="module")
 def valid(tmp_path_factory):
-    """A proof with a tree, beside components that need none."""
-    tuples = [[1, 1, 0], [0, 1, 1], [1, 0, 1], [2, 2, 2], [2, 0, 2], [3, 3, 0]]
-    problem = assoc.AssignmentProblem(tuples, [-3.25, -3.5, -2.75, -8.0, -1.0, -0.5], [3, 3, 3])
+    """A proof with two stages, and a tree with a cut, beside components that need none."""
+    problem = branched()
     path = tmp_path_factory.mktemp("proof") / "proof.json"
-    assert write_proof(path, problem, assoc.assign(problem)) == pytest.approx(-12.0)
-    return exact_problem(problem), json.loads(path.read_text())
+    assert write_proof(path, problem, assoc.assign(problem)) == -20.04 == float(exact_optimum(problem))
+    proof = json.loads(path.read_text())
+    assert len(proof["multipliers"]) == 2 and len(proof["trees"]) == 1
+    assert len(proof["trees"][0]["cuts"]) == 1 and len(proof["trees"][0]["nodes"]) == 3
+    return exact_problem(problem), proof
 
 
 def replaced(*keys: object, by: object):
@@ -172,33 +188,47 @@ TREE = ("trees", 0, "nodes")
 SPOILED = {
     "another problem": (replaced("problem", by="0" * 64), "for another problem"),
     "no problem": (removed("problem"), "for another problem"),
-    "a multiplier too low": (raised("multipliers", 0, 1, by=-1.0), "gives the bound"),
-    "a multiplier of a lonely row": (raised("multipliers", 2, 2, by=-1e-9), "gives the bound"),
-    "a multiplier missing": (removed("multipliers", 1, 0), "expected a list of 3"),
-    "a sensor missing": (removed("multipliers", 1), "expected a list of 3"),
-    "a multiplier that is no number": (replaced("multipliers", 0, 0, by="x"), "expected a decimal number"),
-    "a multiplier of infinity": (replaced("multipliers", 0, 0, by=float("inf")), "expected a decimal number"),
-    "a multiplier that is nothing": (replaced("multipliers", 0, 0, by=None), "expected a decimal number"),
-    "a huge exponent": (replaced("multipliers", 0, 0, by="1e99999999"), "expected a decimal number"),
+    "no stage": (replaced("multipliers", by=[]), "expected a list"),
+    "the first stage left out": (removed("multipliers", 0), "not those of a component"),
+    "the second stage left out": (removed("multipliers", 1), "not those of a component"),
+    "the first stage too weak": (raised("multipliers", 0, 0, 1, by=-1.0), "not those of a component"),
+    "a multiplier too low": (raised("multipliers", 1, 1, 3, by=-1.0), "gives the bound"),
+    "a multiplier missing": (removed("multipliers", 0, 1, 0), "expected a list of 4"),
+    "a sensor missing": (removed("multipliers", 1, 1), "expected a list of 3"),
+    "a multiplier that is no number": (replaced("multipliers", 0, 0, 0, by="x"), "expected a decimal number"),
+    "a multiplier of infinity": (replaced("multipliers", 0, 0, 0, by=float("inf")), "expected a decimal number"),
+    "a multiplier that is nothing": (replaced("multipliers", 0, 0, 0, by=None), "expected a decimal number"),
+    "a huge exponent": (replaced("multipliers", 0, 0, 0, by="1e99999999"), "expected a decimal number"),
     "a leaf's multiplier too low": (raised(*TREE, 1, "multipliers", 0, by=-1.0), "gives the bound"),
+    "a leaf's multiplier too high": (raised(*TREE, 2, "multipliers", 4, by=+9.0), "gives the bound"),
     "a leaf without multipliers": (removed(*TREE, 1, "multipliers"), "must have a multiplier"),
     "a leaf with too few": (removed(*TREE, 1, "multipliers", 0), "must have a multiplier"),
     "a branch left out": (removed(*TREE, 2), "lacks node"),
     "the tree left out": (removed("trees", 0), "gives the bound"),
     "the tree empty": (replaced(*TREE, by=[]), "lacks node"),
-    "a child that is its own parent": (replaced(*TREE, 0, "children", by=[0, 1]), "come after it"),
-    "one child for both answers": (replaced(*TREE, 0, "children", by=[1, 1]), "gives the bound"),
+    "a child that is its own parent": (replaced(*TREE, 0, "children", by=[0, 1]), "of its own after it"),
+    "one child for both answers": (replaced(*TREE, 0, "children", by=[1, 1]), "of its own after it"),
     "the answers exchanged": (replaced(*TREE, 0, "children", by=[2, 1]), "gives the bound"),
     "one child": (replaced(*TREE, 0, "children", by=[1]), "expected a list of 2"),
     "a pair of one row": (replaced(*TREE, 0, "pair", by=[[1, 1], [1, 1]]), "must name two rows"),
-    "a pair elsewhere": (replaced(*TREE, 0, "pair", by=[[1, 1], [2, 2]]), "must name two rows"),
-    "a row that is not there": (replaced("trees", 0, "rows", by=[[1, 1], [2, 1], [3, 9]]), "not those of a component"),
+    "a pair elsewhere": (replaced(*TREE, 0, "pair", by=[[1, 1], [2, 4]]), "must name two rows"),
+    "a cut for a row": (replaced(*TREE, 0, "pair", by=[[0, 0], [1, 1]]), "must name two rows"),
+    "a cut of an even set": (removed("trees", 0, "cuts", 0, 0), "does not follow"),
+    "a cut with a row twice": (replaced("trees", 0, "cuts", 0, 0, by=[1, 4]), "does not follow"),
+    "a cut of rows elsewhere": (replaced("trees", 0, "cuts", 0, 0, by=[2, 4]), "does not follow"),
+    "another cut": (replaced("trees", 0, "cuts", 0, 0, by=[1, 2]), "gives the bound"),
+    "a cut left out": (replaced("trees", 0, "cuts", by=[]), "must have a multiplier"),
+    "a cut that earns": (replaced(*TREE, 1, "multipliers", -1, by=3.735), "gives the bound"),
+    "no cuts": (removed("trees", 0, "cuts"), "expected a list"),
+    "a target too high": (replaced("trees", 0, "target", by="-14"), "gives the bound"),
+    "no target": (removed("trees", 0, "target"), "expected a decimal number"),
+    "a row that is not there": (replaced("trees", 0, "rows", 0, by=[3, 9]), "not those of a component"),
     "a tree of fewer rows": (removed("trees", 0, "rows", 0), "not those of a component"),
-    "a wrong cost": (replaced("cost", by="-12.5"), "the solution costs"),
-    "a bound above what is proved": (replaced("bound", by="-11.9"), "gives the bound"),
+    "a wrong cost": (replaced("cost", by="-20.5"), "the solution costs"),
+    "a bound above what is proved": (replaced("bound", by="-20.03"), "gives the bound"),
     "a tuple twice": (lambda proof: proof["tuples"].append(proof["tuples"][0]), "twice"),
     "a tuple left out": (removed("tuples", 0), "does not use measurement"),
-    "a tuple of another problem": (replaced("tuples", 0, by=[3, 3, 3]), "not in the problem"),
+    "a tuple of another problem": (replaced("tuples", 0, by=[3, 3, 1]), "not in the problem"),
     "a tuple that is no list": (replaced("tuples", 0, by=7), "expected a list"),
     "another format": (replaced("format", by="proof"), "expected the format"),
     "a later version": (replaced("version", by=2), "expected the format"),
@@ -217,20 +247,38 @@ def test_spoiled_proofs_are_refused(valid, how):
 
 
 def test_no_multipliers_prove_more_than_the_optimum(valid):
+    """Nor do wrong targets and cuts: whatever a proof says that the checker accepts is true."""
     problem, proof = valid
     rng = np.random.default_rng(0)
-    for _ in range(200):
+    worse = check.number("-19.9")
+    proved = 0
+    for _ in range(400):
         other = copy.deepcopy(proof)
-        for values in (*other["multipliers"], *(node.get("multipliers", []) for node in other["trees"][0]["nodes"])):
-            values[:] = [value + rng.normal(0.0, rng.choice([1e-9, 1.0, 100.0])) for value in values]
-        other.pop("bound")
+        (tree,) = other["trees"]
+        stages = [values for stage in other["multipliers"] for values in stage]
+        for values in (*stages, *(node.get("multipliers", []) for node in tree["nodes"])):
+            if rng.random() < 0.3:
+                values[:] = [value + rng.normal(0.0, rng.choice([1e-9, 0.1, 1.0, 100.0])) for value in values]
+        if rng.random() < 0.5:
+            tree["target"] = str(-12.91 + rng.choice([-1.0, 0.004, 0.5, 10.0]))
+        if rng.random() < 0.5:
+            size = rng.choice([1, 3, 5, 7])
+            tree["cuts"] = [[tree["rows"][i] for i in rng.permutation(len(tree["rows"]))[:size]]]
         text = json.loads(json.dumps(other), parse_float=str, parse_int=str)
-        assert check.proved(problem, text) <= check.number("-12")
+        # as the proof of a worse solution, whose target leaves it more room
+        for target in (check.number("-20.04"), worse):
+            try:
+                bound = check.proved(problem, text, target)
+            except check.RefusedError:
+                continue
+            proved += 1
+            assert bound <= check.number("-20.04")
+    assert proved > 50
 
 
 def test_a_proof_for_a_problem_with_another_cost_is_refused(valid):
     problem, proof = valid
-    costs = {one: cost + (one == (2, 2, 2)) for one, cost in problem.costs.items()}
+    costs = {one: cost + (one == (3, 3, 3)) for one, cost in problem.costs.items()}
     with pytest.raises(check.RefusedError, match="another problem"):
         check.check(check.Problem(problem.sizes, problem.dummies, costs), json.dumps(proof | {"cost": None}))
 

@@ -118,6 +118,7 @@ def test_ranking_returns_a_good_solution_when_none_is_proved():
     assert best.lower_bound <= best.cost < 0.7 * assign(problem, "greedy").cost
 
 
+@pytest.mark.slow
 def test_a_solver_that_gives_up_or_finds_little_is_helped_out(monkeypatch, problem, greedy_cost):
     from assoc.solvers import registry
 
@@ -161,6 +162,7 @@ def test_clusters_and_distinct_tuples():
         assert np.array_equal(tuples[place], problem.tuples)
 
 
+@pytest.mark.slow
 def test_greedy_choice_is_made_first_on_large_problems_alone(problem):
     run = Run(0, time_limit=5.0)
     small = ghosts(20, 500)

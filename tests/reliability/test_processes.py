@@ -129,7 +129,8 @@ def test_two_first_runs_at_once(tmp_path):
     assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
 
 
-@sample("suffix", ["*.nbc", "*.nbi"], every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["*.nbc", "*.nbi"])
 def test_a_cache_cut_short_is_made_anew(tmp_path, suffix):
     folder = copied(tmp_path)
     first_run(folder).communicate(timeout=60)
@@ -140,6 +141,7 @@ def test_a_cache_cut_short_is_made_anew(tmp_path, suffix):
         assert (again.communicate(timeout=60)[1], again.returncode) == ("", 0)
 
 
+@pytest.mark.slow
 def test_a_cache_on_a_full_disk(tmp_path):
     """A kernel that cannot be kept is compiled all the same."""
     folder = copied(tmp_path)
@@ -173,6 +175,7 @@ def test_an_installation_that_cannot_be_written(tmp_path):
     assert os.listdir(temporary) == []
 
 
+@pytest.mark.slow
 def test_no_folder_for_temporary_files_either(tmp_path):
     """A kernel is compiled all the same where nothing at all can be written."""
     folder = copied(tmp_path / "site")

@@ -14,7 +14,7 @@ from llvmlite.binding import get_host_cpu_features
 
 from assoc._system.shipped import NEEDED
 from tests.release.kernels import PROCESSOR, pack
-from tests.sizes import few_or_all, sample
+from tests.sizes import few_or_all
 
 _PROGRAM = """
 import sys
@@ -90,7 +90,8 @@ def spoil_code(path: Path) -> None:
         path.write_bytes(path.read_bytes()[:-100])
 
 
-@few_or_all("what", "sorting", "both")
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["both"])
 def test_nothing_is_compiled(made, tmp_path, what):
     folder, answer = made(what)
     assert solved(folder, tmp_path, what) == (0, answer)
@@ -104,7 +105,8 @@ def test_the_same_bytes_as_compiled_here(made, tmp_path, what):
     assert answer == made(what)[1]
 
 
-@sample("spoil", [spoil_version, spoil_code], every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("spoil", [spoil_version, spoil_code])
 def test_what_does_not_fit_is_compiled(kernels, tmp_path, spoil):
     folder, answer = kernels
     other = tmp_path / "kernels"

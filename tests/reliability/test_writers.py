@@ -81,6 +81,7 @@ def test_a_full_disk_and_then_room_again(every, disk):
         assert outcome(every[name], disk / "out") == ("", ["out"], "new"), name
 
 
+@pytest.mark.slow
 def test_a_read_only_disk(every, disk):
     (disk / "out").write_text("old")
     assert mount("-o", "remount,ro", disk)

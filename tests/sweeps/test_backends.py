@@ -202,6 +202,7 @@ def test_a_cluster_gives_the_same_and_survives_the_loss_of_its_workers(
     assert counts.new == slow.size == len(load(tmp_path / "s")) and same(tmp_path / "s", expected)
 
 
+@pytest.mark.slow
 def test_a_lost_scheduler_is_one_clear_line(slow, tmp_path, scheduler, start_worker):
     def lose(counts):
         if counts.new >= 20 and not lost:

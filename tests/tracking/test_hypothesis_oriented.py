@@ -44,6 +44,7 @@ def test_all_hypotheses_of_two_scans_and_their_probabilities(seed):
     np.testing.assert_allclose(own.probabilities, p / p.sum(), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_best_of_three_scans(seed):
     times, scans, best = enumerated(seed)

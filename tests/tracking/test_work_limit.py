@@ -10,7 +10,6 @@ from assoc import simulation
 from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
 from assoc.tracking import tracker as module
 from assoc.tracking.filter_choice import two_speeds
-from tests.sizes import sample
 
 
 @pytest.fixture
@@ -25,7 +24,8 @@ def rows(tracker, scene):
     return table.to_frame().to_csv(), [one.assigned[0].tolist() for one in decisions]
 
 
-@sample("name", sorted(TRACKERS), every=6)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(TRACKERS))
 def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
     crowd = simulation.simulate("crowd", 1, targets=12, scans=3, width=400.0, height=300.0)
     quick = rows(TRACKERS[name].for_scene(crowd), crowd)

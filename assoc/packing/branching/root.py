@@ -35,12 +35,15 @@ class Root(NamedTuple):
         Whether a row may stay uncovered; all cuts may.
     variable : int32 array, duals : float array, shape (rows of the program,)
         A basis and its multipliers.
+    sets : bool array, shape (cuts, R)
+        The odd sets of rows of which the cuts are made.
     """
 
     program: Program
     slack: NDArray[np.bool_]
     variable: NDArray[np.int32]
     duals: Floats
+    sets: NDArray[np.bool_]
 
 
 def plain_root(packing: Packing, duals: Floats) -> Root:
@@ -50,7 +53,7 @@ def plain_root(packing: Packing, duals: Floats) -> Root:
     program = program_of(packing.arrays)
     if packing.granularity:
         program = program._replace(weights=_lowered(packing))
-    return Root(program, packing.slack, anchors, duals)
+    return Root(program, packing.slack, anchors, duals, np.zeros((0, rows), dtype=np.bool_))
 
 
 def _lowered(packing: Packing) -> Floats:
@@ -107,7 +110,7 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
         status, _ = solve_dual(program, allowed, basis, effort)
         before, bound = bound, _bound(program, basis)
         in_vain = in_vain + 1 if bound - before < _GAIN * (cutoff - bound) else 0
-    return Root(program, allowed.slack, basis.variable, basis.duals)
+    return Root(program, allowed.slack, basis.variable, basis.duals, sets)
 
 
 def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], duals: Floats) -> Basis:
