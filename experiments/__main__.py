@@ -134,7 +134,7 @@ EXPERIMENTS = (
     Experiment(
         "metaheuristics.against_peers",
         "aco, genetic and tabu after seconds, other programs after a minute, on ghosts",
-        "with --publish experiments/results/metaheuristics.against_peers.json",
+        "a table on the terminal; with --publish a file beside the other results",
     ),
     Experiment(
         "metaheuristics.sweep",
