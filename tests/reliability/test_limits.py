@@ -21,6 +21,7 @@ from assoc.ranking.clusters import clusters_of, distinct
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
+from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
 from experiments.common.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
@@ -133,6 +134,18 @@ def test_a_solver_that_gives_up_or_finds_little_is_helped_out(monkeypatch, probl
     for solve in (give_up, take_nothing):
         monkeypatch.setitem(registry._REGISTERED, "poor", (parameters, solve))
         assert assign(fresh(problem), "poor", time_limit=5.0).cost == greedy_cost
+
+
+def test_searches_end_before_what_follows_them(problem):
+    packing = prepare(problem).packing
+    run = Run(0, time_limit=100.0)
+    prepare_fallback(packing, run)
+    assert 0.0 < run.reserve <= 50.0
+    assert run.remaining() < run.time_limit - run.reserve
+    # what takes longer to prepare than the limit is leaves half of it
+    short = Run(0, time_limit=1e-6)
+    prepare_fallback(packing, short)
+    assert short.reserve == 0.5e-6 and short.should_stop() and short.stopped_by == "time_limit"
 
 
 def test_sorting_as_numpy_does():
