@@ -1,0 +1,145 @@
+"""Reid's clusters: tracks that contend for measurements, with the hypotheses about them.
+
+What is outside of a cluster does not matter to it: the hypotheses about the whole scene are all combinations of one
+hypothesis of each cluster, and their log-probabilities add up. Clusters are merged when a measurement lies in gates of
+several, and fall apart when no two of their branches exclude each other across the parts.
+
+References
+----------
+D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Control 24, 1979, section III.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from assoc._types import Array
+
+
+class Cluster(NamedTuple):
+    """Hypotheses about some tracks, the best first."""
+
+    branches: Array
+    """Rows of the batch, ascending, each in some hypothesis; int64 (B,)."""
+    holds: Array
+    """Which branches each hypothesis believes in, bool (H, B)."""
+    weight: Array
+    """Log-probability of each, that of the best is 0; (H,)."""
+
+    @property
+    def best(self) -> Array:
+        """Branches of the best hypothesis."""
+        return self.branches[self.holds[0]]
+
+    @property
+    def probabilities(self) -> Array:
+        """Of the hypotheses, (H,)."""
+        p = np.exp(self.weight)
+        return np.asarray(p / p.sum())
+
+
+def cluster(branches: Array, holds: Array, weight: Array) -> Cluster:
+    """Make a cluster of hypotheses in any order; branches that none believes in are left out."""
+    order = np.argsort(-weight, kind="stable")
+    used = holds.any(axis=0)
+    return Cluster(branches[used], holds[np.ix_(order, used)], weight[order] - weight[order[0]])
+
+
+def linked(first: Array, second: Array, count: int) -> Array:
+    """Number of the connected part of each of `count` things, given pairs of them; parts by their first thing."""
+    links = coo_array((np.ones(len(first), dtype=np.bool_), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
+    """One cluster with the combinations of the hypotheses of several, clusters that share nothing.
+
+    Parameters
+    ----------
+    clusters : sequence of Cluster
+        At least one.
+    potential : array
+        What the coming measurements add at most to the log-probability for each row of the batch that a hypothesis
+        believes in. Of more than `most` combinations those stay that may become the best: a track in the making is less
+        likely than not until its second detection.
+    most : int
+        The most combinations.
+    """
+    if len(clusters) == 1:
+        return clusters[0]
+    total, picked = np.zeros(1), np.zeros((1, 0), dtype=np.int64)
+    for one in clusters:
+        promise = one.weight + one.holds @ potential[one.branches]
+        both = (total[:, None] + promise).ravel()
+        order = np.argsort(-both, kind="stable")[:most]
+        before, own = np.divmod(order, len(one.weight))
+        total, picked = both[order], np.column_stack([picked[before], own])
+    holds = np.concatenate([one.holds[picked[:, i]] for i, one in enumerate(clusters)], axis=1)
+    weight = np.sum([one.weight[picked[:, i]] for i, one in enumerate(clusters)], axis=0)
+    return cluster(np.concatenate([one.branches for one in clusters]), holds, weight)
+
+
+def parts(whole: Cluster, label: Array, score: Array) -> list[Cluster]:
+    """The clusters that a cluster falls apart into.
+
+    A hypothesis' log-probability is, up to a constant, the sum of the scores of its branches, and of what tracks that
+    are deleted have left behind. The parts of the hypotheses that are kept may be combined in more ways than are kept:
+    what was left out for its rank alone comes back.
+
+    Parameters
+    ----------
+    whole : Cluster
+    label : int array (B,)
+        The part of each branch; no two branches of different parts exclude each other.
+    score : array (B,)
+        Scores of the branches.
+    """
+    left_behind = whole.weight - whole.holds @ score
+    found = []
+    for number in np.unique(label):
+        own = np.flatnonzero(label == number)
+        holds, which = np.unique(whole.holds[:, own], axis=0, return_inverse=True)
+        rest = np.full(len(holds), -np.inf)
+        np.maximum.at(rest, which.ravel(), left_behind)
+        found.append(cluster(whole.branches[own], holds, holds @ score[own] + rest))
+    return found
+
+
+def without(whole: Cluster, gone: Array) -> Cluster:
+    """A cluster without some of its branches; hypotheses that differed in them alone are one."""
+    if not gone.any():
+        return whole
+    holds, which = np.unique(whole.holds[:, ~gone], axis=0, return_inverse=True)
+    weight = np.full(len(holds), -np.inf)
+    np.logaddexp.at(weight, which.ravel(), whole.weight)
+    return cluster(whole.branches[~gone], holds, weight)
+
+
+def limited(whole: Cluster, most: int, drop: float) -> Cluster:
+    """The best hypotheses of a cluster: at most so many, none this far below the best."""
+    kept = whole.weight[:most] >= -drop
+    if kept.all() and len(kept) == len(whole.weight):
+        return whole
+    rows = np.flatnonzero(kept)
+    return cluster(whole.branches, whole.holds[rows], whole.weight[rows])
+
+
+def agreeing(whole: Cluster, owner: Array) -> Cluster:
+    """The hypotheses that say of some measurements what the best one says.
+
+    Parameters
+    ----------
+    whole : Cluster
+    owner : int array (B, M)
+        What each branch says of M sensors: a number for the track and its measurement, 0: it was missed.
+    """
+    if len(whole.weight) == 1:
+        return whole
+    said = np.sort(whole.holds[:, :, None] * owner, axis=1)
+    same = (said == said[0]).all(axis=(1, 2))
+    return cluster(whole.branches, whole.holds[same], whole.weight[same])
