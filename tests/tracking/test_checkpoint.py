@@ -91,10 +91,10 @@ OF_TREES = {
     "bank.track_id": lambda a: a.update({"bank.track_id": a["bank.track_id"][::-1].copy()}),
 }
 OF_HYPOTHESES = {
-    "members": lambda a: a["members"].__setitem__(0, 10_000),
-    "lengths": lambda a: a["lengths"].__setitem__(0, -1),
+    "cluster_hypotheses": lambda a: a["cluster_hypotheses"].__setitem__(0, 0),
+    "cluster_branches": lambda a: a["cluster_branches"].__setitem__(0, 10_000),
+    "holds": lambda a: a.update(holds=a["holds"][1:]),
     "weight": lambda a: a["weight"].__setitem__(0, np.nan),
-    "line": lambda a: a["line"].__setitem__((0, 0), -1),
 }
 
 

@@ -80,19 +80,20 @@ def test_equation_2_1():
     np.testing.assert_allclose(own.probabilities, wanted / wanted.sum(), rtol=1e-9)
 
 
+def said_of_the_last_scan(own, rows):
+    return {(int(own._batch.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
+
+
 def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
     times, scans = plain.small_scans(np.random.default_rng(1))
     own = tracker(depth=2, max_hypotheses=50)
     final = []
     for time, z in zip(times, scans, strict=True):
         final += own.step(time, [z]).final
-        for rows in own._members:
+        for one in own._clusters:
             # every hypothesis agrees with the best on the scan before
-            column = {(int(own._batch.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
-            best = {
-                (int(own._batch.track_id[r]), int(own._history[r, 1])) for r in own._members[0] if own._history[r, 1]
-            }
-            assert column == best
+            said = [said_of_the_last_scan(own, one.branches[held]) for held in one.holds]
+            assert all(other == said[0] for other in said)
     assert [decision.scan for decision in final + list(own.flush())] == [0, 1, 2]
 
 

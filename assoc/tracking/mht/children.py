@@ -98,6 +98,8 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
     weight : array (C,)
         Log-probability, the largest first.
     """
+    # one layout, so that nothing is compiled twice
+    parents = Parents(np.ascontiguousarray(parents.holds), np.ascontiguousarray(parents.weight))
     parent, choice, weight = _rank(parents, meanings, most, drop)
     return parent, choice, weight
 

@@ -12,6 +12,7 @@ D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Co
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from assoc._types import Array
+
+# the hypotheses about one branch: it is there, or not
+_THERE_FIRST, _GONE_FIRST = np.array([[True], [False]]), np.array([[False], [True]])
 
 
 class Cluster(NamedTuple):
@@ -43,17 +47,54 @@ class Cluster(NamedTuple):
         return np.asarray(p / p.sum())
 
 
-def cluster(branches: Array, holds: Array, weight: Array) -> Cluster:
-    """Make a cluster of hypotheses in any order; branches that none believes in are left out."""
-    order = np.argsort(-weight, kind="stable")
+def cluster(branches: Array, holds: Array, weight: Array, most: int | None = None, drop: float = np.inf) -> Cluster:
+    """Make a cluster of hypotheses in any order.
+
+    At most `most` of them stay, none of a log-probability `drop` below the best; branches that none believes in do not.
+    """
+    if (weight[1:] > weight[:-1]).any():
+        order = np.argsort(-weight, kind="stable")
+        holds, weight = holds[order], weight[order]
+    last = int(np.searchsorted(-weight, drop - weight[0], side="right"))
+    last = last if most is None else min(last, most)
+    if last < len(weight):
+        holds, weight = holds[:last], weight[:last]
     used = holds.any(axis=0)
-    return Cluster(branches[used], holds[np.ix_(order, used)], weight[order] - weight[order[0]])
+    if not used.all():
+        branches, holds = branches[used], holds[:, used]
+    return Cluster(branches, holds, weight - weight[0])
+
+
+def doubted(branches: Array, odds: Array, drop: float) -> list[Cluster]:
+    """Clusters of one branch each, which may be or not: logarithms of the odds (N,), infinite where it is certain."""
+    found = []
+    for i, value in enumerate(odds.tolist()):
+        if value > drop:
+            found.append(Cluster(branches[i : i + 1], _THERE_FIRST[:1], np.zeros(1)))
+        elif value >= -drop:
+            holds = _THERE_FIRST if value >= 0.0 else _GONE_FIRST
+            found.append(Cluster(branches[i : i + 1], holds, np.array([0.0, -abs(value)])))
+    return found
+
+
+def odds_of(one: Cluster) -> float:
+    """Logarithm of the odds of a cluster of one branch, see `doubted`."""
+    if len(one.weight) == 1:
+        return np.inf
+    return float(one.weight[0] - one.weight[1]) * (1.0 if one.holds[0, 0] else -1.0)
 
 
 def linked(first: Array, second: Array, count: int) -> Array:
     """Number of the connected part of each of `count` things, given pairs of them; parts by their first thing."""
     links = coo_array((np.ones(len(first), dtype=np.bool_), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+def grouped(label: Array, parts: int) -> list[Array]:
+    """Numbers of the things of each of so many parts, ascending."""
+    order = np.argsort(label, kind="stable")
+    bounds = np.searchsorted(label[order], np.arange(parts + 1)).tolist()
+    return [order[first:last] for first, last in pairwise(bounds)]
 
 
 def merged(clusters: Sequence[Cluster], potential: Array, most: int) -> Cluster:
@@ -118,15 +159,6 @@ def without(whole: Cluster, gone: Array) -> Cluster:
     weight = np.full(len(holds), -np.inf)
     np.logaddexp.at(weight, which.ravel(), whole.weight)
     return cluster(whole.branches[~gone], holds, weight)
-
-
-def limited(whole: Cluster, most: int, drop: float) -> Cluster:
-    """The best hypotheses of a cluster: at most so many, none this far below the best."""
-    kept = whole.weight[:most] >= -drop
-    if kept.all() and len(kept) == len(whole.weight):
-        return whole
-    rows = np.flatnonzero(kept)
-    return cluster(whole.branches, whole.holds[rows], whole.weight[rows])
 
 
 def agreeing(whole: Cluster, owner: Array) -> Cluster:

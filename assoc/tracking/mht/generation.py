@@ -9,7 +9,7 @@ import numpy as np
 from assoc._system import memory
 from assoc._types import Array
 from assoc.tracking.mht.children import NEW, Meanings, Parents, best_children
-from assoc.tracking.mht.clusters import Cluster, cluster, limited, linked, merged
+from assoc.tracking.mht.clusters import Cluster, cluster, doubted, grouped, linked, merged, odds_of
 from assoc.tracking.mht.growth import Offers
 
 
@@ -40,44 +40,55 @@ def generated(
     own = np.repeat(np.arange(len(clusters)), [len(one.branches) for one in clusters])
     label = linked(own[offers.branch], len(clusters) + offers.measurement, len(clusters) + count)
     parts = int(label.max(initial=-1)) + 1
-    members = _grouped(label[: len(clusters)], parts)
-    measurements = _grouped(label[len(clusters) :], parts)
-    near = _grouped(label[own[offers.branch]], parts)
+    members = grouped(label[: len(clusters)], parts)
+    measurements = grouped(label[len(clusters) :], parts)
+    near = grouped(label[own[offers.branch]], parts)
     birth, birth_row = np.full(count, -np.inf), np.zeros(count, dtype=np.int64)
     birth[born], birth_row[born] = offers.births.score, total + pairs + np.arange(len(born))
     # what a branch can add to a log-probability at most
     potential = offers.missed.copy()
     np.maximum.at(potential, offers.branch, offers.gain)
-    found = []
-    for group in range(parts):
-        there = [clusters[i] for i in members[group].tolist()]
-        z, pair = measurements[group], near[group]
-        if not there:
-            if birth[z[0]] > -np.inf:
-                weight = np.array([birth[z[0]], 0.0])
-                found.append(limited(cluster(birth_row[z], np.array([[True], [False]]), weight), most, drop))
+    found, alone, odds = [], [], []
+    for there, z, pair in zip(members, measurements, near, strict=True):
+        if not len(there):
+            alone.append(birth_row[z[0]])
+            odds.append(birth[z[0]])
             continue
-        whole = merged(there, potential, most)
-        weight = whole.weight + whole.holds @ offers.missed[whole.branches]
-        if not len(z):
-            found.append(limited(cluster(whole.branches, whole.holds, weight), most, drop))
-            continue
-        pair = pair[np.lexsort((offers.branch[pair], offers.measurement[pair]))]
-        # merging may have left out all hypotheses that believe in a branch
-        pair = pair[np.isin(offers.branch[pair], whole.branches)]
-        track = np.searchsorted(whole.branches, offers.branch[pair])
-        first = np.searchsorted(offers.measurement[pair], np.append(z, count))
-        gain = offers.gain[pair] - offers.missed[offers.branch[pair]]
-        memory.require(
-            whole.holds.nbytes + most * (4.0 * len(z) + 100.0),
-            f"max_hypotheses = {most}: {len(whole.weight)} hypotheses",
-            "keep fewer",
-        )
-        parents = Parents(whole.holds, weight)
-        parent, choice, weight = best_children(parents, Meanings(first, track, gain, birth[z]), most, drop)
-        rows = np.concatenate([whole.branches, total + pair, birth_row[z]])
-        found.append(cluster(rows, _held(whole.holds[parent], choice, track), weight))
-    return found
+        whole = merged([clusters[i] for i in there.tolist()], potential, most)
+        if len(z):
+            pair = pair[np.lexsort((offers.branch[pair], offers.measurement[pair]))]
+            found.append(_children(whole, offers, z, pair, birth[z], birth_row[z], most, drop))
+        elif len(whole.branches) == 1:
+            alone.append(whole.branches[0])
+            odds.append(odds_of(whole) + offers.missed[whole.branches[0]])
+        else:
+            weight = whole.weight + whole.holds @ offers.missed[whole.branches]
+            found.append(cluster(whole.branches, whole.holds, weight, most, drop))
+    return found + doubted(np.array(alone, dtype=np.int64), np.array(odds), drop)
+
+
+def _children(
+    whole: Cluster, offers: Offers, z: Array, pair: Array, birth: Array, birth_row: Array, most: int, drop: float
+) -> Cluster:
+    """The children of a cluster's hypotheses by the measurements z (their births: score and row) in its gates."""
+    branch = offers.branch[pair]
+    # merging may have left out all hypotheses that believe in a branch
+    track = np.searchsorted(whole.branches, branch)
+    there = np.append(whole.branches, -1)[track] == branch
+    if not there.all():
+        pair, branch, track = pair[there], branch[there], track[there]
+    first = np.searchsorted(offers.measurement[pair], np.append(z, z[-1] + 1))
+    memory.require(
+        whole.holds.nbytes + most * (4.0 * len(z) + 100.0),
+        f"max_hypotheses = {most}: {len(whole.weight)} hypotheses",
+        "keep fewer",
+    )
+    missed = offers.missed[whole.branches]
+    parents = Parents(whole.holds, whole.weight + whole.holds @ missed)
+    meanings = Meanings(first, track, offers.gain[pair] - missed[track], birth)
+    parent, choice, weight = best_children(parents, meanings, most, drop)
+    rows = np.concatenate([whole.branches, len(offers.missed) + pair, birth_row])
+    return cluster(rows, _held(whole.holds[parent], choice, track), weight)
 
 
 def _held(holds: Array, choice: Array, track: Array) -> Array:
@@ -92,9 +103,3 @@ def _held(holds: Array, choice: Array, track: Array) -> Array:
     child, measurement = np.nonzero(choice == NEW)
     all_held[child, branches + len(track) + measurement] = True
     return all_held
-
-
-def _grouped(label: Array, parts: int) -> list[Array]:
-    """Numbers of the things of each part, ascending."""
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.searchsorted(label[order], np.arange(1, parts)))

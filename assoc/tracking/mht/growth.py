@@ -147,9 +147,7 @@ class AtOnce(Growth):
         self._offered = [self._states, pairs.states, begun]
         births = Births(_single(np.flatnonzero(fit), s, self.rows.shape[1]), score, np.lexsort(positions.T))
         missed = np.full(len(self.rows), self._terms.miss[s])
-        return Offers(
-            missed, pairs.track, pairs.measurement, pairs.log_likelihood + self._terms.detection[s], births
-        )
+        return Offers(missed, pairs.track, pairs.measurement, pairs.log_likelihood + self._terms.detection[s], births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         self._states = concatenate(self._offered)[kept]

@@ -29,12 +29,16 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
 from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
+from assoc.tracking.mht.crossed_births import with_births
 from assoc.tracking.mht.generation import generated
-from assoc.tracking.mht.growth import AtOnce, Growth, InOrder
+from assoc.tracking.mht.growth import AtOnce, Births, Growth, InOrder
 from assoc.tracking.mht.pruning import MOST_SCANS
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
+
+_MOST_CROSSINGS = 100
+"""The most new targets in a scan where several sensors together tell a position."""
 
 
 @doors
@@ -99,7 +103,9 @@ class HypothesisOrientedMHT(Tracker):
     def _adopt(self, batch: TrackBatch) -> None:
         super()._adopt(batch)
         self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
-        self._clusters = [cluster(np.array([row]), np.ones((1, 1), dtype=np.bool_), np.zeros(1)) for row in range(len(batch))]
+        self._clusters = [
+            cluster(np.array([row]), np.ones((1, 1), dtype=np.bool_), np.zeros(1)) for row in range(len(batch))
+        ]
 
     def _step(self, scan: Scan) -> Step:
         # hypotheses of equal weight are kept by number: measurements are numbered by value, so that the order in which
@@ -149,23 +155,47 @@ class HypothesisOrientedMHT(Tracker):
             growth = InOrder(self._batch, self._timed(scan), self.terms)
         for s in growth.order:
             offers = growth.offers(s)
-            births = offers.births
-            new_ids = np.empty(len(births.turn), dtype=np.int64)
-            new_ids[births.turn] = self._new_ids(len(births.turn))
-            most, drop = self.max_hypotheses, self.hypothesis_drop
-            self._clusters = generated(self._clusters, offers, births.rows[:, s] - 1, len(scan.measurements[s]), most, drop)
+            new_ids = self._ids_of(offers.births)
+            limits = self.max_hypotheses, self.hypothesis_drop
+            born, count = offers.births.rows[:, s] - 1, len(scan.measurements[s])
+            self._clusters = generated(self._clusters, offers, born, count, *limits)
             growth.take(s, offers, self._renumber(), new_ids)
+        if isinstance(growth, AtOnce):
+            self._begin_crossed(scan, growth)
         return growth
+
+    def _begin_crossed(self, scan: Scan, growth: AtOnce) -> None:
+        """New targets of what the best hypothesis' confirmed tracks leave of sensors that start none alone."""
+        rows = self._best
+        sure = np.append(self._batch.confirmed, False)[growth.origin[rows]]
+        taken = growth.rows[rows[sure]]
+        free = [np.isin(np.arange(1, size + 1), taken[:, s], invert=True) for s, size in enumerate(scan.sizes.tolist())]
+        found = self._crossings(scan, free)
+        if found is None:
+            return
+        several, scores = found
+        # by far the most are ghosts
+        best = np.argsort(-scores, kind="stable")[:_MOST_CROSSINGS]
+        births = Births(several.rows[best], scores[best], np.lexsort(several.positions[best].T))
+        states = self.initiation.start(self.filter, several.positions[best], several.covariances[best])
+        most, drop = self.max_hypotheses, self.hypothesis_drop
+        self._clusters = with_births(self._clusters, growth.rows, births, scan.sizes, most, drop)
+        growth.take_crossings(births, states, self._renumber(), self._ids_of(births))
+
+    def _ids_of(self, births: Births) -> Array:
+        ids = np.empty(len(births.turn), dtype=np.int64)
+        ids[births.turn] = self._new_ids(len(births.turn))
+        return ids
 
     def _renumber(self) -> Array:
         """Give the branches of the clusters new rows, cluster after cluster; their rows before."""
-        self._clusters = [one for one in self._clusters if len(one.branches)]
-        kept = np.concatenate([np.zeros(0, dtype=np.int64), *(one.branches for one in self._clusters)])
-        ends = np.cumsum([len(one.branches) for one in self._clusters]).tolist()
-        self._clusters = [
-            one._replace(branches=np.arange(end - len(one.branches), end))
-            for one, end in zip(self._clusters, ends, strict=True)
-        ]
+        clusters = [one for one in self._clusters if len(one.branches)]
+        kept = np.concatenate([np.zeros(0, dtype=np.int64), *(one.branches for one in clusters)])
+        rows, end = np.arange(len(kept)), 0
+        self._clusters = []
+        for branches, holds, weight in clusters:
+            begin, end = end, end + len(branches)
+            self._clusters.append(Cluster(rows[begin:end], holds, weight))
         return kept
 
     def _keep(self, clusters: list[Cluster]) -> None:
@@ -178,7 +208,10 @@ class HypothesisOrientedMHT(Tracker):
         """End the hypotheses that disagree with the best of their cluster about the oldest scan of the window."""
         said = self._history[:, -len(self.sensors) :].astype(np.int64)
         owner = np.where(said > 0, self._batch.track_id[:, None] * (said.max(initial=0) + 1) + said, 0)
-        self._keep([agreeing(one, owner[one.branches]) for one in self._clusters])
+        decided = owner.any(axis=1)
+        self._keep(
+            [agreeing(one, owner[one.branches]) if decided[one.branches].any() else one for one in self._clusters]
+        )
 
     def _delete_tracks(self, time: float) -> None:
         """Delete the tracks all of whose branches say so."""
@@ -200,7 +233,8 @@ class HypothesisOrientedMHT(Tracker):
         found = []
         for one in self._clusters:
             own = label[one.branches]
-            found += [one] if (own == own[0]).all() else parts(one, own, self._batch.score[one.branches])
+            together = len(own) == 1 or bool((own == own[0]).all())
+            found += [one] if together else parts(one, own, self._batch.score[one.branches])
         self._keep(found)
 
     def _confirm(self) -> None:
