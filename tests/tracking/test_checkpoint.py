@@ -106,7 +106,9 @@ OF_HYPOTHESES = {
         ("mht-hypothesis", OF_MHT),
         ("mht", OF_TREES),
         ("mht-hypothesis", OF_HYPOTHESES),
-    ], every=3)
+    ],
+    every=3,
+)
 def test_each_lie_is_named(name, lies, tmp_path):
     tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
     for field, lie in lies.items():

@@ -1,9 +1,9 @@
-"""The m best children of a cluster's hypotheses by the measurements of one sensor: Murty's partition, one queue for all.
+"""The m best children of a cluster's hypotheses by one sensor's measurements: Murty's partition, one queue for all.
 
-A child says of each measurement: false alarm, a new target, or one of its parent's tracks, each track at most once. That
-is a two-dimensional assignment problem for each parent. All parents share one queue, so that a parent whose best child
-is not among the m best of all costs no more than its bound (Cox and Miller). A child is split by its measurements in
-turn: those before are fixed, the one in turn may not be what it was; and is solved when it comes first.
+A child says of each measurement: false alarm, a new target, or one of its parent's tracks, each track at most once.
+That is a two-dimensional assignment problem for each parent. All parents share one queue, so that a parent whose best
+child is not among the m best of all costs no more than its bound (Cox and Miller). A child is split by its measurements
+in turn: those before are fixed, the one in turn may not be what it was; and is solved when it comes first.
 
 References
 ----------
@@ -98,8 +98,6 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
     weight : array (C,)
         Log-probability, the largest first.
     """
-    # one layout, so that nothing is compiled twice
-    parents = Parents(np.ascontiguousarray(parents.holds), np.ascontiguousarray(parents.weight))
     parent, choice, weight = _rank(parents, meanings, most, drop)
     return parent, choice, weight
 

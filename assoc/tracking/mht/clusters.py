@@ -6,7 +6,7 @@ several, and fall apart when no two of their branches exclude each other across 
 
 References
 ----------
-D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Control 24, 1979, section III.
+D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Control 24, 1979.
 """
 
 from __future__ import annotations
@@ -62,16 +62,18 @@ def cluster(branches: Array, holds: Array, weight: Array, most: int | None = Non
     used = holds.any(axis=0)
     if not used.all():
         branches, holds = branches[used], holds[:, used]
-    return Cluster(branches, holds, weight - weight[0])
+    # in one layout, so that sums are the same to the last bit wherever it comes from
+    return Cluster(branches, np.ascontiguousarray(holds), weight - weight[0])
 
 
-def doubted(branches: Array, odds: Array, drop: float) -> list[Cluster]:
+def doubted(branches: Array, odds: Array, most: int, drop: float) -> list[Cluster]:
     """Clusters of one branch each, which may be or not: logarithms of the odds (N,), infinite where it is certain."""
     found = []
+    drop = drop if most > 1 else 0.0
     for i, value in enumerate(odds.tolist()):
         if value > drop:
             found.append(Cluster(branches[i : i + 1], _THERE_FIRST[:1], np.zeros(1)))
-        elif value >= -drop:
+        elif value >= -drop and most > 1:
             holds = _THERE_FIRST if value >= 0.0 else _GONE_FIRST
             found.append(Cluster(branches[i : i + 1], holds, np.array([0.0, -abs(value)])))
     return found
@@ -86,7 +88,7 @@ def odds_of(one: Cluster) -> float:
 
 def linked(first: Array, second: Array, count: int) -> Array:
     """Number of the connected part of each of `count` things, given pairs of them; parts by their first thing."""
-    links = coo_array((np.ones(len(first), dtype=np.bool_), (first, second)), shape=(count, count))
+    links = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 

@@ -64,7 +64,7 @@ def generated(
         else:
             weight = whole.weight + whole.holds @ offers.missed[whole.branches]
             found.append(cluster(whole.branches, whole.holds, weight, most, drop))
-    return found + doubted(np.array(alone, dtype=np.int64), np.array(odds), drop)
+    return found + doubted(np.array(alone, dtype=np.int64), np.array(odds), most, drop)
 
 
 def _children(

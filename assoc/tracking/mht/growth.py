@@ -1,8 +1,8 @@
 """How the branches of a tracker grow by a scan, sensor by sensor: what may happen next, and what was kept of it.
 
-After each sensor the candidates are the branches before, missed, then the pairs of a branch and a measurement, then new
-targets; the tracker says which rows of them are kept. Whether measurements are of one instant or have times of their own
-matters here and nowhere else.
+After each sensor the candidates are the branches before, missed, then the pairs of a branch and a measurement, then
+new targets; the tracker says which rows of them are kept. Whether measurements are of one instant or have times of
+their own matters here and nowhere else.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ class InOrder(Growth):
         seen = self.rows.any(axis=1)
         last = np.where(seen, followed.when, np.nan)
         batch = self._batch(self._timed.at_end(followed, self.origin), followed.first, last)
-        return batch, self._looked[self._anchor].any(axis=1)
+        return batch, np.asarray(self._looked[self._anchor].any(axis=1))
 
 
 def _single(numbers: Array, s: int, sensors: int) -> Array:

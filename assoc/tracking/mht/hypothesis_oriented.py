@@ -208,7 +208,7 @@ class HypothesisOrientedMHT(Tracker):
         """End the hypotheses that disagree with the best of their cluster about the oldest scan of the window."""
         said = self._history[:, -len(self.sensors) :].astype(np.int64)
         owner = np.where(said > 0, self._batch.track_id[:, None] * (said.max(initial=0) + 1) + said, 0)
-        decided = owner.any(axis=1)
+        decided = np.asarray(owner.any(axis=1))
         self._keep(
             [agreeing(one, owner[one.branches]) if decided[one.branches].any() else one for one in self._clusters]
         )
@@ -282,15 +282,16 @@ class HypothesisOrientedMHT(Tracker):
         count = len(arrays[f"{PREFIX}track_id"])
         check_window(arrays, count, len(self.sensors), self.depth)
         hypotheses, branches = arrays["cluster_hypotheses"], arrays["cluster_branches"]
-        good = ((hypotheses >= 1) & (hypotheses <= self.max_hypotheses)).all()
-        require_field(good, "cluster_hypotheses", f"1 to {self.max_hypotheses} hypotheses of each cluster")
-        good = len(branches) == len(hypotheses) and (branches >= 1).all() and (branches <= count).all()
-        require_field(good and int(branches.sum()) == count, "cluster_branches", "the branches of each cluster")
+        some = ((hypotheses >= 1) & (hypotheses <= self.max_hypotheses)).all()
+        require_field(some, "cluster_hypotheses", f"1 to {self.max_hypotheses} hypotheses of each cluster")
+        all_of_them = branches.shape == hypotheses.shape and ((branches >= 1) & (branches <= count)).all()
+        all_of_them = all_of_them and int(branches.sum()) == count
+        require_field(all_of_them, "cluster_branches", "how many branches each cluster has")
         size = int((hypotheses * branches).sum())
         require_field(len(arrays["holds"]) == size, "holds", "whether each hypothesis holds each branch")
         weight = arrays["weight"]
-        good = len(weight) == int(hypotheses.sum()) and np.isfinite(weight).all()
-        require_field(good, "weight", "a number for each hypothesis")
+        weighed = len(weight) == int(hypotheses.sum()) and np.isfinite(weight).all()
+        require_field(weighed, "weight", "a number for each hypothesis")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)
