@@ -81,13 +81,13 @@ def test_rounding_is_no_improvement(solver):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("temper", ["normal", "near ties", "large gap"])
-def test_thousands_of_small_parts_beside_a_hard_one(temper):
+def test_thousands_of_small_parts_beside_a_hard_one():
     rng = np.random.default_rng(45)
     tuples, sizes, dummy = many_parts(rng, 2000)
-    problem = AssignmentProblem(tuples, TEMPERS[temper](rng, tuples, sizes), sizes, dummy=dummy)
-    ways = [name for name in (*WAYS, *LISTED) if name != "tensor"]
-    assert judge(Case(problem, "many parts", temper, 0), ways) == []
+    problem = AssignmentProblem(tuples, TEMPERS["near ties"](rng, tuples, sizes), sizes, dummy=dummy)
+    # a dense tensor has no room; tours of the paper's ants through thousands of measurements take a minute
+    ways = [name for name in QUICK if name not in ("tensor", "aco paper")]
+    assert judge(Case(problem, "many parts", "near ties", 0), ways) == []
 
 
 def test_parts_are_counted_as_the_whole_is():
