@@ -8,7 +8,7 @@ from assoc.metrics.gospa import Gospa, gospa, gospa_over_time, mean_gospa
 from assoc.metrics.identity import Identity, identity, label_switches
 from assoc.metrics.ospa import Ospa, ospa, ospa_over_time
 from assoc.metrics.ospa2 import ospa2
-from assoc.metrics.plot_identity import identity_after_each, plot_identity_switches
+from assoc.metrics.plot_identity import identity_after_each, plot_identity_switches, tracks_of_one_identity
 from assoc.metrics.rmse import rmse, track_rmse
 from assoc.metrics.summary import Summary, summarise
 from assoc.metrics.trajectories import Trajectories
@@ -36,4 +36,5 @@ __all__ = [
     "rmse",
     "summarise",
     "track_rmse",
+    "tracks_of_one_identity",
 ]

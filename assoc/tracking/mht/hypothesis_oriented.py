@@ -60,6 +60,7 @@ class HypothesisOrientedMHT(Tracker):
     """
 
     name = "mht-hypothesis"
+    weighs_identities = False
 
     def __init__(
         self, *arguments: Any, max_hypotheses: int = 20, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
