@@ -177,7 +177,7 @@ def _synthetic() -> list[Instance]:
 
 
 def near_ties(seed: int) -> AssignmentProblem:
-    """Three hundred tuples of seven sensors with 26 measurements each, whose costs differ by a ten-thousandth at most."""
+    """Some 300 tuples of seven sensors with 26 measurements each, whose costs differ by a ten-thousandth at most."""
     rng = np.random.default_rng(seed)
     tuples = rng.integers(1, 27, (300, 7)) * (rng.random((300, 7)) < 0.5)
     tuples = np.unique(tuples[np.count_nonzero(tuples, axis=1) >= 2], axis=0)
