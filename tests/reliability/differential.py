@@ -133,8 +133,8 @@ def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way:
         yield from (f"{text} (place {place})" for text in _faults_of(problem, own, answer))
     first = answers[0]
     if name in PROVING:
-        # solvers close their gaps to 1e-9 of the costs they see
-        room = magnitude(problem) / 10**9
+        # solvers close their gaps to 1e-9 of the weights they see, which are differences of costs
+        room = magnitude(problem) * Fraction(1.01) / 10**9
         excess = exact_cost(problem, first.indices) - optimum
         if excess > Fraction(OPTIMALITY_TOLERANCE) * max(1, abs(optimum)) + room:
             yield f"is {float(excess):.3g} above the optimum {float(optimum):.6g}"
