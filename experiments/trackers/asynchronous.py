@@ -163,7 +163,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     return run(
         parser, chosen, NAME, TITLE,
         lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds), draw, (11, 4),
-        f"{__doc__} {chosen.seeds} scenes of airliners over 240 s, half as many (at least 2) of recorded traffic over 300 s.",
+        f"{__doc__} {chosen.seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
     )  # fmt: skip
 
 
