@@ -167,7 +167,7 @@ def clustering_time_window() -> str:
         Row("table 2.1, recording", "assoc/recordings/reading.py", f"{HOLDS}: read as printed", rebuild),
         Row("figure 2.2 and section 2.2.2, the window", "assoc/recordings/windows.py", HOLDS, windows),
         Row("figures 2.3 to 2.5, Reid's 28 hypotheses", "assoc/tracking/mht/hypothesis_oriented.py", HOLDS, mht),
-        Row("section 2.2.4, Murty's m best", "assoc/tracking/mht/children.py", f"{HOLDS}; m is not given, 20 is ours",
+        Row("section 2.2.4, Murty's m best", "assoc/tracking/mht/children.py", f"{HOLDS}; m is not given, 50 is ours",
             test("tests/tracking/test_clusters.py")),
         Row("section 2.2.5, F, H and R", "assoc/filters/motion/models.py",
             f"{HOLDS} with the state [x, x', y, y']: the printed order [x, y, x', y'] does not fit F", mht),

@@ -63,7 +63,7 @@ class HypothesisOrientedMHT(Tracker):
     name = "mht-hypothesis"
 
     def __init__(
-        self, *arguments: Any, max_hypotheses: int = 20, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
+        self, *arguments: Any, max_hypotheses: int = 50, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
         for value, what in ((depth, "depth"), (max_hypotheses, "max_hypotheses")):
