@@ -112,7 +112,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, elapsed, compiling),
         lambda: _compare(scene, table, parsed["cutoff"]),
-        lambda: _report_rates(plots),
+        lambda: _report_rates(plots, parsed["identity"] or "score-only"),
     )
     _EARLY_END.say(f"the tracks of {count} of {total} scans are written")
 
@@ -154,6 +154,8 @@ def _of_scene(
     from assoc.tracking.filter_choice import pace_of
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
+    if parsed["identity"] is not None:
+        raise InvalidInputError("--identity: is for plots; the measurements of a scene have no codes")
     if parsed["rates"] is not None:
         raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
     for flag in ("rotation", *RADAR):
@@ -209,6 +211,8 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
     if parsed["radar"] is not None and not _is_asterix(file):
         raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
+    if parsed["rates"] and parsed["identity"] == "ignore":
+        raise InvalidInputError("--rates: judges by the identities that --identity ignore leaves out")
     if parsed["rates"] and recording.aircraft is None:
         raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
     if window == "none":
@@ -239,8 +243,15 @@ def _write_rates(path: str, plots: PlotTracks) -> None:
     write_text(path, "\n".join(lines) + "\n")
 
 
-def _report_rates(plots: PlotTracks | None) -> None:
-    if plots is None or plots.rates is None:
+def _report_rates(plots: PlotTracks | None, identity: str) -> None:
+    if plots is None or identity == "ignore":
+        return
+    if plots.kept is not None:
+        kept, judged = plots.kept
+        # what was used says nothing of how good the result is
+        own = " (identities were used to make them)" if identity == "use" and plots.recording.sources is None else ""
+        print_lines(f"{kept} of {judged} tracks with an identity kept one{own}")
+    if plots.rates is None:
         return
     rates, known = plots.rates, "aircraft" if plots.recording.sources is not None else "Mode 3"
     figures = ", ".join(

@@ -24,6 +24,7 @@ from numba.core import caching, event
 
 from assoc._system import compile_time, shipped, temporary
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
+from assoc._system.interrupts import signals_held
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -80,16 +81,18 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load compiled code, own or shipped; what cannot be read (cut by a crash) is compiled again, and replaced."""
-        try:
-            found = super().load_overload(sig, target_context)
-        except Exception:
-            # an index that cannot be read cannot be added to either
-            with contextlib.suppress(OSError):
-                self.flush()
-            found = None
-        if found is None:
-            with contextlib.suppress(Exception):
-                found = shipped.load(self, sig, target_context)
+        # LLVM asks Python for the code: if Ctrl-C came in its place, the kernel would be empty, and its call a crash
+        with signals_held():
+            try:
+                found = super().load_overload(sig, target_context)
+            except Exception:
+                # an index that cannot be read cannot be added to either
+                with contextlib.suppress(OSError):
+                    self.flush()
+                found = None
+            if found is None:
+                with contextlib.suppress(Exception):
+                    found = shipped.load(self, sig, target_context)
         if found is None and thread.may_interpret:
             raise NotCompiled
         return found

@@ -78,3 +78,28 @@ def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> i
         switches += owner.get(aircraft, taker) != taker
         owner[aircraft] = taker
     return switches
+
+
+@door
+def tracks_of_one_identity(sources: Array, tracks: Array, confirmed: Array) -> tuple[int, int]:
+    """How many confirmed tracks kept one identity for all their life, and how many had any.
+
+    A track's identity after each plot is the majority of its last 6 (`identity_after_each`), so that a single plot gone
+    astray, or with a garbled code, changes nothing.
+
+    Parameters
+    ----------
+    sources, tracks : array_like of int (n,)
+        As for `identity_after_each`.
+    confirmed : array_like of bool (n,)
+        Whether that track was confirmed then; its plots before that do not count.
+    """
+    source, track, sure = np.asarray(sources), np.asarray(tracks), np.asarray(confirmed, dtype=bool)
+    if source.ndim != 1 or not source.shape == track.shape == sure.shape:
+        shapes = f"{source.shape}, {track.shape}, {sure.shape}"
+        raise InvalidInputError(f"sources, tracks and confirmed must have one shape (n,), got {shapes}")
+    identity = identity_after_each(source, track)
+    own = sure & (track >= 0) & (identity >= 0)
+    known = np.unique(np.stack([track[own], identity[own]], axis=1), axis=0)
+    _, count = np.unique(known[:, 0], return_counts=True)
+    return int((count == 1).sum()), len(count)

@@ -38,6 +38,8 @@ class Window:
         Metres, NaN where it is missing or garbled.
     rows : int array (n,)
         The plots' numbers in the recording.
+    addresses : int array (n,)
+        ICAO addresses, 0 where they are not known.
     """
 
     number: int
@@ -46,6 +48,7 @@ class Window:
     identities: Array
     altitudes: Array
     rows: Array
+    addresses: Array
 
     @classmethod
     def of(cls, recording: Recording, rows: Array, number: int) -> Window:
@@ -58,6 +61,7 @@ class Window:
             identities=recording.identities[rows],
             altitudes=recording.trusted_altitudes[rows],
             rows=rows,
+            addresses=recording.addresses[rows],
         )
 
     def __len__(self) -> int:

@@ -26,6 +26,8 @@ class Scan:
         When each measurement was made, seconds; None: all at `time`.
     sectors : array (S, 2), or None
         Azimuths from which to which each sensor looked, see `assoc.Scene`; None: all looked everywhere.
+    identities : tuple over sensors of int arrays (n_s, 2), or None
+        Mode 3/A code and ICAO address of each measurement, 0 where it has none.
     """
 
     index: int
@@ -36,6 +38,7 @@ class Scan:
     truth_positions: Array | None = None
     times: tuple[Array, ...] | None = None
     sectors: Array | None = None
+    identities: tuple[Array, ...] | None = None
 
     @property
     def sizes(self) -> Array:

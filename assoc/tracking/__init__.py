@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from assoc.tracking.identity_evidence import IdentityParameters
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
@@ -34,6 +35,7 @@ __all__ = [
     "TRACKERS",
     "Decision",
     "HypothesisOrientedMHT",
+    "IdentityParameters",
     "Initiation",
     "JointProbabilisticTracker",
     "LatePlots",

@@ -26,6 +26,7 @@ from assoc.filters.state import gaussian
 from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
+from assoc.tracking.identity_evidence import Identities
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track_batch import TrackBatch
@@ -216,6 +217,7 @@ class Checkpoint(ABC):
     initiation: Initiation
     gate_probability: float
     registration: OnlineRegistration | None
+    identities: Identities | None
     _place: Scene
     _time: float | None
     _pace: float
@@ -266,6 +268,7 @@ class Checkpoint(ABC):
             "initiation": repr(self.initiation),
             "gate_probability": repr(self.gate_probability),
             **({} if self.registration is None else {"registration": repr(self.registration.parameters)}),
+            **({} if self.identities is None else {"identity": repr(self.identities.parameters)}),
         }
 
     def _arrays(self) -> dict[str, Array]:
@@ -280,6 +283,7 @@ class Checkpoint(ABC):
             "filter_rng": np.array("" if rng is None else json.dumps(rng.bit_generator.state)),
             **self._batch.arrays(PREFIX),
             **({} if self.registration is None else self.registration.arrays()),
+            **({} if self.identities is None else self.identities.arrays()),
         }
 
     def _check(self, arrays: dict[str, Array]) -> None:
@@ -294,6 +298,8 @@ class Checkpoint(ABC):
             rng_state(rng, str(arrays["filter_rng"]))
         if self.registration is not None:
             self.registration.restored(arrays)
+        if self.identities is not None:
+            self.identities.restored(arrays)
 
     def _take(self, arrays: dict[str, Array]) -> None:
         """Take over checked arrays."""
@@ -308,3 +314,5 @@ class Checkpoint(ABC):
         self._batch = self._batch.restored(arrays, PREFIX)
         if self.registration is not None:
             self.registration = self.registration.restored(arrays)
+        if self.identities is not None:
+            self.identities = self.identities.restored(arrays)

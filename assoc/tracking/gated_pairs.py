@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ def gated_pairs(
     stamps: Array | None,
     sensor: Sensor,
     gate_probability: float,
+    evidence: Callable[[Array, Array], tuple[Array, Array]] | None = None,
 ) -> GatedPairs:
     """Predict tracks, gate measurements and correct every pair.
 
@@ -48,12 +50,14 @@ def gated_pairs(
         The measurements' own times, from `before` to `time`; None: all are of `time`.
     sensor : Sensor
     gate_probability : float
+    evidence : callable (track, measurement) -> (log ratio, possible), optional
+        What else than their places says which pairs (K,) belong together: it adds to the log likelihood, and rules out.
     """
     gate = gate_of(sensor, gate_probability)
     predicted = _later(filter, states, time - before)
     if stamps is None:
         pairs = track_pairs(filter, predicted, measurements, sensor, gate)
-        return GatedPairs(predicted, pairs, np.full(len(pairs.track), time))
+        return _weighed(GatedPairs(predicted, pairs, np.full(len(pairs.track), time)), evidence)
     parts, when = [], []
     for stamp in np.unique(stamps):
         numbers = np.flatnonzero(stamps == stamp)
@@ -72,7 +76,19 @@ def gated_pairs(
         np.concatenate([part.log_likelihood for part in parts]),
         concatenate([part.states for part in parts]),
     )
-    return GatedPairs(predicted, joined, np.concatenate(when))
+    return _weighed(GatedPairs(predicted, joined, np.concatenate(when)), evidence)
+
+
+def _weighed(gated: GatedPairs, evidence: Callable[[Array, Array], tuple[Array, Array]] | None) -> GatedPairs:
+    if evidence is None or not len(gated.pairs.track):
+        return gated
+    pairs = gated.pairs
+    says, possible = evidence(pairs.track, pairs.measurement)
+    kept = np.flatnonzero(possible)
+    chosen = TrackPairs(
+        pairs.track[kept], pairs.measurement[kept], (pairs.log_likelihood + says)[kept], pairs.states[kept]
+    )
+    return GatedPairs(gated.predicted, chosen, gated.when[kept])
 
 
 def _later(filter: Filter[Any], states: Any, dt: float) -> Any:

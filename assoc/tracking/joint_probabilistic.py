@@ -20,6 +20,7 @@ Systems 40, 2004.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,7 @@ import numpy as np
 
 from assoc._system.door import doors
 from assoc._types import Array
+from assoc.costs.tracks.own_times import PairEvidence
 from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
 from assoc.filters.base import predict_each
@@ -100,10 +102,15 @@ class JointProbabilisticTracker(Tracker):
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
         before = time if self._time is None else self._time
         seen = np.zeros(len(batch), dtype=np.bool_)
+        # identities come with times, and so from a single sensor: its tracks are those of the batch
+        says = self._evidence(scan)
         assigned, found = [], []
         for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
             stamps = None if times is None else times[s]
-            near = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
+            near = gated_pairs(
+                self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability,
+                None if says is None else _of_sensor(says, s),
+            )  # fmt: skip
             before = time
             pairs = self._probabilities(batch, near.pairs, s, len(z))
             found.append(pairs)
@@ -186,6 +193,10 @@ class JointProbabilisticTracker(Tracker):
 
     def _settings(self) -> dict[str, str]:
         return super()._settings() | {"max_events": repr(self.max_events)}
+
+
+def _of_sensor(evidence: PairEvidence, s: int) -> Callable[[Array, Array], tuple[Array, Array]]:
+    return lambda track, measurement: evidence(track, s, measurement)
 
 
 def _probability(score: Array) -> Array:

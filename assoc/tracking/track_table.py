@@ -121,9 +121,12 @@ class TrackTable(Shown):
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV; the file appears whole or not at all."""
         from assoc._files.output import write_text
+        from assoc._text.plain import spreadsheet_text
 
-        text = self.to_frame().to_csv(index=False)
-        write_text(path, text)
+        frame = self.to_frame()
+        if self.targets:
+            frame["target"] = frame["target"].map(spreadsheet_text)
+        write_text(path, frame.to_csv(index=False))
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Write the table as Parquet; the file appears whole or not at all.

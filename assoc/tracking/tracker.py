@@ -15,7 +15,7 @@ from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
-from assoc.costs.tracks.own_times import TimedScan
+from assoc.costs.tracks.own_times import PairEvidence, TimedScan
 from assoc.costs.tracks.scores import score_terms
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter, predict_each
@@ -32,6 +32,7 @@ from assoc.solvers.registry import make_parameters
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint, Memory
 from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
+from assoc.tracking.identity_evidence import Identities, IdentityParameters, checked_identities
 from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_starts import Crossings
 from assoc.tracking.life_cycle import LifeCycle
@@ -77,6 +78,9 @@ class Tracker(Checkpoint):
     registration : "online" or OnlineRegistration, optional
         Estimates the sensors' biases from the measurements that come in and corrects these by them; all measurements of
         a scan must then be of one instant. Without it measurements are taken as they are.
+    identity : IdentityParameters, optional
+        How far Mode 3/A codes and addresses of measurements, which `step` may be given, tell to which track these
+        belong. Without it they are not looked at.
 
     Raises
     ------
@@ -85,6 +89,8 @@ class Tracker(Checkpoint):
     """
 
     name: ClassVar[str]
+    weighs_identities: ClassVar[bool] = True
+    """Whether it can use codes and addresses."""
 
     def __init__(
         self,
@@ -101,6 +107,7 @@ class Tracker(Checkpoint):
         gate_probability: float = GATE_PROBABILITY,
         max_tuples: int = MAX_TUPLES,
         registration: str | OnlineRegistration | None = None,
+        identity: IdentityParameters | None = None,
     ) -> None:
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         self._place = Scene(sensors=sensors, times=np.zeros(1), measurements=empty, region=region)  # type: ignore[arg-type]
@@ -127,6 +134,9 @@ class Tracker(Checkpoint):
         if not (registration is None or isinstance(registration, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
         self.registration = registration
+        if identity is not None and not self.weighs_identities:
+            raise InvalidInputError(f"identity: {self.name} cannot use codes and addresses; take another tracker")
+        self.identities = None if identity is None else Identities(identity)
         self.terms = score_terms(self.sensors)
         self._new_tracks = NewTracks(self._place, self.filter, self.initiation, self.terms)
         self._time: float | None = None
@@ -208,6 +218,7 @@ class Tracker(Checkpoint):
         measurements: Sequence[Array],
         times: Sequence[Array] | None = None,
         sectors: Array | None = None,
+        identities: Sequence[Array] | None = None,
     ) -> Step:
         """Take one scan in.
 
@@ -224,6 +235,9 @@ class Tracker(Checkpoint):
             From which to which azimuth each sensor looked since the last scan, see `assoc.Scene`: what a sensor did
             not look at it has not missed. No sensor may have looked at anything twice. Left out, all looked
             everywhere.
+        identities : sequence over sensors of int arrays (n_s, 2), optional
+            Mode 3/A code and ICAO address of each measurement, 0 where it has none. Used by trackers that were made
+            with `identity`, others do not look at them.
 
         Returns
         -------
@@ -241,12 +255,18 @@ class Tracker(Checkpoint):
         looks = None if sectors is None else checked_sectors(sectors, len(self.sensors), "sectors")
         if self.registration is not None and stamps is not None:
             raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
+        codes = None if self.identities is None or identities is None else tuple(
+            checked_identities(identities, [len(z) for z in checked])
+        )
+        if codes is not None and stamps is None:
+            # identities are weighed where measurements are followed one by one, at their own times
+            stamps = tuple(np.full(len(z), when) for z in checked)
         before = self.remember()
         try:
             if self.registration is not None:
                 self.registration = self.registration.after(when, checked)
                 checked = self.registration.correct(checked)
-            scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks)
+            scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
             dt = self._elapsed(when)
             if dt > 0:
                 # a running mean that forgets: scans may change their pace
@@ -267,6 +287,8 @@ class Tracker(Checkpoint):
         except BaseException:
             self.go_back(before)
             raise
+        if codes is not None and self.identities is not None:
+            self.identities = self.identities.after(step.assigned, codes, self._batch.track_id)
         if scan.at_once:
             self._batch = self._batch.not_overlooked(-(self._out_of_view() @ self.terms.miss))
         self._time = when
@@ -318,8 +340,15 @@ class Tracker(Checkpoint):
         return TimedScan(
             self.filter, self._batch.states, before, scan.measurements, scan.own_times(), self.sensors,
             self._new_tracks.places(scan.measurements), start, scan.sectors, self.gate_probability,
-            scan.time,
+            scan.time, self._evidence(scan),
         )  # fmt: skip
+
+    def _evidence(self, scan: Scan) -> PairEvidence | None:
+        """What identities say of pairs of a row of the batch and a measurement."""
+        known, codes, batch = self.identities, scan.identities, self._batch
+        if known is None or codes is None:
+            return None
+        return lambda track, s, measurement: known.evidence(batch.track_id[track], codes[s][measurement])
 
     def _out_of_view(self) -> Array:
         """Which sensors cannot see which tracks: they have not missed them; bool (T, S)."""

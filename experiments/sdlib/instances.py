@@ -171,4 +171,15 @@ def _synthetic() -> list[Instance]:
         for seed in (1, 2):
             planted = lambda sensors=sensors, seed=seed: synthetic.planted(sensors, seed)[0]  # noqa: E731
             found.append(Instance(f"planted-{sensors}-{seed}", "planted", planted))
+    for seed in (1, 2, 3):
+        found.append(Instance(f"near-ties-{seed}", "near ties", lambda seed=seed: near_ties(seed)))
     return found
+
+
+def near_ties(seed: int) -> AssignmentProblem:
+    """Some 300 tuples of seven sensors with 26 measurements each, whose costs differ by a ten-thousandth at most."""
+    rng = np.random.default_rng(seed)
+    tuples = rng.integers(1, 27, (300, 7)) * (rng.random((300, 7)) < 0.5)
+    tuples = np.unique(tuples[np.count_nonzero(tuples, axis=1) >= 2], axis=0)
+    costs = -1.0 + 1e-6 * rng.integers(0, 100, len(tuples))
+    return AssignmentProblem(tuples, costs, [26] * 7)

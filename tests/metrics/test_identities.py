@@ -24,6 +24,7 @@ from assoc.metrics import (
     rmse,
     summarise,
     track_rmse,
+    tracks_of_one_identity,
 )
 
 
@@ -123,6 +124,26 @@ def test_identity_switches_of_plots():
     assert identity_after_each([-1, 0, 1, 1, -1, 1], [3, 3, 3, 3, -1, 4]).tolist() == [-1, 0, 1, 1, -1, 1]
     with pytest.raises(InvalidInputError, match="one shape"):
         plot_identity_switches(sources, true, every[:3])
+
+
+def test_tracks_of_one_identity():
+    sources = np.array([1, 2] * 12)
+    every = np.ones(24, dtype=bool)
+    true = np.array([5, 6] * 12)
+    assert tracks_of_one_identity(sources, true, every) == (2, 2)
+    # a garbled code, a false plot and a plot of nobody change nothing
+    garbled = sources.copy()
+    garbled[[8, 13]] = 3, -1
+    assert tracks_of_one_identity(garbled, true, every) == (2, 2)
+    # two tracks swap their aircraft: neither keeps one
+    swapped = np.where(np.arange(24) < 12, true, 11 - true)
+    assert tracks_of_one_identity(sources, swapped, every) == (0, 2)
+    # ... but only what is confirmed counts, and tracks of false plots have no identity
+    assert tracks_of_one_identity(sources, swapped, np.arange(24) < 12) == (2, 2)
+    assert tracks_of_one_identity(np.full(24, -1), true, every) == (0, 0)
+    assert tracks_of_one_identity(sources, np.full(24, -1), every) == (0, 0)
+    with pytest.raises(InvalidInputError, match="one shape"):
+        tracks_of_one_identity(sources, true[:3], every)
 
 
 def test_ct_mt_it_by_hand():

@@ -14,10 +14,14 @@ import pandas as pd
 import pytest
 
 from assoc import track
+from assoc._cli.track.options import make_tracker
 from assoc._cli.track.plot_lines import parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
+from assoc.tracking import MultiSensorTracker
+from assoc.tracking.checkpoint import described
+from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +79,29 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     again = subprocess.run(words(scene_file, "--replay", 0, "-o", out), capture_output=True, text=True, timeout=300)
     assert again.returncode == 0 and again.stdout == ""
     assert out.read_text() == done.stdout
+
+
+def test_the_default_filter_suits_the_turns(tmp_path, monkeypatch, capsys):
+    """As for_scene does with scans of a turn; the scene's own pace where no turns are given."""
+    scene = simulate("rotating-radars", 5, aircraft=1, duration=12.0, interval=4.0)
+    scene.save(tmp_path / "radars.npz")
+    made = []
+
+    def note(*arguments, **options):
+        made.append(make_tracker(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr("assoc._cli.track.live.make_tracker", note)
+    expected = described(MultiSensorTracker.for_scene(scene).filter)
+    for more in (["--turns", "4,5,5.5"], []):
+        made.clear()
+        words = [str(tmp_path / "radars.npz"), "--live", "--replay", "0", "-o", str(tmp_path / "t.csv"), *more]
+        assert track.main(words) == 0
+        assert {described(one.filter) for one in made} == {expected}
+    made.clear()
+    assert track.main([*words, "--turns", "9,10,12"]) == 0
+    assert {described(one.filter) for one in made} == {described(two_speeds(manoeuvre_noise(9.0)))}
+    capsys.readouterr()
 
 
 @pytest.mark.slow

@@ -138,6 +138,14 @@ BAD = {
     "solver": (["SCENE", "--solver", "acoo"], "solver: unknown name 'acoo'; did you mean aco"),
     "window for a scene": (["SCENE", "--window", "ctw"], "--window: groups the plots of a CSV file"),
     "rates for a scene": (["SCENE", "--rates", "r.csv"], "--rates: judges the plots"),
+    "identity for a scene": (["SCENE", "--identity", "use"], "--identity: is for plots"),
+    "identity": (["PLOTS", "--identity", "yes"], "--identity: unknown name 'yes'; known: use, score-only, ignore"),
+    "identity unused": (["PLOTS", "--code-shared", "0.1"], "--code-shared: is only for --identity use"),
+    "identity of Reid": (
+        ["PLOTS", "--identity", "use", "--tracker", "mht-hypothesis", *NOISE],
+        "identity: mht-hypothesis cannot use codes and addresses",
+    ),
+    "code probability": (["PLOTS", "--identity", "use", "--code-garbled", "1"], "code_garbled: expected a number"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),
     "depth": (["SCENE", "--tracker", "mht", "--depth", "0"], "--depth: expected a whole number >= 1, got '0'"),
@@ -266,6 +274,22 @@ def test_irregular_windows_and_what_rates_need(tmp_path, capsys):
     assert "no plot has an identity" in capsys.readouterr().err and not (tmp_path / "t.csv").exists()
     assert track.main([unknown, "-o", str(tmp_path / "t.csv"), "--rotation", "10", *NOISE]) == 0
     assert "CT" not in capsys.readouterr().out
+
+
+def test_identities_judge_or_are_used_or_are_left_out(tmp_path, capsys):
+    plots(tmp_path / "plots.csv")
+    printed, tables = {}, {}
+    for identity in (None, "score-only", "ignore", "use"):
+        words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE]
+        assert track.main(words + ([] if identity is None else ["--identity", identity])) == 0
+        printed[identity], tables[identity] = capsys.readouterr().out, (tmp_path / "tracks.csv").read_text()
+    assert tables[None] == tables["score-only"] == tables["ignore"] != tables["use"]
+    assert "2 of 2 tracks with an identity kept one\n" in printed[None] and "CT " in printed["score-only"]
+    assert "kept one" not in printed["ignore"] and "CT " not in printed["ignore"]
+    assert "kept one (identities were used to make them)" in printed["use"]
+    rates = ["--identity", "ignore", "--rates", str(tmp_path / "rates.csv")]
+    assert track.main([str(tmp_path / "plots.csv"), "-o", str(tmp_path / "t.csv"), *NOISE, *rates]) == 2
+    assert "--rates: judges by the identities" in capsys.readouterr().err and not (tmp_path / "t.csv").exists()
 
 
 def read_without_identities(folder):

@@ -85,9 +85,9 @@ WAYS: dict[str, Way] = {
     "exact": _by("exact"),
     "greedy": _by("greedy"),
     "aco": _by("aco"),
-    # the colony of the paper walks on where others have long closed: some cycles are enough to see its answers
+    # the colony of the paper walks on where others have long closed, and so does genetic search: some cycles are enough
     "aco paper": _by("aco", mode="paper", iterations=40),
-    "genetic": _by("genetic"),
+    "genetic": _by("genetic", iterations=20),
     "tabu": _by("tabu"),
     "lagrangian": _by("lagrangian"),
     "lagrangian cold": _by("lagrangian", warm_start=False, polish=False),

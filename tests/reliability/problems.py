@@ -7,7 +7,7 @@ random by `draw`, or one after the other by whoever wants them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -34,10 +34,10 @@ class Case:
     number: int
 
 
-def draw(seed: int, number: int) -> Case:
-    """Draw case ``number`` of a seed."""
+def draw(seed: int, number: int, structures: Sequence[str] = ()) -> Case:
+    """Draw case ``number`` of a seed, of some structures or of all."""
     rng = np.random.default_rng([seed, number])
-    structure = str(rng.choice(list(STRUCTURES)))
+    structure = str(rng.choice(list(structures or STRUCTURES)))
     temper = str(rng.choice(list(TEMPERS)))
     return Case(make(rng, structure, temper), structure, temper, number)
 
@@ -51,13 +51,18 @@ def make(rng: np.random.Generator, structure: str, temper: str) -> AssignmentPro
 
 
 def exact_optimum(problem: AssignmentProblem) -> Fraction:
-    """Optimal cost in exact arithmetic, by recursion over the sets of covered measurements.
+    """Optimal cost in exact arithmetic, part by part, by recursion over the sets of covered measurements.
 
     Raises
     ------
     InfeasibleError
         The problem has no solution.
     """
+    return sum((optimum_of_part(part) for _, part in _parts(problem)), Fraction(0))
+
+
+def optimum_of_part(problem: AssignmentProblem) -> Fraction:
+    """Optimal cost of a problem with few measurements."""
     covering, to_cover, unit = _coverings(problem)
     memo: dict[int, int | None] = {}
 
@@ -89,6 +94,43 @@ def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
     InfeasibleError
         The problem has no solution.
     """
+    tuples = problem.tuples.tolist()
+    return {
+        tuple(tuples[k]): p
+        for rows, part in _parts(problem)
+        for k, p in zip(rows, marginals_of_part(part), strict=True)
+    }
+
+
+def _parts(problem: AssignmentProblem) -> list[tuple[list[int], AssignmentProblem]]:
+    """Split a problem with dummies into parts that share no measurement: the rows of each, and a problem of them."""
+    if not problem.dummy or len(problem.tuples) == 0:
+        return [(list(range(len(problem.tuples))), problem)]
+    measurements = [[(s, i) for s, i in enumerate(row) if i] for row in problem.tuples.tolist()]
+    chief = {one: one for own in measurements for one in own}
+
+    def root(one: tuple[int, int]) -> tuple[int, int]:
+        while chief[one] != one:
+            one = chief[one]
+        return one
+
+    for own in measurements:
+        for one in own[1:]:
+            chief[root(one)] = root(own[0])
+    members: dict[tuple[int, int], list[int]] = {}
+    for k, own in enumerate(measurements):
+        members.setdefault(root(own[0]), []).append(k)
+    parts = []
+    for rows in members.values():
+        columns = [np.unique(column, return_inverse=True) for column in problem.tuples[rows].T]
+        # numbers from 1, and 0 for none also where no tuple has none
+        tuples = np.stack([place + (values[0] > 0) for values, place in columns], axis=1)
+        parts.append((rows, AssignmentProblem(tuples, problem.costs[rows], tuples.max(axis=0))))
+    return parts
+
+
+def marginals_of_part(problem: AssignmentProblem) -> list[float]:
+    """Probability of each tuple of a problem with few measurements."""
     covering, to_cover, unit = _coverings(problem)
     # for each set of covered measurements: the least cost of the rest, the weight of all rests relative to that
     memo: dict[int, tuple[int, float] | None] = {}
@@ -126,11 +168,8 @@ def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
             probability[mask] = probability.get(mask, 0.0) + share
             reached[after] = reached.get(after, 0.0) + share
     offsets = _offsets(problem)[0]
-    result = {}
-    for row in problem.tuples.tolist():
-        mask = sum(1 << (offsets[s] + i - 1) for s, i in enumerate(row) if i)
-        result[tuple(row)] = probability.get(mask, 0.0)
-    return result
+    masks = (sum(1 << (offsets[s] + i - 1) for s, i in enumerate(row) if i) for row in problem.tuples.tolist())
+    return [probability.get(mask, 0.0) for mask in masks]
 
 
 def _weight(exponent: int, unit: int) -> float:
@@ -295,6 +334,48 @@ def _axial_without_anything(rng: np.random.Generator) -> Structure:
     return np.zeros((0, len(sizes)), np.int64), sizes, False
 
 
+def _star(rng: np.random.Generator) -> Structure:
+    """Draw tuples that all hold the same measurement, or one of two."""
+    sensors = int(rng.integers(3, 9))
+    sizes = np.concatenate([[int(rng.integers(1, 3))], rng.integers(1, 3, sensors - 1)]).astype(np.int64)
+    rays = rng.integers(0, sizes[1:] + 1, (int(rng.integers(3, 40)), sensors - 1))
+    tuples = np.column_stack([rng.integers(1, sizes[0] + 1, len(rays)), rays])
+    return _real(np.unique(tuples, axis=0)), sizes, True
+
+
+def _uneven(rng: np.random.Generator) -> Structure:
+    """Draw sensors of which one has nearly all measurements."""
+    sensors = int(rng.integers(2, 5))
+    sizes = np.ones(sensors, np.int64)
+    sizes[rng.integers(sensors)] = rng.integers(6, _MOST_ROWS - sensors + 2)
+    tuples = _real(_grid(sizes, 0))
+    return tuples[rng.random(len(tuples)) < rng.choice([0.3, 1.0])], sizes, True
+
+
+def _many_sensors(rng: np.random.Generator) -> Structure:
+    sensors = int(rng.integers(7, 9))
+    sizes = rng.integers(1, 3, sensors).astype(np.int64)
+    sizes[np.flatnonzero(sizes == 2)[_MOST_ROWS - sensors :]] = 1
+    tuples = rng.integers(0, sizes + 1, (int(rng.integers(10, 60)), sensors))
+    return _real(np.unique(tuples, axis=0)), sizes, True
+
+
+def _many_parts(rng: np.random.Generator) -> Structure:
+    return many_parts(rng, int(10 ** rng.uniform(0.5, 1.6)))
+
+
+def many_parts(rng: np.random.Generator, count: int) -> Structure:
+    """Draw one hard part beside so many that are pairs, or a few tuples."""
+    hard, sizes, _ = _chain(rng)
+    blocks, start = [hard], sizes.copy()
+    for own in rng.integers(0, 3, (count, len(sizes))):
+        block = _real(_grid(own, 0))
+        block = block[rng.random(len(block)) < 0.5]
+        blocks.append(np.where(block > 0, block + start, 0))
+        start += own
+    return np.concatenate(blocks), start, True
+
+
 STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "gated": _gated,
     "listed singletons": _with_listed_singletons,
@@ -310,6 +391,10 @@ STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "axial rectangular": _axial_rectangular,
     "axial sparse": _axial_sparse,
     "axial, nothing": _axial_without_anything,
+    "star": _star,
+    "uneven": _uneven,
+    "many sensors": _many_sensors,
+    "many parts": _many_parts,
 }
 
 

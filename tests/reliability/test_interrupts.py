@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -72,6 +73,46 @@ def test_while_a_result_is_converted():
     # a signal that comes during a kernel is heard when its result is converted: a record's class is then missing
     done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stdout.strip()) == (0, "10"), done.stderr
+
+
+LOADING = """
+import signal
+import sys
+import assoc
+from numba.core.registry import cpu_target
+
+problem = assoc.AssignmentProblem([[1, 1], [1, 2], [2, 1]], [-1.0, -3.0, -2.0], [2, 2])
+engine = cpu_target.target_context.codegen()._engine._ee
+hand_over = engine._object_cache_getbuffer
+asked = heard = 0
+
+def interrupted(module):
+    global asked
+    asked += 1
+    # every other one, so that the next call comes further
+    if asked % 2:
+        signal.raise_signal(signal.SIGINT)
+    return hand_over(module)
+
+if "interrupted" in sys.argv:
+    engine._object_cache_getbuffer = interrupted
+while True:
+    try:
+        cost = assoc.assign(problem, "exact").cost
+        break
+    except KeyboardInterrupt:
+        heard += 1
+print(heard > 3, cost, flush=True)
+"""
+
+
+def test_while_a_kernel_is_loaded():
+    # LLVM asks Python for compiled code, and takes none for empty code
+    compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}
+    for word, heard in (("alone", "False"), ("interrupted", "True")):
+        command = [sys.executable, "-c", LOADING, word]
+        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=300)
+        assert (done.returncode, done.stdout.split(), done.stderr) == (0, [heard, "-5.0"], "")
 
 
 @pytest.mark.slow

@@ -91,10 +91,10 @@ OF_TREES = {
     "bank.track_id": lambda a: a.update({"bank.track_id": a["bank.track_id"][::-1].copy()}),
 }
 OF_HYPOTHESES = {
-    "members": lambda a: a["members"].__setitem__(0, 10_000),
-    "lengths": lambda a: a["lengths"].__setitem__(0, -1),
+    "cluster_hypotheses": lambda a: a["cluster_hypotheses"].__setitem__(0, 0),
+    "cluster_branches": lambda a: a["cluster_branches"].__setitem__(0, 10_000),
+    "holds": lambda a: a.update(holds=a["holds"][1:]),
     "weight": lambda a: a["weight"].__setitem__(0, np.nan),
-    "line": lambda a: a["line"].__setitem__((0, 0), -1),
 }
 
 
@@ -106,7 +106,9 @@ OF_HYPOTHESES = {
         ("mht-hypothesis", OF_MHT),
         ("mht", OF_TREES),
         ("mht-hypothesis", OF_HYPOTHESES),
-    ], every=3)
+    ],
+    every=3,
+)
 def test_each_lie_is_named(name, lies, tmp_path):
     tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
     for field, lie in lies.items():

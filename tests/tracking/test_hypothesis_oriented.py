@@ -4,8 +4,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from assoc._files.npz import save_npz
+from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.simulation import simulate
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
+from assoc.tracking.checkpoint import FORMAT, VERSION
 from tests.tracking import plain
 
 SEEDS = (0, 4)
@@ -80,19 +84,20 @@ def test_equation_2_1():
     np.testing.assert_allclose(own.probabilities, wanted / wanted.sum(), rtol=1e-9)
 
 
+def said_of_the_last_scan(own, rows):
+    return {(int(own._batch.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
+
+
 def test_n_scan_pruning_leaves_one_story_of_the_oldest_scan():
     times, scans = plain.small_scans(np.random.default_rng(1))
     own = tracker(depth=2, max_hypotheses=50)
     final = []
     for time, z in zip(times, scans, strict=True):
         final += own.step(time, [z]).final
-        for rows in own._members:
+        for one in own._clusters:
             # every hypothesis agrees with the best on the scan before
-            column = {(int(own._batch.track_id[r]), int(own._history[r, 1])) for r in rows if own._history[r, 1]}
-            best = {
-                (int(own._batch.track_id[r]), int(own._history[r, 1])) for r in own._members[0] if own._history[r, 1]
-            }
-            assert column == best
+            said = [said_of_the_last_scan(own, one.branches[held]) for held in one.holds]
+            assert all(other == said[0] for other in said)
     assert [decision.scan for decision in final + list(own.flush())] == [0, 1, 2]
 
 
@@ -122,3 +127,34 @@ def test_the_28_hypotheses_of_reids_example():
     # 0: false alarm, 1 and 2: the targets, above: a new one; no target twice
     rows = ((a, b, c) for a in (0, 1, 2, 3) for b in (0, 2, 4) for c in (0, 2, 5))
     assert sum(row.count(1) < 2 and row.count(2) < 2 for row in rows) == 28
+
+
+def test_a_single_hypothesis_is_saved_and_restored(tmp_path):
+    times, scans = plain.small_scans(np.random.default_rng(1))
+    own, again = tracker(max_hypotheses=1), tracker(max_hypotheses=1)
+    own.step(times[0], [scans[0]])
+    own.save(tmp_path / "state.npz")
+    again.restore(tmp_path / "state.npz")
+    assert own.probabilities.tolist() == again.probabilities.tolist() == [1.0]
+
+
+def test_a_file_from_before_there_were_clusters_is_refused(tmp_path):
+    times, scans = plain.small_scans(np.random.default_rng(1))
+    own, path = tracker(), tmp_path / "state.npz"
+    own.step(times[0], [scans[0]])
+    arrays = {name: value for name, value in own._arrays().items() if not name.startswith("cluster_")}
+    save_npz(path, FORMAT, VERSION, arrays)
+    with pytest.raises(InvalidInputError, match=r"state\.npz: .*cluster_hypotheses") as caught:
+        tracker().restore(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_hundred_aircraft_are_confirmed_within_five_scans():
+    scene = simulate("crowd", 3, targets=100, scans=5, interval=4.0, width=40_000.0, height=10_000.0)
+    own = HypothesisOrientedMHT.for_scene(scene)
+    for k in range(5):
+        scan = scene.scan(k)
+        own.step(scan.time, scan.measurements)
+    confirmed = np.array([track.position for track in own.tracks if track.confirmed])
+    away = np.linalg.norm(confirmed[:, None] - scan.truth_positions[None], axis=2)
+    assert (away.min(axis=0) < 400).all() and (away.min(axis=1) < 500).all()

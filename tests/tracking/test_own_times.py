@@ -16,7 +16,7 @@ from experiments.trackers.oracle import OracleTracker
 from tests.sizes import sample
 from tests.tracking import plain
 
-KINDS = ["multi-sensor", "static", "mht", "nearest-neighbour"]
+KINDS = ["multi-sensor", "static", "mht", "mht-hypothesis", "nearest-neighbour"]
 SENSORS = [plain.sensor(0.8, 1e-3, 10.0), plain.sensor(0.9, 1e-3, 15.0), plain.sensor(0.7, 1e-3, 5.0)]
 PLACE, VELOCITY = np.array([500.0, 500.0, 250.0]), np.array([20.0, -10.0, 5.0])
 

@@ -16,6 +16,7 @@ from assoc.tracking import (
     TrackOrientedMHT,
 )
 from assoc.tracking.life_cycle import count_bits
+from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
 
 KINDS = list(TRACKERS.values())
@@ -100,6 +101,33 @@ def test_the_order_of_the_measurements_does_not_matter(kind):
     assert [t.track_id for t in plain.tracks] == [t.track_id for t in shuffled.tracks]
     for a, b in zip(plain.tracks, shuffled.tracks, strict=True):
         np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_order_of_the_sensors_matters_little(kind):
+    """Filters linearise at one sensor after the other: positions move by far less than they are uncertain."""
+    one = scene()
+    positions = []
+    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
+        tracker = kind([one.sensors[s] for s in order], TrackOrientedMHT.for_scene(one).filter, region=one.region)
+        for k in range(one.num_scans):
+            tracker.step(one.scan(k).time, [one.scan(k).measurements[s] for s in order])
+        found = [t for t in tracker.tracks if t.confirmed]
+        positions.append(np.array(sorted(t.position.tolist() for t in found)))
+    sigma = np.sqrt(max(t.covariance[:3, :3].trace() for t in found))
+    for other in positions[1:]:
+        np.testing.assert_allclose(positions[0], other, atol=0.1 * sigma)
+
+
+def test_a_target_is_no_formula_in_a_spreadsheet(tmp_path):
+    table = TrackTable()
+    tracker = MultiSensorTracker.for_scene(scene())
+    run(tracker, scene())
+    table.add(tracker.tracks[:1])
+    table.targets = {tracker.tracks[0].track_id: "=1+1"}
+    table.to_csv(tmp_path / "tracks.csv")
+    assert (tmp_path / "tracks.csv").read_text().splitlines()[1].endswith(",'=1+1")
+    assert table.to_frame()["target"].tolist() == ["=1+1"]
 
 
 @sample("kind", KINDS, every=3)

@@ -15,11 +15,12 @@ from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.tracking import LiveTracker, Tracker
+from assoc.tracking.filter_choice import pace_of
 
 
 def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
     """Track plots as they come, until they end or a signal ends the program."""
-    for flag in ("report", "rates", "window", "rotation", "registration", *RADAR):
+    for flag in ("report", "rates", "window", "identity", "rotation", "registration", *RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
     if parsed["smooth"]:
@@ -37,12 +38,14 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
     if speed is not None and not 0 <= speed < math.inf:
         raise InvalidInputError(f"--replay: expected a number >= 0, got {parsed['replay']!r}")
     scene = Scene.load(file)
+    # what one instant is to a scene is a turn to antennas: so long nothing is heard of a target
+    pace = pace_of(scene.times) if turns is None else min(turns)
 
     def tell(line: str) -> None:
         print(f"assoc.track: {printable(line)}", file=sys.stderr, flush=True)
 
     def make() -> Tracker:
-        return make_tracker(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region)
+        return make_tracker(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region, pace)
 
     tracker = LiveTracker(scene, make, turns=turns, tell=tell, **numbers)
     tracker.warm_up()

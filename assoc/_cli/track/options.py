@@ -41,6 +41,7 @@ TRACKERS = {
     "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
 WINDOWS = ("ctw", "ctw-time", "irregular", "none")
+IDENTITY = ("use", "score-only", "ignore")
 # option -> the trackers that take it
 _OWN = {
     "depth": ("mht", "mht-hypothesis"),
@@ -81,7 +82,7 @@ _CHOICES = (
 _TRACKING = (
     ("--depth", "N", "mht: number of scans after which a decision is final (default 3)"),
     ("--max-branches", "N", "mht: largest number of branches of a track tree (default 30)"),
-    ("--max-hypotheses", "N", "mht-hypothesis: largest number of hypotheses (default 20)"),
+    ("--max-hypotheses", "N", "mht-hypothesis: most hypotheses of a cluster (default 50)"),
     ("--max-events", "N", "joint-probabilistic: joint events listed for each cluster (default 100)"),
     ("--rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver"),
     ("--import", "MODULE", IMPORT_HELP),
@@ -92,6 +93,11 @@ _PLOTS = (
         "NAME",
         "how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by random "
         "intervals; none, one by one",
+    ),
+    (
+        "--identity",
+        "NAME",
+        "codes and addresses: use, to associate plots; score-only, to judge the tracks by them (default); or ignore",
     ),
     ("--rates", "FILE", "write CT, MT and IT of each window (.csv; needs identities)"),
     ("--rotation", "S", "rotation period of the antenna, seconds (default: estimated)"),
@@ -115,6 +121,7 @@ further options (docs/tracking.md):
   track life cycle   --confirmation --false-probability --missed-probability --m --n \
 --deletion --deletion-time --deletion-count --deletion-drop
   track initiation   --speed --rest --birth-rate --widest
+  --identity use     --code-garbled --code-shared --address-garbled --address-shared
   solver parameters  described by: python -m assoc.solve --solver NAME --help"""
 
 
@@ -132,10 +139,10 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
         _parser([]).parse_args(words)
-    from assoc.tracking import Initiation, LifeCycle
+    from assoc.tracking import IdentityParameters, Initiation, LifeCycle
 
-    own, cycle, initiation = _further(solver)
-    parser = _parser([*own, *cycle, *initiation])
+    own, cycle, initiation, identity = _further(solver)
+    parser = _parser([*own, *cycle, *initiation, *identity])
     parser.elsewhere = lambda: flags_of_solvers(solver)
     parsed = vars(parser.parse_args(words))
     given = parsed["cutoff"]
@@ -160,6 +167,13 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
         "initiation": Initiation(**parameter_values(initiation, parsed)),
         **common_values(parsed),
     }
+    if parsed["identity"] not in (None, *IDENTITY):
+        raise InvalidInputError(f"--identity: unknown name {parsed['identity']!r}; known: {', '.join(IDENTITY)}")
+    trusted = parameter_values(identity, parsed)
+    if parsed["identity"] == "use":
+        settings["identity"] = IdentityParameters(**trusted)
+    elif trusted:
+        raise InvalidInputError(f"{flag_of(next(iter(trusted)))}: is only for --identity use")
     if not parsed["live"]:
         for option in LIVE_ONLY:
             if parsed[option] is not None:
@@ -167,15 +181,15 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     return parsed, settings
 
 
-def _further(solver: str) -> tuple[list[Option], list[Option], list[Option]]:
-    """Parameters of the solver, the life cycle of tracks, and their initiation."""
+def _further(solver: str) -> tuple[list[Option], list[Option], list[Option], list[Option]]:
+    """Parameters of the solver, the life cycle of tracks, their initiation, and identities."""
     from assoc.solvers import registry
-    from assoc.tracking import Initiation, LifeCycle
+    from assoc.tracking import IdentityParameters, Initiation, LifeCycle
 
     initiation = [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
     for one in initiation:
         one.kind = float
-    return options(registry.parameters(solver)), options(LifeCycle), initiation
+    return options(registry.parameters(solver)), options(LifeCycle), initiation, options(IdentityParameters)
 
 
 def _field(owner: Any, name: str) -> Any:
@@ -189,7 +203,10 @@ def completions() -> dict[str, Sequence[str]]:
     from assoc.solvers import registry
     from assoc.tracking.filter_choice import FILTERS
 
-    values = {"--tracker": [*TRACKERS], "--filter": [*FILTERS], "--window": WINDOWS, "--solver": registry.names()}
+    values = {
+        "--tracker": [*TRACKERS], "--filter": [*FILTERS], "--window": WINDOWS, "--identity": IDENTITY,
+        "--solver": registry.names(),
+    }  # fmt: skip
     return {**_parser([option for group in _further("exact") for option in group]).flags(), **values}
 
 

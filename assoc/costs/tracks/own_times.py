@@ -30,6 +30,10 @@ from assoc.sensors import Sensor
 _CURVED = 1.3
 
 
+PairEvidence = Callable[[Array, int, Array], tuple[Array, Array]]
+"""Rows of tracks (K,), a sensor, measurements (K,) -> log likelihood ratio (K,), whether they may be one (K,)."""
+
+
 class Places(NamedTuple):
     """What the measurements of each sensor say of positions, and which may begin a track."""
 
@@ -103,6 +107,9 @@ class TimedScan:
     gate_probability : float
     end : float
         Time of the scan, seconds; no measurement is after it.
+    evidence : callable (track, sensor, measurement) -> (log ratio, possible), optional
+        What else than their places says which pairs of a track and a measurement (K,) belong together: it adds to the
+        log likelihood, and rules out.
     """
 
     def __init__(
@@ -118,7 +125,9 @@ class TimedScan:
         sectors: Array | None,
         gate_probability: float,
         end: float,
+        evidence: PairEvidence | None = None,
     ) -> None:
+        self.evidence = evidence
         self.filter, self.states, self.sensors, self.places = filter, states, sensors, places
         self.before = np.broadcast_to(np.asarray(before, dtype=np.float64), (len(states),))
         self.measurements, self.times, self.start, self.sectors = measurements, times, start, sectors
@@ -174,6 +183,11 @@ class TimedScan:
                 states, when[here] = _put(states, here, done.state), now
                 log_likelihood[here] += done.log_likelihood
                 inside[here] &= done.nis <= self.gates[s]
+                if self.evidence is not None:
+                    known = here[track[here] >= 0]
+                    says, possible = self.evidence(track[known], s, rows[known, s] - 1)
+                    log_likelihood[known] += says
+                    inside[known] &= possible
         return Followed(states, when, first, leads, log_likelihood, inside)
 
     def _moved(self, states: Any, dt: Array) -> Any:

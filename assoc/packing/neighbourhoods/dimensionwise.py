@@ -243,16 +243,13 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
         # all on the left must be matched, so all on the right will be
         for q in range(num_right):
             price[q] = 0.0
-    before = 0.0
-    for r in range(num_rows):
-        k = owner[r]
-        if k >= 0 and first_row(cols, k) == r:
-            before += weights[k]
+    before = _weight(cols, weights, owner)
     row_edge = np.empty(num_left, np.int64)
     u, v = np.empty(num_left), np.empty(num_right)
     after = match_sparse(indptr, indices[:count], costs[:count], left_alone, price, row_edge, u, v)
     if not after < before - 1e-9 * max(1.0, abs(before)):
         return 0.0
+    previous = owner.copy()
     for r in range(num_rows):
         owner[r] = -1
     taken = np.zeros(num_right, np.bool_)
@@ -266,4 +263,19 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
     for q in range(num_right):
         if not taken[q] and right_column[q] >= 0:
             own(cols, right_column[q], owner)
-    return after - before
+    # summed as before: among costs that cancel, rounding alone would be an improvement, and for ever
+    change = _weight(cols, weights, owner) - before
+    if change < 0.0:
+        return change
+    owner[:] = previous
+    return 0.0
+
+
+@njit
+def _weight(cols: Any, weights: Any, owner: Any) -> float:
+    total = 0.0
+    for r in range(owner.size):
+        k = owner[r]
+        if k >= 0 and first_row(cols, k) == r:
+            total += weights[k]
+    return total

@@ -1,4 +1,4 @@
-"""Hypothesis-oriented multiple hypothesis tracking: Reid's generation, Murty's m best, n-scan pruning.
+"""Hypothesis-oriented multiple hypothesis tracking: Reid's clusters and generation, Murty's m best, n-scan pruning.
 
 A hypothesis says of every measurement so far: false alarm, one of the existing targets, or a new target. Its
 probability is equation 2.1 of the thesis on clustering time windows,
@@ -7,7 +7,8 @@ probability is equation 2.1 of the thesis on clustering time windows,
 
 with N_d the targets that were detected, densities for P_FA and P_NT. Relative to "all false alarms" its
 logarithm is the sum of the scores of the hypothesis' tracks (`assoc.costs.tracks.scores`), so that both forms
-of the tracker count alike.
+of the tracker count alike. Tracks that contend for no measurement stand in clusters of their own, each with its own m
+best hypotheses (`assoc.tracking.mht.clusters`).
 
 References
 ----------
@@ -18,51 +19,52 @@ IEEE Trans. Pattern Analysis and Machine Intelligence 18, 1996.
 
 from __future__ import annotations
 
-import heapq
 from typing import Any
 
 import numpy as np
 
-from assoc._system import memory
 from assoc._system.door import doors
 from assoc._types import Array
-from assoc.costs.tracks.tuples import TrackPairs
 from assoc.errors import InvalidInputError
-from assoc.filters.base import predict_each
-from assoc.problem import AssignmentProblem
-from assoc.ranking.kbest import kbest
 from assoc.scene.scan import Scan
 from assoc.tracking.checkpoint import PREFIX, check_window, require_field
-from assoc.tracking.gated_pairs import gated_pairs
+from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
+from assoc.tracking.mht.crossed_births import with_births
+from assoc.tracking.mht.generation import generated
+from assoc.tracking.mht.growth import AtOnce, Births, Growth, InOrder
 from assoc.tracking.mht.pruning import MOST_SCANS
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
+_MOST_CROSSINGS = 100
+"""The most new targets in a scan where several sensors together tell a position."""
+
 
 @doors
 class HypothesisOrientedMHT(Tracker):
-    """Multiple hypothesis tracker that keeps the m best hypotheses about everything.
+    """Multiple hypothesis tracker that keeps the m best hypotheses about each cluster of tracks.
 
     Parameters
     ----------
     sensors, filter, ...
-        As for `Tracker`. Sensors of a scan are taken in one after the other; with a single sensor each
-        measurement may have its own time. The `solver` is not used: the ranking is Murty's.
+        As for `Tracker`. Sensors of a scan are taken in one after the other. The `solver` is not used: the ranking is
+        Murty's.
     max_hypotheses : int
         m.
     depth : int
         Scans after which a decision is final, n; at most 1000.
     hypothesis_drop : float
-        A hypothesis whose log-probability is this far below the best is dropped.
+        A hypothesis whose log-probability is this far below the best of its cluster is dropped.
     **options
         As for `Tracker`.
     """
 
     name = "mht-hypothesis"
+    weighs_identities = False
 
     def __init__(
-        self, *arguments: Any, max_hypotheses: int = 20, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
+        self, *arguments: Any, max_hypotheses: int = 50, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
         for value, what in ((depth, "depth"), (max_hypotheses, "max_hypotheses")):
@@ -74,190 +76,177 @@ class HypothesisOrientedMHT(Tracker):
             raise InvalidInputError(f"hypothesis_drop must be a number above 0, got {hypothesis_drop!r}")
         self.max_hypotheses, self.depth = int(max_hypotheses), int(depth)
         self.hypothesis_drop = float(hypothesis_drop)
-        self._members: list[Array] = [np.zeros(0, dtype=np.int64)]
-        """Rows of the batch that each hypothesis believes in, the best hypothesis first."""
-        self._weight = np.zeros(1)
-        """Log-probability of each hypothesis, up to a constant."""
-        self._line = np.zeros((1, self.depth), dtype=np.int64)
-        """Ancestors of each hypothesis: which one it came from in this scan, in the last, ..."""
+        self._clusters: list[Cluster] = []
+        """Their branches are all rows of the batch, cluster after cluster."""
         self._history = np.zeros((0, self.depth * len(self.sensors)), dtype=np.int32)
+        """Measurements of each branch (1-based, 0 missed): the sensors of this scan, of the last, ..."""
         self._window: list[tuple[float, Array]] = []
-
-    def _current(self) -> TrackBatch:
-        rows = self._members[0]
-        return self._batch[rows[np.argsort(self._batch.track_id[rows], kind="stable")]]
+        """Times and sizes of the scans that are not yet final, the last one first."""
 
     @property
     def probabilities(self) -> Array:
-        """Probabilities of the hypotheses that are kept, the best first."""
-        p = np.exp(self._weight - self._weight.max())
-        return np.asarray(p / p.sum())
+        """Probabilities of the best hypotheses about everything, the best first; at most `max_hypotheses` of them."""
+        logarithms = np.zeros(1)
+        for one in self._clusters:
+            both = (logarithms[:, None] + np.log(one.probabilities)).ravel()
+            logarithms = -np.sort(-both)[: self.max_hypotheses]
+        return np.exp(logarithms)
+
+    @property
+    def _best(self) -> Array:
+        """Branches of the best hypothesis."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(one.best for one in self._clusters)])
+
+    def _current(self) -> TrackBatch:
+        rows = self._best
+        return self._batch[rows[np.argsort(self._batch.track_id[rows], kind="stable")]]
 
     def _adopt(self, batch: TrackBatch) -> None:
         super()._adopt(batch)
         self._history = np.zeros((len(batch), self._history.shape[1]), dtype=np.int32)
-        self._members = [np.arange(len(batch))]
+        self._clusters = [
+            cluster(np.array([row]), np.ones((1, 1), dtype=np.bool_), np.zeros(1)) for row in range(len(batch))
+        ]
 
     def _step(self, scan: Scan) -> Step:
-        time, measurements, times = scan.time, scan.measurements, scan.times
-        if scan.sectors is not None or (times is not None and len(self.sensors) > 1):
-            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        count = len(self.sensors)
-        before = time if self._time is None else self._time
-        history = np.zeros_like(self._history)
-        history[:, count:] = self._history[:, : history.shape[1] - count]
-        self._history = history
-        parent = np.arange(len(self._members))
-        for s, z in enumerate(measurements):
-            parent = parent[self._generate(s, z, time, before, None if times is None else times[s])]
-            before = time
-        self._line = np.column_stack([parent, self._line[parent][:, : self.depth - 1]])
-        self._batch = self._batch.counted(np.asarray((self._history[:, :count] > 0).any(axis=1)))
-        self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
-        self._confirm()
-        now = self._decision(0)
-        final: tuple[Decision, ...] = ()
-        if len(self._window) == self.depth:
-            # hypotheses that disagree with the best about the oldest scan end here
-            ancestor = self._line[:, self.depth - 2]
-            self._keep(np.flatnonzero(ancestor == ancestor[0]) if self.depth > 1 else np.arange(1))
-            final = (self._decision(self.depth - 1),)
-            self._window.pop()
-        ended = self._delete_tracks(time)
-        return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
-
-    def _generate(self, s: int, z: Array, time: float, before: float, stamps: Array | None) -> Array:
-        """Children of all hypotheses by one sensor's measurements; returns the parent of each that is kept."""
-        batch, history = self._batch, self._history
-        sensor = self.sensors[s]
         # hypotheses of equal weight are kept by number: measurements are numbered by value, so that the order in which
         # they are given does not matter
-        order = np.lexsort((*z.T[::-1], *(() if stamps is None else (stamps,))))
-        z, stamps = z[order], None if stamps is None else stamps[order]
-        gated = gated_pairs(self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability)
-        pairs = gated.pairs
-        gain = pairs.log_likelihood + self.terms.detection[s]
-        roots, root_history, numbers = self._roots(s, z, time, stamps)
-        missed = batch.scored(gated.predicted, self.terms.miss[s])
-        hit = batch[pairs.track].scored(pairs.states, gain, gated.when)
-        hit_history = history[pairs.track]
-        hit_history[:, s] = pairs.measurement + 1
-        # rows of the next batch: missed branches, detected branches, new targets
-        self._batch = TrackBatch.concatenate([missed, hit, roots])
-        self._history = np.concatenate([history, hit_history, root_history])
-        given = np.concatenate([[0], order + 1]).astype(np.int32)
-        self._history[:, s] = given[self._history[:, s]]
-        offsets = (len(batch), len(batch) + len(pairs.track))
-        # no branch gains more than this
-        most = np.full(len(batch), self.terms.miss[s])
-        np.maximum.at(most, pairs.track, gain)
-        births = float(np.maximum(roots.score, 0.0).sum())
-        children: list[tuple[float, int, int, Array]] = []
-        number = 0
-        for h in np.argsort(-self._weight, kind="stable").tolist():
-            reachable = self._weight[h] + float(most[self._members[h]].sum()) + births
-            if len(children) == self.max_hypotheses and reachable <= children[0][0]:
-                continue
-            for weight, rows in self._ranked(h, s, pairs, gain, numbers, roots.score, len(z), offsets):
-                number += 1
-                entry = (weight, -number, h, rows)
-                if len(children) < self.max_hypotheses:
-                    heapq.heappush(children, entry)
-                elif weight > children[0][0]:
-                    heapq.heapreplace(children, entry)
-                else:
-                    break
-            memory.require(
-                len(children) * (16.0 * len(self._members[h]) + 400.0),
-                f"max_hypotheses = {self.max_hypotheses}: {len(children)} hypotheses",
-                "keep fewer",
-            )
-        children.sort(key=lambda one: (-one[0], one[2], one[3].tolist()))
-        best = children[0][0]
-        children = [one for one in children if one[0] >= best - self.hypothesis_drop]
-        self._weight = np.array([one[0] for one in children]) - best
-        self._members = [one[3] for one in children]
-        self._forget()
-        return np.array([one[2] for one in children], dtype=np.int64)
+        times = scan.times or [None] * len(scan.measurements)
+        pairs = zip(scan.measurements, times, strict=True)
+        orders = [np.lexsort((*z.T[::-1], *(() if stamps is None else (stamps,)))) for z, stamps in pairs]
+        known = self._batch.track_id[self._batch.confirmed]
+        growth = self._grown(self._sorted(scan, orders))
+        batch, looked = growth.finished()
+        given = [np.append(0, order + 1) for order in orders]
+        rows = np.stack([one[growth.rows[:, s]] for s, one in enumerate(given)], axis=1)
+        nothing = np.zeros((1, self._history.shape[1]), dtype=np.int32)
+        older = np.concatenate([self._history, nothing])[growth.origin]
+        self._history = np.concatenate([rows.astype(np.int32), older], axis=1)[:, : older.shape[1]]
+        self._batch = batch.counted(np.asarray(rows.any(axis=1)), looked)
+        self._window.insert(0, (scan.time, scan.sizes.astype(np.int64)))
+        self._confirm()
+        now = self._decision(0)
+        known = np.union1d(known, self._batch.track_id[self._batch.confirmed])
+        final: tuple[Decision, ...] = ()
+        if len(self._window) == self.depth:
+            self._prune()
+            final = (self._decision(self.depth - 1),)
+            self._window.pop()
+        self._delete_tracks(scan.time)
+        self._split()
+        ended = np.setdiff1d(known, self._batch.track_id)
+        return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
-    def _ranked(
-        self,
-        h: int,
-        s: int,
-        pairs: TrackPairs,
-        gain: Array,
-        numbers: Array,
-        birth: Array,
-        count: int,
-        offsets: tuple[int, int],
-    ) -> list[tuple[float, Array]]:
-        """The m best children of a hypothesis: log-probabilities and rows of the next batch."""
-        own = self._members[h]
-        place = np.full(offsets[0], -1, dtype=np.int64)
-        place[own] = np.arange(len(own))
-        mine = np.flatnonzero(place[pairs.track] >= 0)
-        # Cox and Hingorani's matrix: a target or a new one takes a measurement, what is left is a false alarm
-        targets, new = len(own), len(numbers)
-        rows = np.concatenate([place[pairs.track[mine]], np.arange(targets), targets + np.arange(new)]) + 1
-        columns = np.concatenate([pairs.measurement[mine] + 1, np.zeros(targets, np.int64), numbers + 1])
-        costs = np.concatenate([-gain[mine], np.full(targets, -self.terms.miss[s]), -birth])
-        meaning = np.concatenate([offsets[0] + mine, own, offsets[1] + np.arange(new)])
-        if not len(rows):
-            return [(float(self._weight[h]), own)]
-        problem = AssignmentProblem(np.stack([rows, columns], axis=1), costs, [targets + new, count])
-        found = []
-        for solution in kbest(problem, self.max_hypotheses):
-            used = solution.indices[solution.indices < len(meaning)]
-            found.append((float(self._weight[h]) - solution.cost, np.sort(meaning[used])))
-        return found
+    @staticmethod
+    def _sorted(scan: Scan, orders: list[Array]) -> Scan:
+        ordered = [z[order] for z, order in zip(scan.measurements, orders, strict=True)]
+        stamps = None if scan.times is None else tuple(t[order] for t, order in zip(scan.times, orders, strict=True))
+        return Scan(scan.index, scan.time, tuple(ordered), times=stamps, sectors=scan.sectors)
 
-    def _roots(self, s: int, z: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array, Array]:
-        numbers = np.arange(len(z))
-        states, fit, positions, score = self._new_tracks.singles(s, z)
-        numbers = numbers[fit]
-        when = np.full(len(numbers), time) if stamps is None else stamps[numbers]
-        ids = np.empty(len(numbers), dtype=np.int64)
-        ids[np.lexsort((*positions.T, when))] = self._new_ids(len(numbers))
-        history = np.zeros((len(numbers), self._history.shape[1]), dtype=np.int32)
-        history[:, s] = numbers + 1
-        return TrackBatch.new(predict_each(self.filter, states, time - when), ids, score, when), history, numbers
+    def _grown(self, scan: Scan) -> Growth:
+        """Branches and clusters after the scan's sensors, one after the other."""
+        growth: AtOnce | InOrder
+        if scan.at_once:
+            predicted = self._predicted(self._batch, self._elapsed(scan.time)).states
+            growth = AtOnce(
+                self._batch, scan, predicted, self.filter, self.sensors, self.terms, self._new_tracks,
+                self.gate_probability,
+            )  # fmt: skip
+        else:
+            growth = InOrder(self._batch, self._timed(scan), self.terms)
+        for s in growth.order:
+            offers = growth.offers(s)
+            new_ids = self._ids_of(offers.births)
+            limits = self.max_hypotheses, self.hypothesis_drop
+            born, count = offers.births.rows[:, s] - 1, len(scan.measurements[s])
+            self._clusters = generated(self._clusters, offers, born, count, *limits)
+            growth.take(s, offers, self._renumber(), new_ids)
+        if isinstance(growth, AtOnce):
+            self._begin_crossed(scan, growth)
+        return growth
 
-    def _keep(self, hypotheses: Array, weights: Array | None = None) -> None:
-        self._members = [self._members[h] for h in hypotheses]
-        self._weight = self._weight[hypotheses] if weights is None else weights
-        self._line = self._line[hypotheses]
-        self._weight = self._weight - self._weight.max()
-        self._forget()
-
-    def _forget(self) -> None:
-        """Drop the branches that no hypothesis believes in."""
-        used = np.unique(np.concatenate(self._members)) if self._members else np.zeros(0, dtype=np.int64)
-        place = np.zeros(len(self._batch), dtype=np.int64)
-        place[used] = np.arange(len(used))
-        self._batch, self._history = self._batch[used], self._history[used]
-        self._members = [place[rows] for rows in self._members]
-
-    def _merge(self) -> None:
-        """Put hypotheses together that have become the same since tracks in which they differed are deleted."""
-        places: dict[bytes, list[int]] = {}
-        for h, rows in enumerate(self._members):
-            places.setdefault(rows.tobytes(), []).append(h)
-        if len(places) == len(self._members):
+    def _begin_crossed(self, scan: Scan, growth: AtOnce) -> None:
+        """New targets of what the best hypothesis' confirmed tracks leave of sensors that start none alone."""
+        rows = self._best
+        sure = np.append(self._batch.confirmed, False)[growth.origin[rows]]
+        taken = growth.rows[rows[sure]]
+        free = [np.isin(np.arange(1, size + 1), taken[:, s], invert=True) for s, size in enumerate(scan.sizes.tolist())]
+        found = self._crossings(scan, free)
+        if found is None:
             return
-        weights = [float(np.logaddexp.reduce(self._weight[same])) for same in places.values()]
-        order = sorted(range(len(weights)), key=lambda i: (-weights[i], i))
-        firsts = [same[0] for same in places.values()]
-        self._keep(np.array([firsts[i] for i in order], dtype=np.int64), np.array([weights[i] for i in order]))
+        several, scores = found
+        # by far the most are ghosts
+        best = np.argsort(-scores, kind="stable")[:_MOST_CROSSINGS]
+        births = Births(several.rows[best], scores[best], np.lexsort(several.positions[best].T))
+        states = self.initiation.start(self.filter, several.positions[best], several.covariances[best])
+        most, drop = self.max_hypotheses, self.hypothesis_drop
+        self._clusters = with_births(self._clusters, growth.rows, births, scan.sizes, most, drop)
+        growth.take_crossings(births, states, self._renumber(), self._ids_of(births))
+
+    def _ids_of(self, births: Births) -> Array:
+        ids = np.empty(len(births.turn), dtype=np.int64)
+        ids[births.turn] = self._new_ids(len(births.turn))
+        return ids
+
+    def _renumber(self) -> Array:
+        """Give the branches of the clusters new rows, cluster after cluster; their rows before."""
+        clusters = [one for one in self._clusters if len(one.branches)]
+        kept = np.concatenate([np.zeros(0, dtype=np.int64), *(one.branches for one in clusters)])
+        rows, end = np.arange(len(kept)), 0
+        self._clusters = []
+        for branches, holds, weight in clusters:
+            begin, end = end, end + len(branches)
+            self._clusters.append(Cluster(rows[begin:end], holds, weight))
+        return kept
+
+    def _keep(self, clusters: list[Cluster]) -> None:
+        """Go on with these clusters."""
+        self._clusters = clusters
+        kept = self._renumber()
+        self._batch, self._history = self._batch[kept], self._history[kept]
+
+    def _prune(self) -> None:
+        """End the hypotheses that disagree with the best of their cluster about the oldest scan of the window."""
+        said = self._history[:, -len(self.sensors) :].astype(np.int64)
+        owner = np.where(said > 0, self._batch.track_id[:, None] * (said.max(initial=0) + 1) + said, 0)
+        decided = np.asarray(owner.any(axis=1))
+        self._keep(
+            [agreeing(one, owner[one.branches]) if decided[one.branches].any() else one for one in self._clusters]
+        )
+
+    def _delete_tracks(self, time: float) -> None:
+        """Delete the tracks all of whose branches say so."""
+        ids = self._batch.track_id
+        gone = ~np.isin(ids, ids[~self._to_delete(self._batch, time)])
+        if gone.any():
+            left = (one for one in self._clusters if not gone[one.branches].all())
+            self._keep([without(one, gone[one.branches]) for one in left])
+
+    def _split(self) -> None:
+        """Let clusters fall apart: branches hang together that are of one track or want the same measurement."""
+        count = len(self._batch)
+        tracks, track = np.unique(self._batch.track_id, return_inverse=True)
+        branch, column = np.nonzero(self._history)
+        wanted = column * (self._history.max(initial=0) + np.int64(1)) + self._history[branch, column]
+        wants, want = np.unique(wanted, return_inverse=True)
+        first, second = np.append(np.arange(count), branch), np.append(count + track, count + len(tracks) + want)
+        label = linked(first, second, count + len(tracks) + len(wants))
+        found = []
+        for one in self._clusters:
+            own = label[one.branches]
+            together = len(own) == 1 or bool((own == own[0]).all())
+            found += [one] if together else parts(one, own, self._batch.score[one.branches])
+        self._keep(found)
 
     def _confirm(self) -> None:
-        batch, rows = self._batch, self._members[0]
+        batch, rows = self._batch, self._best
         good = batch.track_id[rows[batch.confirm(self.life_cycle).confirmed[rows]]]
         self._batch = batch.with_confirmed(batch.confirmed | np.isin(batch.track_id, good))
 
     def _decision(self, age: int) -> Decision:
         count = len(self.sensors)
         time, sizes = self._window[age]
-        rows = self._members[0]
+        rows = self._best
         assigned = []
         for s in range(count):
             ids = np.zeros(int(sizes[s]) + 1, dtype=np.int64)
@@ -265,15 +254,6 @@ class HypothesisOrientedMHT(Tracker):
             assigned.append(ids[1:])
         batch = self._batch[rows]
         return decision(self._scan - age, time, assigned, batch.track_id[batch.confirmed])
-
-    def _delete_tracks(self, time: float) -> Array:
-        before = np.unique(self._batch.track_id[self._batch.confirmed])
-        gone = self._to_delete(self._batch, time)
-        if gone.any():
-            self._members = [rows[~gone[rows]] for rows in self._members]
-            self._forget()
-            self._merge()
-        return np.setdiff1d(before, self._batch.track_id)
 
     def flush(self) -> tuple[Decision, ...]:
         """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
@@ -290,29 +270,36 @@ class HypothesisOrientedMHT(Tracker):
     def _arrays(self) -> dict[str, Array]:
         times = np.array([time for time, _ in self._window], dtype=np.float64)
         sizes = np.array([sizes for _, sizes in self._window], dtype=np.int64).reshape(-1, len(self.sensors))
-        own: dict[str, Array] = {"history": self._history, "weight": self._weight, "line": self._line}
-        own["members"] = np.concatenate(self._members)
-        own["lengths"] = np.array([len(rows) for rows in self._members], dtype=np.int64)
-        own |= {"window_times": times, "window_sizes": sizes}
+        own: dict[str, Array] = {"history": self._history, "window_times": times, "window_sizes": sizes}
+        shapes = [one.holds.shape for one in self._clusters]
+        own["cluster_hypotheses"] = np.array([hypotheses for hypotheses, _ in shapes], dtype=np.int64)
+        own["cluster_branches"] = np.array([branches for _, branches in shapes], dtype=np.int64)
+        own["holds"] = np.concatenate([np.zeros(0, np.bool_), *(one.holds.ravel() for one in self._clusters)])
+        own["weight"] = np.concatenate([np.zeros(0), *(one.weight for one in self._clusters)])
         return super()._arrays() | own
 
     def _check(self, arrays: dict[str, Array]) -> None:
         super()._check(arrays)
         count = len(arrays[f"{PREFIX}track_id"])
         check_window(arrays, count, len(self.sensors), self.depth)
-        members, lengths, weight, line = (arrays[name] for name in ("members", "lengths", "weight", "line"))
-        require_field(1 <= len(lengths) <= self.max_hypotheses, "lengths", f"1 to {self.max_hypotheses} hypotheses")
-        require_field((lengths >= 0).all() and (lengths <= count).all(), "lengths", "numbers of branches")
-        require_field(int(lengths.sum()) == len(members), "members", "as many branches as the lengths say")
-        require_field(((members >= 0) & (members < count)).all(), "members", "numbers of branches")
-        weighed = weight.shape == lengths.shape and np.isfinite(weight).all()
+        hypotheses, branches = arrays["cluster_hypotheses"], arrays["cluster_branches"]
+        some = ((hypotheses >= 1) & (hypotheses <= self.max_hypotheses)).all()
+        require_field(some, "cluster_hypotheses", f"1 to {self.max_hypotheses} hypotheses of each cluster")
+        all_of_them = branches.shape == hypotheses.shape and ((branches >= 1) & (branches <= count)).all()
+        all_of_them = all_of_them and int(branches.sum()) == count
+        require_field(all_of_them, "cluster_branches", "how many branches each cluster has")
+        size = int((hypotheses * branches).sum())
+        require_field(len(arrays["holds"]) == size, "holds", "whether each hypothesis holds each branch")
+        weight = arrays["weight"]
+        weighed = len(weight) == int(hypotheses.sum()) and np.isfinite(weight).all()
         require_field(weighed, "weight", "a number for each hypothesis")
-        require_field(line.shape == (len(lengths), self.depth), "line", f"the shape {(len(lengths), self.depth)}")
-        require_field((line >= 0).all(), "line", "numbers of hypotheses")
 
     def _take(self, arrays: dict[str, Array]) -> None:
         super()._take(arrays)
-        self._history, self._line = arrays["history"].astype(np.int32), arrays["line"]
-        self._weight = arrays["weight"]
-        self._members = np.split(arrays["members"], np.cumsum(arrays["lengths"])[:-1])
+        self._history = arrays["history"].astype(np.int32)
         self._window = [(float(t), n) for t, n in zip(arrays["window_times"], arrays["window_sizes"], strict=True)]
+        self._clusters = []
+        weight, holds, row = arrays["weight"], arrays["holds"], 0
+        for h, b in zip(arrays["cluster_hypotheses"].tolist(), arrays["cluster_branches"].tolist(), strict=True):
+            self._clusters.append(Cluster(np.arange(row, row + b), holds[: h * b].reshape(h, b), weight[:h]))
+            weight, holds, row = weight[h:], holds[h * b :], row + b

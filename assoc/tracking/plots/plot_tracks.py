@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assoc._types import Array
-from assoc.metrics import CtMtIt, ct_mt_it
+from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
 from assoc.recordings import Recording, Window
 from assoc.tracking.plots.plot_windows import step_windows
 from assoc.tracking.track_table import TrackTable
@@ -30,6 +30,9 @@ class PlotTracks(NamedTuple):
         CT, MT and IT of the windows; None where no aircraft is known.
     table : TrackTable
         The tracks after each window; their altitude is the last that a plot of theirs has told, garbled ones left out.
+    kept : (int, int) or None
+        Confirmed tracks that kept one identity, and those that had any: the aircraft where it is known, else the
+        address if any plot has one, else Mode 3. None where no plot has an identity.
     """
 
     recording: Recording
@@ -38,6 +41,7 @@ class PlotTracks(NamedTuple):
     tracks: Array
     rates: CtMtIt | None
     table: TrackTable
+    kept: tuple[int, int] | None
 
 
 def track_plots(
@@ -77,10 +81,21 @@ def track_plots(
         listed = (track for track in tracker.tracks if track.reported or not confirmed)
         table.add(listed, tracker.filter.motion.position, altitudes)
     tracks = np.concatenate(takers)
-    aircraft = recording.aircraft
-    rates = None
+    aircraft, confirmed_then = recording.aircraft, np.concatenate(sure)
+    rates = kept = None
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(window.rows for window in done)])
     if aircraft is not None and done:
         number = np.repeat(np.arange(len(done)), [len(window) for window in done])
-        rows = np.concatenate([window.rows for window in done])
-        rates = ct_mt_it(number, aircraft[rows], tracks, np.concatenate(sure))
-    return PlotTracks(recording, done, np.array(ends), tracks, rates, table)
+        rates = ct_mt_it(number, aircraft[rows], tracks, confirmed_then)
+    names = _names(recording)[rows]
+    if (names >= 0).any():
+        kept = tracks_of_one_identity(names, tracks, confirmed_then)
+    return PlotTracks(recording, done, np.array(ends), tracks, rates, table, kept)
+
+
+def _names(recording: Recording) -> Array:
+    """One number for each identity (n,): of the aircraft, else the address, else Mode 3; -1 where a plot has none."""
+    if recording.sources is not None:
+        return recording.sources
+    given = recording.addresses if recording.addresses.any() else recording.identities
+    return np.where(given > 0, given, -1)

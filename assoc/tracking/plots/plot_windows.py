@@ -23,6 +23,14 @@ class PlotWindow(Protocol):
     def measurements(self) -> Array:
         """Measurements (n, d) of one sensor."""
 
+    @property
+    def identities(self) -> Array:
+        """Mode 3/A codes (n,), 0 where there is none."""
+
+    @property
+    def addresses(self) -> Array:
+        """ICAO addresses (n,), 0 where there is none."""
+
 
 def step_windows(tracker: Tracker, windows: Iterable[PlotWindow], *, stamps: bool = True) -> Iterator[Step]:
     """Take windows of plots in, one after the other.
@@ -48,4 +56,7 @@ def step_windows(tracker: Tracker, windows: Iterable[PlotWindow], *, stamps: boo
         if early is not None:
             times = np.maximum(times, early)
         end = float(times[-1]) if len(times) else float(early or 0.0)
-        yield tracker.step(end, [window.measurements], [times] if stamps else None)
+        known = None
+        if tracker.identities is not None:
+            known = [np.stack([window.identities, window.addresses], axis=1)]
+        yield tracker.step(end, [window.measurements], [times] if stamps else None, identities=known)

@@ -1,0 +1,279 @@
+"""The m best children of a cluster's hypotheses by one sensor's measurements: Murty's partition, one queue for all.
+
+A child says of each measurement: false alarm, a new target, or one of its parent's tracks, each track at most once.
+That is a two-dimensional assignment problem for each parent. All parents share one queue, so that a parent whose best
+child is not among the m best of all costs no more than its bound (Cox and Miller). A child is split by its measurements
+in turn: those before are fixed, the one in turn may not be what it was; and is solved when it comes first.
+
+References
+----------
+I. J. Cox, M. L. Miller, On finding ranked assignments with application to multitarget tracking and motion
+correspondence, IEEE Trans. Aerospace and Electronic Systems 31, 1995.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._system.compiled import search_njit
+from assoc._types import Array
+from assoc.packing.kernels.heap import doubled, pop, push
+from assoc.packing.kernels.matching import match_sparse
+
+NEW, FALSE = -1, -2
+"""What a measurement may be besides one of the pairs."""
+
+
+class Parents(NamedTuple):
+    """Hypotheses before the measurements of a sensor."""
+
+    holds: Array
+    """Which tracks each believes in, bool (H, T)."""
+    weight: Array
+    """Log-probability of each if all its tracks are missed and all measurements are false alarms, (H,)."""
+
+
+class Meanings(NamedTuple):
+    """What n measurements may mean."""
+
+    first: Array
+    """Pairs ``first[j]:first[j + 1]`` have measurement j, int64 (n + 1,)."""
+    track: Array
+    """Track of each pair, int64 (K,)."""
+    gain: Array
+    """What a pair adds to the log-probability, against the track missed and the measurement a false alarm, (K,)."""
+    birth: Array
+    """What a new target adds; -inf where there can be none, (n,)."""
+
+
+class _Nodes(NamedTuple):
+    """Children in the queue or taken from it, one a row."""
+
+    parent: Any
+    above: Any
+    """Node that each was split from, -1: none."""
+    turn: Any
+    """Measurement that may not be what it was in that node; those before it are what they were."""
+    choice: Any
+    cost: Any
+    """Infinite while it is known by a bound alone."""
+    rise: Any
+    """What it costs at least to make each measurement something else."""
+
+
+class _Work(NamedTuple):
+    """Room for one assignment problem; its columns are the tracks, then a new target for each measurement."""
+
+    indptr: Any
+    columns: Any
+    costs: Any
+    choice: Any
+    row_slack: Any
+    column_slack: Any
+    edge: Any
+    u: Any
+    v: Any
+    taken: Any
+
+
+def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> tuple[Array, Array, Array]:
+    """Rank the children of all parents.
+
+    Parameters
+    ----------
+    parents : Parents
+    meanings : Meanings
+    most : int
+        The most children.
+    drop : float
+        Children whose log-probability is this far below the best are left out.
+
+    Returns
+    -------
+    parent : int64 array (C,)
+    choice : int32 array (C, n)
+        Pair of each measurement, or `NEW`, or `FALSE`.
+    weight : array (C,)
+        Log-probability, the largest first.
+    """
+    parent, choice, weight = _rank(parents, meanings, most, drop)
+    return parent, choice, weight
+
+
+@search_njit
+def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, most: int, drop: float) -> Any:
+    """The next hypotheses of a cluster, in one compiled call.
+
+    Parameters
+    ----------
+    holds, weight : bool array (H, T), array (H,)
+        Hypotheses before the measurements.
+    missed : array (T,)
+        What a miss of each track adds to a log-probability.
+    meanings, most, drop
+        As for `best_children`.
+
+    Returns
+    -------
+    used : int64 array (U,)
+        Which of the tracks missed, the pairs and the new targets, in this order, any hypothesis believes in.
+    holds, weight : bool array (C, U), array (C,)
+        Hypotheses, the best first, with log-probability 0.
+    """
+    tracks, pairs = missed.size, meanings.track.size
+    alone = weight.copy()
+    for h in range(weight.size):
+        for b in range(tracks):
+            if holds[h, b]:
+                alone[h] += missed[b]
+    parent, choice, after = _rank(Parents(holds, alone), meanings, most, drop)
+    held = np.zeros((parent.size, tracks + pairs + meanings.birth.size), np.bool_)
+    for c in range(parent.size):
+        held[c, :tracks] = holds[parent[c]]
+        for j in range(choice.shape[1]):
+            if choice[c, j] == NEW:
+                held[c, tracks + pairs + j] = True
+            elif choice[c, j] >= 0:
+                held[c, meanings.track[choice[c, j]]] = False
+                held[c, tracks + choice[c, j]] = True
+    used, size = np.empty(held.shape[1], np.int64), 0
+    for column in range(held.shape[1]):
+        if held[:, column].any():
+            used[size] = column
+            size += 1
+    found = np.empty((parent.size, size), np.bool_)
+    for c in range(parent.size):
+        for i in range(size):
+            found[c, i] = held[c, used[i]]
+    return used[:size], found, after - after[0]
+
+
+@search_njit
+def _rank(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
+    holds, weight = parents
+    count, room = meanings.birth.size, weight.size + 64
+    nodes = _Nodes(
+        np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+        np.empty((room, count), np.int32), np.full(room, np.inf), np.empty((room, count)),
+    )  # fmt: skip
+    work = _room(holds.shape[1], count, meanings.track.size)
+    key, item = np.empty(room), np.empty(room, np.int64)
+    made, waiting = 0, 0
+    for h in range(weight.size):
+        nodes.parent[made], nodes.above[made], nodes.turn[made] = h, -1, 0
+        push(key, item, waiting, _bound(parents, meanings, h), made)
+        made, waiting = made + 1, waiting + 1
+    found = np.empty(min(most, 64), np.int64)
+    size, limit = 0, np.inf
+    while waiting > 0 and size < most and key[0] <= limit:
+        value, node = key[0], item[0]
+        waiting -= 1
+        pop(key, item, waiting)
+        if nodes.cost[node] == np.inf:
+            _solve(parents, meanings, nodes, work, node)
+            if nodes.cost[node] < np.inf:
+                push(key, item, waiting, nodes.cost[node], node)
+                waiting += 1
+            continue
+        if size == 0:
+            limit = value + drop
+        if size == found.size:
+            found = doubled(found)
+        found[size] = node
+        size += 1
+        while made + count > key.size:
+            nodes = _Nodes(
+                doubled(nodes.parent), doubled(nodes.above), doubled(nodes.turn), doubled(nodes.choice),
+                doubled(nodes.cost), doubled(nodes.rise),
+            )  # fmt: skip
+            nodes.cost[made:] = np.inf
+            key, item = doubled(key), doubled(item)
+        for j in range(nodes.turn[node], count):
+            bound = value + nodes.rise[node, j]
+            if bound <= limit:
+                nodes.parent[made], nodes.above[made], nodes.turn[made] = nodes.parent[node], node, j
+                push(key, item, waiting, bound, made)
+                made, waiting = made + 1, waiting + 1
+    found = found[:size]
+    return nodes.parent[found], nodes.choice[found], -nodes.cost[found]
+
+
+@search_njit
+def _room(tracks: int, count: int, pairs: int) -> Any:
+    return _Work(
+        np.zeros(count + 1, np.int64), np.empty(pairs + count, np.int64), np.empty(pairs + count),
+        np.empty(pairs + count, np.int32), np.empty(count), np.zeros(tracks + count), np.empty(count, np.int64),
+        np.empty(count), np.empty(tracks + count), np.zeros(tracks, np.bool_),
+    )  # fmt: skip
+
+
+@search_njit
+def _bound(parents: Parents, meanings: Meanings, h: int) -> float:
+    """What the best child of a parent costs at least: each measurement is what suits it best."""
+    cost = -parents.weight[h]
+    for j in range(meanings.birth.size):
+        most = max(0.0, meanings.birth[j])
+        for k in range(meanings.first[j], meanings.first[j + 1]):
+            if parents.holds[h, meanings.track[k]]:
+                most = max(most, meanings.gain[k])
+        cost -= most
+    return cost
+
+
+@search_njit
+def _solve(parents: Parents, meanings: Meanings, nodes: _Nodes, work: _Work, node: int) -> None:
+    """Find the best child of a node's kind, and what it costs at least to change it; infinite where there is none."""
+    first, track, gain, birth = meanings
+    above, turn = nodes.above[node], nodes.turn[node]
+    choice, h = nodes.choice[node], nodes.parent[node]
+    count, tracks = birth.size, work.taken.size
+    cost = -parents.weight[h]
+    work.taken[:] = False
+    for j in range(turn):
+        chosen = nodes.choice[above, j]
+        choice[j] = chosen
+        if chosen == NEW:
+            cost -= birth[j]
+        elif chosen >= 0:
+            cost -= gain[chosen]
+            work.taken[track[chosen]] = True
+    edges = 0
+    for j in range(turn, count):
+        may_be_false = True
+        if birth[j] > -np.inf:
+            work.columns[edges], work.costs[edges], work.choice[edges] = tracks + j, -birth[j], NEW
+            edges += 1
+        for k in range(first[j], first[j + 1]):
+            if parents.holds[h, track[k]] and not work.taken[track[k]]:
+                work.columns[edges], work.costs[edges], work.choice[edges] = track[k], -gain[k], k
+                edges += 1
+        if j == turn:
+            # what it was in the nodes that this one was split from
+            at = node
+            while nodes.above[at] >= 0 and nodes.turn[at] == turn:
+                at = nodes.above[at]
+                if nodes.choice[at, j] == FALSE:
+                    may_be_false = False
+                for e in range(edges):
+                    if work.choice[e] == nodes.choice[at, j]:
+                        work.costs[e] = np.inf
+        work.row_slack[j - turn] = 0.0 if may_be_false else np.inf
+        work.indptr[j - turn + 1] = edges
+    rows = count - turn
+    total = match_sparse(
+        work.indptr[: rows + 1], work.columns, work.costs, work.row_slack[:rows], work.column_slack,
+        work.edge[:rows], work.u[:rows], work.v,
+    )  # fmt: skip
+    nodes.cost[node] = cost + total
+    if total == np.inf:
+        return
+    for i in range(rows):
+        chosen = work.edge[i]
+        choice[turn + i] = FALSE if chosen < 0 else work.choice[chosen]
+        least = np.inf if chosen < 0 else work.row_slack[i] - work.u[i]
+        for e in range(work.indptr[i], work.indptr[i + 1]):
+            if e != chosen:
+                least = min(least, work.costs[e] - work.u[i] - work.v[work.columns[e]])
+        nodes.rise[node, turn + i] = max(0.0, least)
