@@ -25,6 +25,11 @@ class Experiment(NamedTuple):
     regenerates: str
 
 
+def _published(page: str, name: str) -> str:
+    """What an experiment with trackers gives."""
+    return f"docs/{page}.md (measured); with --publish experiments/results/trackers.{name}.json"
+
+
 EXPERIMENTS = (
     Experiment(
         "benchmarks",
@@ -110,16 +115,19 @@ EXPERIMENTS = (
         "docs/filters.md (consistency); with --publish experiments/results/filters.endurance.json",
     ),
     Experiment("filters.tune", "tuning of the fuzzy rules and of the IMM", "assoc/filters/fuzzy/tuned_parameters.json"),
-    Experiment("trackers.asynchronous", "turning radars, late plots", "docs/tracking.md (turning radars)"),
-    Experiment("trackers.benchmark", "our trackers and Stone Soup's; goals", "docs/tracking.md (measured)"),
-    Experiment("trackers.biases", "registration of biased radars", "docs/registration.md (measured)"),
-    Experiment("trackers.close_targets", "trackers where association is hard", "docs/tracking.md (close targets)"),
+    Experiment("trackers.asynchronous", "turning radars, late plots", _published("tracking", "asynchronous")),
+    Experiment("trackers.bearings", "bearings alone: tracks among ghosts", _published("tracking", "bearings")),
+    Experiment("trackers.benchmark", "our trackers and Stone Soup's", _published("tracking", "benchmark")),
+    Experiment("trackers.biases", "registration of biased radars", _published("registration", "biases")),
+    Experiment("trackers.capacity", "many targets, long runs", _published("tracking", "capacity")),
+    Experiment("trackers.close_targets", "trackers where association is hard", _published("tracking", "close_targets")),
+    Experiment("trackers.live", "plots as they come: the time of a step", _published("tracking", "live")),
     Experiment(
         "trackers.warm_starts",
         "whether trackers would gain by warm starts",
         "docs/tracking.md (warm starts); with --publish experiments/results/trackers.warm_starts.json",
     ),
-    Experiment("trackers.comparison", "our trackers side by side", "docs/tracking.md (measured)"),
+    Experiment("trackers.comparison", "our trackers side by side", _published("tracking", "comparison")),
     Experiment(
         "trackers.fusion_in_stone_soup",
         "fusion before tracking, in Stone Soup",
@@ -128,8 +136,7 @@ EXPERIMENTS = (
     Experiment(
         "metaheuristics.ablation",
         "aco, genetic and tabu with each part taken out, and with two workers",
-        "docs/solvers.md (what each part contributes); with --publish "
-        "experiments/results/metaheuristics.ablation.json",
+        "docs/solvers.md (what each part contributes); with --publish experiments/results/metaheuristics.ablation.json",
     ),
     Experiment(
         "metaheuristics.against_peers",

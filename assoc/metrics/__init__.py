@@ -5,6 +5,7 @@ from __future__ import annotations
 from assoc.metrics.association_accuracy import AssociationAccuracy, association_accuracy
 from assoc.metrics.ct_mt_it import CtMtIt, ct_mt_it
 from assoc.metrics.gospa import Gospa, gospa, gospa_over_time, mean_gospa
+from assoc.metrics.hota import Hota, hota
 from assoc.metrics.identity import Identity, identity, label_switches
 from assoc.metrics.ospa import Ospa, ospa, ospa_over_time
 from assoc.metrics.ospa2 import ospa2
@@ -17,6 +18,7 @@ __all__ = [
     "AssociationAccuracy",
     "CtMtIt",
     "Gospa",
+    "Hota",
     "Identity",
     "Ospa",
     "Summary",
@@ -25,6 +27,7 @@ __all__ = [
     "ct_mt_it",
     "gospa",
     "gospa_over_time",
+    "hota",
     "identity",
     "identity_after_each",
     "label_switches",

@@ -89,8 +89,6 @@ class Tracker(Checkpoint):
     """
 
     name: ClassVar[str]
-    weighs_identities: ClassVar[bool] = True
-    """Whether it can use codes and addresses."""
 
     def __init__(
         self,
@@ -134,8 +132,6 @@ class Tracker(Checkpoint):
         if not (registration is None or isinstance(registration, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
         self.registration = registration
-        if identity is not None and not self.weighs_identities:
-            raise InvalidInputError(f"identity: {self.name} cannot use codes and addresses; take another tracker")
         self.identities = None if identity is None else Identities(identity)
         self.terms = score_terms(self.sensors)
         self._new_tracks = NewTracks(self._place, self.filter, self.initiation, self.terms)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.pages import coverage, measured, metaheuristics
+from experiments.pages import coverage, measured, metaheuristics, trackers
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TABLES: dict[str, dict[str, Callable[[], str]]] = {
@@ -24,7 +24,8 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "solvers.md": metaheuristics.SOLVERS,
     "ant_colony.md": metaheuristics.ANT_COLONY,
     "concepts.md": measured.CONCEPTS,
-    "tracking.md": measured.TRACKING,
+    "tracking.md": {**measured.TRACKING, **trackers.TRACKING},
+    "registration.md": trackers.REGISTRATION,
 }
 """Page -> name of the table -> what makes it."""
 

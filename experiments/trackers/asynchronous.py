@@ -1,49 +1,44 @@
 """Turning radars, each at its own pace: measurements with times of their own, and late ones.
 
     python -m experiments.trackers.asynchronous [FILE.csv] [--quick] [--seed N] [--json FILE] [--figure FILE]
+                                                [--seeds N] [--publish]
 
 Three radars with 4, 5 and 5.5 seconds for a turn see thirty airliners, and with a file recorded traffic. GOSPA (order
 2), identity switches and CPU time of a scan, beside an oracle that is told which measurement is whose and when it was
 made; and what comes of it when the plots of four seconds are taken to be of one instant. Then a fifth of the plots
 arrives up to 30 s late: the tracks as they are once everything is there, as they are shown at once, and with the late
-plots refused, beside the tracks of plots in order. Seeds are --seed and those that follow.
+plots refused, beside the tracks of plots in order. Seeds are --seed and those that follow, --seeds of
+them (8), half as many for recorded traffic and late plots.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from assoc import simulation
 from assoc._types import Array
-from assoc.metrics import Trajectories, gospa_over_time, identity
+from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
-from experiments.common.command import make_parser, mean_interval, run
-from experiments.trackers.oracle import OracleTracker
+from experiments.common.command import make_parser, run
+from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
 from experiments.trackers.running import through
 
-CUTOFF = 500.0
-"""Of GOSPA, metres."""
 TURNS, INTERVAL = "4,5,5.5", 4.0
 NAMES = ("oracle", "multi-sensor", "static", "mht", "nearest-neighbour")
+INSTANT = "multi-sensor, as one instant"
 WITHIN_ORACLE, WITHIN_ORDER = 1.10, 1.02
+SEEDS = 8
+"""Scenes of airliners; of recorded traffic, and of late plots, there are half as many."""
 LATE_SHARE, MOST_LATE = 0.2, 30.0
 LATE_NAMES = ("in order", "late, once all is there", "late, at once", "late refused")
 _SETTLED = 5
 """Scans at the beginning that are left out where ways to treat late plots are compared."""
-
-
-class Judged(NamedTuple):
-    """One tracker on one scene."""
-
-    gospa: float
-    switches: float
-    milliseconds: float
 
 
 def at_one_instant(scene: Scene) -> Scene:
@@ -51,21 +46,11 @@ def at_one_instant(scene: Scene) -> Scene:
     return Scene(scene.sensors, scene.times, scene.measurements, scene.region, scene.truth)
 
 
-def mean_gospa(scene: Scene, tracks: Trajectories, scans: slice = slice(None)) -> float:
-    """Mean GOSPA over some of the scans, metres."""
-    times, values = gospa_over_time(Trajectories.from_scene(scene), tracks, CUTOFF)
-    by_time = dict(zip(times.tolist(), values, strict=True))
-    return float(np.mean([by_time[t].distance if t in by_time else 0.0 for t in scene.times[scans].tolist()]))
-
-
-def judge(name: str, scene: Scene) -> Judged:
-    """Run a tracker with default settings over a scene."""
-    if name == "multi-sensor, as one instant":
+def judge_own_times(name: str, scene: Scene) -> Judged:
+    """Run a tracker over a scene of turning radars; "..., as one instant" is not told the measurements' own times."""
+    if name == INSTANT:
         scene, name = at_one_instant(scene), "multi-sensor"
-    tracker = OracleTracker(scene) if name == "oracle" else TRACKERS[name].for_scene(scene)
-    done = through(tracker, scene)
-    switches = identity(Trajectories.from_scene(scene), done.tracks, CUTOFF).switches
-    return Judged(mean_gospa(scene, done.tracks), float(switches), 1e3 * float(np.median(done.seconds[1:])))
+    return judge(name, scene)
 
 
 def arrivals(scene: Scene, rng: np.random.Generator) -> list[tuple[list[Array], list[Array]]]:
@@ -112,58 +97,51 @@ def late_plots(scene: Scene, rng: np.random.Generator) -> tuple[list[float], flo
         strict.step(scan.time, z, times, scan.sectors)
         refused.add(one for one in strict.tracks if one.confirmed)
     tables = [Trajectories(*one.arrays()) for one in (settled, shown, refused)]
-    return [mean_gospa(scene, one, judged) for one in (ordered, *tables)], 1e3 * float(np.median(seconds))
+    found = [float(distances(scene, one)[judged].mean()) for one in (ordered, *tables)]
+    return found, 1e3 * float(np.median(seconds))
 
 
-def experiment(file: str | None, quick: bool, seed: int) -> tuple[list[Claim], dict[str, dict[str, Array]]]:
+def experiment(
+    file: str | None, quick: bool, seed: int, seeds: int = SEEDS
+) -> tuple[list[Claim], dict[str, dict[str, list[Judged]]]]:
     """All trackers on all scenes, then late plots."""
-    claims, shown = [], {}
+    claims: list[Claim] = []
+    shown: dict[str, dict[str, list[Judged]]] = {}
     settings: dict[str, dict[str, Any]] = {
         "thirty airliners": {"name": "rotating-radars", "duration": 60.0 if quick else 240.0}
     }
     if file is not None:
         settings["recorded traffic"] = {"name": "from-tracks", "file": file, "scans": 15 if quick else 75}
     for label, setting in settings.items():
-        count = 2 if quick else (8 if setting["name"] == "rotating-radars" else 4)
+        count = 2 if quick else (seeds if setting["name"] == "rotating-radars" else max(2, seeds // 2))
         scenes = [simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting) for k in range(count)]
-        names = (*NAMES, "multi-sensor, as one instant")
-        found = {name: np.array([judge(name, scene) for scene in scenes]) for name in names}
+        found = {name: [judge_own_times(name, scene) for scene in scenes] for name in (*NAMES, INSTANT)}
         shown[label] = found
-        for name, values in found.items():
-            gospa, switches, milliseconds = values.T
-            claims += [
-                Claim(f"{label}, {name}: GOSPA", "m", ours=float(gospa.mean()), interval=mean_interval(gospa)),
-                Claim(f"{label}, {name}: switches", "", ours=float(switches.mean()), interval=mean_interval(switches)),
-                Claim(f"{label}, {name}: CPU time of a scan", "ms", ours=float(np.median(milliseconds))),
-            ]
-        ratio = found["multi-sensor"][:, 0] / found["oracle"][:, 0]
-        what, interval = f"{label}: GOSPA, multi-sensor / oracle", mean_interval(ratio)
-        holds = interval[1] <= WITHIN_ORACLE
-        claims.append(Claim(what, "", WITHIN_ORACLE, ours=float(ratio.mean()), interval=interval, holds=holds))
+        for name, runs in found.items():
+            claims += claims_of(label, name, runs)
+        ratio = means(found["multi-sensor"]) / means(found["oracle"])
+        claims.append(goal(f"{label}: GOSPA, multi-sensor / oracle", "", ratio, WITHIN_ORACLE))
     setting = settings["thirty airliners"] | {"duration": 100.0 if quick else 200.0}
     scenes = [
-        simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting) for k in range(2 if quick else 4)
+        simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting)
+        for k in range(2 if quick else max(2, seeds // 2))
     ]
-    runs = [late_plots(scene, np.random.default_rng(seed + k)) for k, scene in enumerate(scenes)]
-    values = np.array([gospa for gospa, _ in runs])
-    for name, column in zip(LATE_NAMES, values.T, strict=True):
-        what, ratio = f"late plots, {name}: GOSPA / in order", column / values[:, 0]
-        claims.append(
-            Claim(f"late plots, {name}: GOSPA", "m", ours=float(column.mean()), interval=mean_interval(column))
-        )
-        if name == LATE_NAMES[1]:
-            interval = mean_interval(ratio)
-            holds = interval[1] <= WITHIN_ORDER
-            claims.append(Claim(what, "", WITHIN_ORDER, ours=float(ratio.mean()), interval=interval, holds=holds))
-    claims.append(Claim("late plots: CPU time of a scan", "ms", ours=float(np.median([one for _, one in runs]))))
+    late = [late_plots(scene, np.random.default_rng(seed + k)) for k, scene in enumerate(scenes)]
+    values = np.array([gospa for gospa, _ in late])
+    claims += [
+        mean_claim(f"late plots, {name}: GOSPA", "m", column) for name, column in zip(LATE_NAMES, values.T, strict=True)
+    ]
+    ratio = values[:, 1] / values[:, 0]
+    claims.append(goal("late plots, once all is there: GOSPA / in order", "", ratio, WITHIN_ORDER))
+    claims.append(Claim("late plots: CPU time of a scan", "ms", ours=float(np.median([one for _, one in late]))))
     return claims, shown
 
 
-def draw(figure: Any, shown: dict[str, dict[str, Array]]) -> None:
+def draw(figure: Any, shown: dict[str, dict[str, list[Judged]]]) -> None:
     """GOSPA of each tracker on each kind of scene."""
     for axes, (label, found) in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown.items(), strict=True):
         names = list(found)
-        axes.barh(np.arange(len(names)), [found[name][:, 0].mean() for name in names])
+        axes.barh(np.arange(len(names)), [means(found[name]).mean() for name in names])
         axes.set_yticks(np.arange(len(names)), names, fontsize=8)
         axes.set_title(label, fontsize=10)
         axes.set_xlabel("GOSPA, m")
@@ -178,10 +156,15 @@ def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
     parser = make_parser(NAME, TITLE)
     parser.add_argument("file", nargs="?", metavar="FILE", help="recorded trajectories (.csv), as for from-tracks")
+    parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes of airliners (default {SEEDS})")
     chosen = parser.parse_args(arguments)
+    if chosen.seeds < 2:
+        parser.error("--seeds must be at least 2")
     return run(
-        parser, chosen, NAME, TITLE, lambda quick, rng: experiment(chosen.file, quick, chosen.seed), draw, (11, 4)
-    )
+        parser, chosen, NAME, TITLE,
+        lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds), draw, (11, 4),
+        f"{__doc__} {chosen.seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ def _alone(scene: Scene, s: int) -> float:
     return float(np.mean(np.concatenate(errors) ** 2))
 
 
-def thousand(kind: type[Tracker], targets: int, scans: int, seed: int) -> tuple[Array, Array, int]:
+def crowd(kind: type[Tracker], targets: int, scans: int, seed: int) -> tuple[Array, Array, int]:
     """Many targets, three radars: CPU seconds and confirmed tracks of each scan, targets tracked at the end."""
     scene = simulation.simulate(
         "crowd", seed, targets=targets, scans=scans, sensor="radar", width=10_000.0, height=5_000.0, noise=100.0

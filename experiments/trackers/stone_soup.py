@@ -1,6 +1,7 @@
-"""Stone Soup's multi-frame assignment and global nearest neighbour on the same detections.
+"""Stone Soup's multi-frame assignment, global nearest neighbour and JPDA on the same detections.
 
-Both are given the targets at time 0, as ours are, and neither starts or ends tracks.
+All are given the targets at time 0, as ours are, and none starts or ends tracks. JPDA by loopy belief propagation: its
+enumeration of all joint events is for a few targets.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import Any
 import numpy as np
 from stonesoup.dataassociator.mfa import MFADataAssociator
 from stonesoup.dataassociator.neighbour import GNNWith2DAssignment
+from stonesoup.dataassociator.probability import JPDAwithLBP
+from stonesoup.functions import gm_reduce_single
 from stonesoup.hypothesiser.mfa import MFAHypothesiser
 from stonesoup.hypothesiser.probability import PDAHypothesiser
 from stonesoup.models.measurement.linear import LinearGaussian
@@ -23,6 +26,7 @@ from stonesoup.types.mixture import GaussianMixture
 from stonesoup.types.numeric import Probability
 from stonesoup.types.state import GaussianState, TaggedWeightedGaussianState
 from stonesoup.types.track import Track
+from stonesoup.types.update import GaussianStateUpdate
 from stonesoup.updater.kalman import KalmanUpdater
 
 from assoc._types import Array
@@ -82,5 +86,24 @@ def nearest(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
         started = time.process_time()
         for track, one in associator.associate(tracks, detections, when).items():
             track.append(updater.update(one) if one else one.prediction)
+        elapsed = time.process_time() - started
+        yield elapsed, np.array([np.asarray(track.mean, dtype=float)[[0, 2], 0] for track in tracks]).reshape(-1, 2)
+
+
+def probabilistic(plane: Plane, gate: float) -> Iterator[tuple[float, Array]]:
+    """JPDA: each track's mixture of all its measurements as one Gaussian; seconds and positions of each scan."""
+    model, updater, hypothesiser = _parts(plane, gate)
+    associator = JPDAwithLBP(hypothesiser)
+    covariance = np.diag((START_DEVIATION**2)[[0, 2, 1, 3]])
+    tracks = {Track(GaussianState(x[[0, 2, 1, 3], None], covariance, _START)) for x in plane.start}
+    for when, detections in _scans(plane, model):
+        started = time.process_time()
+        for track, many in associator.associate(tracks, detections, when).items():
+            after = [updater.update(one) if one else one.prediction for one in many]
+            weights = np.array([float(one.probability) for one in many])
+            means = np.concatenate([np.asarray(one.mean, dtype=float) for one in after], axis=1)
+            covariances = np.stack([np.asarray(one.covar, dtype=float) for one in after], axis=2)
+            mean, covar = gm_reduce_single(means, covariances, weights / weights.sum())
+            track.append(GaussianStateUpdate(mean, covar, many, when))
         elapsed = time.process_time() - started
         yield elapsed, np.array([np.asarray(track.mean, dtype=float)[[0, 2], 0] for track in tracks]).reshape(-1, 2)

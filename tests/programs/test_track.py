@@ -141,10 +141,6 @@ BAD = {
     "identity for a scene": (["SCENE", "--identity", "use"], "--identity: is for plots"),
     "identity": (["PLOTS", "--identity", "yes"], "--identity: unknown name 'yes'; known: use, score-only, ignore"),
     "identity unused": (["PLOTS", "--code-shared", "0.1"], "--code-shared: is only for --identity use"),
-    "identity of Reid": (
-        ["PLOTS", "--identity", "use", "--tracker", "mht-hypothesis", *NOISE],
-        "identity: mht-hypothesis cannot use codes and addresses",
-    ),
     "code probability": (["PLOTS", "--identity", "use", "--code-garbled", "1"], "code_garbled: expected a number"),
     "rotation for a scene": (["SCENE", "--rotation", "9"], "--rotation: describes the radar of plots"),
     "option of another": (["SCENE", "--max-hypotheses", "5"], "--max-hypotheses: is only for --tracker mht-hypothesis"),

@@ -8,9 +8,12 @@ from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
+from assoc.tracking.mht import branches as module_of_branches
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
+from assoc.tracking.mht.branches import Hits, Roots, Tables, extend
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import decide, keep_best, same_tree
+from assoc.tracking.track_batch import ID, SCORE
 
 VIEW = [[0.0, 1e5], [-3.0, 3.0], [-1.0, 1.5]]
 
@@ -34,8 +37,8 @@ def by_solver(tree, score, history):
 @pytest.mark.parametrize("seed", range(60))
 def test_the_best_hypothesis_is_that_of_a_solver(seed):
     tree, score, history = branches(seed, trees=2 + seed % 12, measurements=2 + seed % 17)
-    chosen, proved = choose(score, history, priced(tree, score, history), VISITS)
-    assert proved
+    chosen, doubtful = choose(score, history, priced(tree, score, history), VISITS)
+    assert not doubtful.any()
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
     assert len(set(tree[chosen])) == chosen.sum()
     for column in history[chosen].T:
@@ -49,26 +52,80 @@ def test_prices_that_say_nothing_change_nothing_but_the_work(seed):
     known = priced(tree, score, history)
     top = np.array([max(score[known.number == t].max(), 0.0) for t in range(len(known.trees))])
     plain = known._replace(trees=top, measurements=np.zeros_like(known.measurements), loss=top[known.number] - score)
-    chosen, proved = choose(score, history, plain, 10**9)
-    assert proved
+    chosen, doubtful = choose(score, history, plain, 10**9)
+    assert not doubtful.any()
     assert -score[chosen].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 
 
-def test_when_the_work_is_too_much_a_hypothesis_is_found_and_not_called_the_best():
+def test_when_the_work_is_too_much_a_hypothesis_is_found_and_its_branches_are_named():
     tree, score, history = branches(1, trees=12, measurements=9)
-    chosen, proved = choose(score, history, priced(tree, score, history), 20)
+    chosen, doubtful = choose(score, history, priced(tree, score, history), 20)
     assert chosen.any()
-    assert not proved
+    assert doubtful.any()
+    assert (score[doubtful] > 0).all()
     assert len(set(tree[chosen])) == chosen.sum()
     assert all(len(set(c[c > 0])) == np.count_nonzero(c) for c in history[chosen].T)
+
+
+def test_a_group_that_takes_too_long_costs_others_nothing():
+    hard = branches(1, trees=12, measurements=9)
+    # two trees want one measurement that no other wants
+    tree = np.concatenate([hard[0], [1000, 1000, 1001, 1001]])
+    score = np.concatenate([hard[1], [9.0, 8.0, 9.5, 4.0]])
+    history = np.concatenate([hard[2], np.array([[10, 0, 0], [0, 0, 0]] * 2, dtype=np.int32)])
+    chosen, doubtful = choose(score, history, priced(tree, score, history), 20)
+    own = tree >= 1000
+    assert doubtful[~own].any() and not doubtful[own].any()
+    assert score[chosen & own].tolist() == [8.0, 9.5]
+
+
+def test_a_solver_is_asked_where_the_search_takes_too_long(monkeypatch):
+    """Branches are cut around the best hypothesis, also where it is hard to find."""
+    monkeypatch.setattr(module_of_branches, "VISITS", 20)
+    tree, score, history = branches(1, trees=12, measurements=9)
+    numbers, counts = np.zeros((len(tree), 5)), np.zeros((len(tree), 5), dtype=np.int64)
+    numbers[:, SCORE], counts[:, ID] = score, tree
+    tables = Tables(numbers, counts, history, np.zeros(len(tree), dtype=np.int64))
+    asked = []
+
+    def solve(tree, score, history):
+        asked.append(len(tree))
+        rows = np.flatnonzero(score > 0)
+        tuples = np.column_stack([np.unique(tree, return_inverse=True)[1] + 1, history])[rows]
+        solution = assign(AssignmentProblem(tuples, -score[rows], np.maximum(tuples.max(axis=0), 1)))
+        mask = np.zeros(len(tree), dtype=np.bool_)
+        mask[rows[solution.indices[solution.indices < len(rows)]]] = True
+        return mask
+
+    hits = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
+    roots = Roots(np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int32), np.zeros(0), np.zeros(0))
+    kept, after, chosen = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve)
+    assert asked
+    assert -after.numbers[chosen, SCORE].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_prices_are_good_where_tracks_are_old_and_side_by_side(seed):
+    """A track's score grows with every scan; what its branches differ by does not."""
+    rng = np.random.default_rng(seed)
+    tree = np.repeat(np.arange(12), 12)
+    # each measurement suits its own track, and its neighbours hardly less
+    history = np.clip(tree[:, None] + 1 + rng.integers(-1, 2, (len(tree), 6)), 1, 12).astype(np.int32)
+    history[rng.random(history.shape) < 0.1] = 0
+    history[::12] = np.arange(1, 13)[:, None]
+    off = np.where(history == 0, 8.0, 2.0 * np.abs(history - tree[:, None] - 1)).sum(axis=1)
+    score = 1_500.0 - off + rng.normal(0.0, 2.0, len(tree))
+    known = priced(tree, score, history)
+    bound = known.trees.sum() + known.measurements.sum()
+    assert bound + by_solver(tree, score, history) == pytest.approx(0.0, abs=0.1)
 
 
 def test_nothing_good_is_nothing_chosen():
     tree, score, history = branches(1, trees=12, measurements=9)
     for rows in (slice(None), slice(0)):
         t, s, h = tree[rows], -np.abs(score[rows]), history[rows]
-        chosen, proved = choose(s, h, priced(t, s, h), VISITS)
-        assert proved
+        chosen, doubtful = choose(s, h, priced(t, s, h), VISITS)
+        assert not doubtful.any()
         assert not chosen.any()
         assert len(chosen) == len(t)
 

@@ -7,6 +7,7 @@ import pytest
 from assoc._files.npz import save_npz
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
+from assoc.simulation import simulate
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
 from assoc.tracking.checkpoint import FORMAT, VERSION
 from tests.tracking import plain
@@ -146,3 +147,14 @@ def test_a_file_from_before_there_were_clusters_is_refused(tmp_path):
     with pytest.raises(InvalidInputError, match=r"state\.npz: .*cluster_hypotheses") as caught:
         tracker().restore(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_hundred_aircraft_are_confirmed_within_five_scans():
+    scene = simulate("crowd", 3, targets=100, scans=5, interval=4.0, width=40_000.0, height=10_000.0)
+    own = HypothesisOrientedMHT.for_scene(scene)
+    for k in range(5):
+        scan = scene.scan(k)
+        own.step(scan.time, scan.measurements)
+    confirmed = np.array([track.position for track in own.tracks if track.confirmed])
+    away = np.linalg.norm(confirmed[:, None] - scan.truth_positions[None], axis=2)
+    assert (away.min(axis=0) < 400).all() and (away.min(axis=1) < 500).all()

@@ -14,7 +14,7 @@ from assoc.tracking.identity_evidence import ADDRESSES, MEMORY, Identities, log_
 from assoc.tracking.plots.plot_tracks import track_plots
 from tests.sizes import few_or_all
 
-NAMES = ("mht", "nearest-neighbour", "joint-probabilistic")
+NAMES = ("mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic")
 TURN = 4.0
 
 
@@ -170,8 +170,6 @@ def test_a_restored_tracker_knows_the_codes(name, tmp_path):
 def test_bad_identities_are_refused():
     recording = crossing(0)
     radar = radar_of(recording, range_noise=100.0, azimuth_noise=2e-3)
-    with pytest.raises(InvalidInputError, match="mht-hypothesis cannot use"):
-        TRACKERS["mht-hypothesis"]([radar], identity=IdentityParameters())
     with pytest.raises(InvalidInputError, match="identity must be IdentityParameters"):
         TRACKERS["mht"]([radar], identity="use")
     tracker = TRACKERS["mht"]([radar], identity=IdentityParameters())

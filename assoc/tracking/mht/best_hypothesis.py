@@ -4,7 +4,8 @@ The prices of `assoc.tracking.mht.losses` bound the score of every global hypoth
 of the branches taken, less the prices of trees and measurements that are left over. The trees fall apart into groups
 that share no measurement; in each group the branches are tried tree by tree, the least loss first, and a choice is
 given up when even the branches that still fit cannot reach what has been found. Where prices are good the first
-descent is nearly always the best.
+descent is nearly always the best. Where it takes too long, what has been found may be far from the best: such groups
+are named, for a solver.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import numpy as np
 from assoc._system.compiled import njit, search_njit
 from assoc.tracking.mht.losses import Priced
 
-VISITS = 100_000
-"""Branches looked at before the best found so far must do; a millisecond or two."""
+VISITS = 20_000
+"""Branches looked at in a group before the best found so far must do; less than a millisecond."""
 
 
 @search_njit
@@ -33,16 +34,16 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
     known : Priced
         Of the same branches.
     visits : int
-        Branches that may be looked at.
+        Branches that may be looked at in each group.
 
     Returns
     -------
     chosen : bool array (B,)
         At most one branch of each tree, no measurement twice, and the largest sum of scores.
-    proved : bool
-        Whether it is; False where the visits did not suffice.
+    doubtful : bool array (B,)
+        Branches of positive score in groups where the visits did not suffice to prove that; mostly none.
     """
-    chosen = np.zeros(score.size, np.bool_)
+    chosen, doubtful = np.zeros(score.size, np.bool_), np.zeros(score.size, np.bool_)
     good = np.flatnonzero(score > 0.0)
     num = known.trees.size
     # branches of each tree, the least loss first
@@ -71,9 +72,11 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
         end = begin + 1
         while end < num and group[order[end]] == group[order[begin]]:
             end += 1
-        visits = _search(order[begin:end], good, start, history, known, used, visits, chosen)
+        if _search(order[begin:end], good, start, history, known, used, visits, chosen) < 0:
+            for t in order[begin:end]:
+                doubtful[good[start[t] : start[t + 1]]] = True
         begin = end
-    return chosen, visits >= 0
+    return chosen, doubtful
 
 
 @njit

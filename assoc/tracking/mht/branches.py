@@ -6,6 +6,7 @@ trees; of these the branches are kept that cost the best global hypothesis least
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,12 +47,13 @@ class Roots(NamedTuple):
 
 
 def extend(
-    tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float
-) -> tuple[Array, Tables, Array, bool]:
+    tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
+    solve: Callable[[Array, Array, Array], Array],
+) -> tuple[Array, Tables, Array]:  # fmt: skip
     """Next branches, cut to those that matter to good global hypotheses.
 
-    The branches of the best global hypothesis stay whatever prices say of them: these may be poor where many branches
-    of one tree are nearly alike.
+    The branches of the best global hypothesis stay whatever prices say of them. Where it is not found quickly a solver
+    is asked: branches cut around a poor hypothesis are lost for good, and the next sensors cannot mend that.
 
     Parameters
     ----------
@@ -66,22 +68,31 @@ def extend(
         In which the new trees begin.
     most, drop
         As for `keep_best`.
+    solve
+        The best global hypothesis of branches, by their trees, scores and histories, as a mask.
 
     Returns
     -------
     kept, tables
         Rows among branches missed, hits and roots, in this order; and what is known of them.
-    chosen, proved
-        Which of them are the best global hypothesis found, and whether none is better.
+    chosen
+        Which of them are the best global hypothesis found.
     """
-    kept, chosen, proved, *rest = _extend(*tables, miss, *hits, *roots, column, scan, most, drop)
-    return kept, Tables(*rest), chosen, bool(proved)
+    known, doubtful, *cut = _extend(*tables, miss, *hits, *roots, column, scan, most, drop, VISITS)
+    if doubtful.size:
+        tree, score, history, loss, chosen = known
+        other = solve(tree[doubtful], score[doubtful], history[doubtful])
+        if score[doubtful[other]].sum() > score[doubtful[chosen[doubtful]]].sum():
+            chosen[doubtful] = other
+            cut = _cut(*tables, *hits, *roots, column, scan, most, drop, tree, score, loss, chosen)
+    kept, chosen, *rest = cut
+    return kept, Tables(*rest), chosen
 
 
 @search_njit
 def _extend(
     numbers: Any, counts: Any, history: Any, born: Any, miss: Any, branch: Any, measurement: Any, gain: Any,
-    when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float,
+    when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float, visits: int,
 ) -> Any:  # fmt: skip
     old, hits = born.size, branch.size
     tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
@@ -100,8 +111,24 @@ def _extend(
     for i in range(ids.size):
         wide[old + hits + i, : rows.shape[1]] = rows[i]
     known = priced(tree, score, wide)
-    chosen, proved = choose(score, wide, known, VISITS)
-    kept = keep_best(tree, score, np.where(chosen, -1.0, known.loss), most, drop)
+    chosen, doubtful = choose(score, wide, known, visits)
+    kept, ours, new_numbers, new_counts, new_history, new_born = _cut(
+        numbers, counts, history, born, branch, measurement, gain, when, ids, rows, since, first, column, scan, most,
+        drop, tree, score, known.loss, chosen,
+    )  # fmt: skip
+    told = (tree, score, wide, known.loss, chosen)
+    return told, np.flatnonzero(doubtful), kept, ours, new_numbers, new_counts, new_history, new_born
+
+
+@njit
+def _cut(
+    numbers: Any, counts: Any, history: Any, born: Any, branch: Any, measurement: Any, gain: Any, when: Any, ids: Any,
+    rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float, tree: Any, score: Any, loss: Any,
+    chosen: Any,
+) -> Any:  # fmt: skip
+    """The branches that stay, and their tables."""
+    old, hits = born.size, branch.size
+    kept = keep_best(tree, score, np.where(chosen, -1.0, loss), most, drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):
@@ -124,7 +151,7 @@ def _extend(
         if row >= old:
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
             new_history[k, column] = measurement[row - old] + 1
-    return kept, chosen[kept], proved, new_numbers, new_counts, new_history, new_born
+    return kept, chosen[kept], new_numbers, new_counts, new_history, new_born
 
 
 @njit

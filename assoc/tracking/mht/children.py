@@ -103,6 +103,54 @@ def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) 
 
 
 @search_njit
+def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, most: int, drop: float) -> Any:
+    """The next hypotheses of a cluster, in one compiled call.
+
+    Parameters
+    ----------
+    holds, weight : bool array (H, T), array (H,)
+        Hypotheses before the measurements.
+    missed : array (T,)
+        What a miss of each track adds to a log-probability.
+    meanings, most, drop
+        As for `best_children`.
+
+    Returns
+    -------
+    used : int64 array (U,)
+        Which of the tracks missed, the pairs and the new targets, in this order, any hypothesis believes in.
+    holds, weight : bool array (C, U), array (C,)
+        Hypotheses, the best first, with log-probability 0.
+    """
+    tracks, pairs = missed.size, meanings.track.size
+    alone = weight.copy()
+    for h in range(weight.size):
+        for b in range(tracks):
+            if holds[h, b]:
+                alone[h] += missed[b]
+    parent, choice, after = _rank(Parents(holds, alone), meanings, most, drop)
+    held = np.zeros((parent.size, tracks + pairs + meanings.birth.size), np.bool_)
+    for c in range(parent.size):
+        held[c, :tracks] = holds[parent[c]]
+        for j in range(choice.shape[1]):
+            if choice[c, j] == NEW:
+                held[c, tracks + pairs + j] = True
+            elif choice[c, j] >= 0:
+                held[c, meanings.track[choice[c, j]]] = False
+                held[c, tracks + choice[c, j]] = True
+    used, size = np.empty(held.shape[1], np.int64), 0
+    for column in range(held.shape[1]):
+        if held[:, column].any():
+            used[size] = column
+            size += 1
+    found = np.empty((parent.size, size), np.bool_)
+    for c in range(parent.size):
+        for i in range(size):
+            found[c, i] = held[c, used[i]]
+    return used[:size], found, after - after[0]
+
+
+@search_njit
 def _rank(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
     holds, weight = parents
     count, room = meanings.birth.size, weight.size + 64

@@ -71,7 +71,7 @@ def doubted(branches: Array, odds: Array, most: int, drop: float) -> list[Cluste
     found = []
     drop = drop if most > 1 else 0.0
     for i, value in enumerate(odds.tolist()):
-        if value > drop:
+        if value > drop or value == np.inf:
             found.append(Cluster(branches[i : i + 1], _THERE_FIRST[:1], np.zeros(1)))
         elif value >= -drop and most > 1:
             holds = _THERE_FIRST if value >= 0.0 else _GONE_FIRST

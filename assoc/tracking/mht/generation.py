@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._system import memory
 from assoc._types import Array
-from assoc.tracking.mht.children import NEW, Meanings, Parents, best_children
+from assoc.tracking.mht.children import Meanings, next_hypotheses
 from assoc.tracking.mht.clusters import Cluster, cluster, doubted, grouped, linked, merged, odds_of
 from assoc.tracking.mht.growth import Offers
 
@@ -42,7 +42,8 @@ def generated(
     parts = int(label.max(initial=-1)) + 1
     members = grouped(label[: len(clusters)], parts)
     measurements = grouped(label[len(clusters) :], parts)
-    near = grouped(label[own[offers.branch]], parts)
+    by_measurement = np.lexsort((offers.branch, offers.measurement))
+    near = [by_measurement[one] for one in grouped(label[own[offers.branch[by_measurement]]], parts)]
     birth, birth_row = np.full(count, -np.inf), np.zeros(count, dtype=np.int64)
     birth[born], birth_row[born] = offers.births.score, total + pairs + np.arange(len(born))
     # what a branch can add to a log-probability at most
@@ -56,7 +57,6 @@ def generated(
             continue
         whole = merged([clusters[i] for i in there.tolist()], potential, most)
         if len(z):
-            pair = pair[np.lexsort((offers.branch[pair], offers.measurement[pair]))]
             found.append(_children(whole, offers, z, pair, birth[z], birth_row[z], most, drop))
         elif len(whole.branches) == 1:
             alone.append(whole.branches[0])
@@ -72,10 +72,10 @@ def _children(
 ) -> Cluster:
     """The children of a cluster's hypotheses by the measurements z (their births: score and row) in its gates."""
     branch = offers.branch[pair]
-    # merging may have left out all hypotheses that believe in a branch
     track = np.searchsorted(whole.branches, branch)
-    there = np.append(whole.branches, -1)[track] == branch
-    if not there.all():
+    if len(whole.branches) <= track.max() or (whole.branches[track] != branch).any():
+        # merging has left out all hypotheses that believe in a branch
+        there = np.isin(branch, whole.branches)
         pair, branch, track = pair[there], branch[there], track[there]
     first = np.searchsorted(offers.measurement[pair], np.append(z, z[-1] + 1))
     memory.require(
@@ -83,23 +83,9 @@ def _children(
         f"max_hypotheses = {most}: {len(whole.weight)} hypotheses",
         "keep fewer",
     )
-    missed = offers.missed[whole.branches]
-    parents = Parents(whole.holds, whole.weight + whole.holds @ missed)
-    meanings = Meanings(first, track, offers.gain[pair] - missed[track], birth)
-    parent, choice, weight = best_children(parents, meanings, most, drop)
+    meanings = Meanings(first, track, offers.gain[pair] - offers.missed[branch], birth)
+    used, holds, weight = next_hypotheses(
+        whole.holds, whole.weight, offers.missed[whole.branches], meanings, most, drop
+    )
     rows = np.concatenate([whole.branches, len(offers.missed) + pair, birth_row])
-    return cluster(rows, _held(whole.holds[parent], choice, track), weight)
-
-
-def _held(holds: Array, choice: Array, track: Array) -> Array:
-    """Which of the branches missed, the pairs and the births each child believes in, bool (C, B + K + n)."""
-    count, branches = holds.shape
-    all_held = np.zeros((count, branches + len(track) + choice.shape[1]), dtype=np.bool_)
-    all_held[:, :branches] = holds
-    child, measurement = np.nonzero(choice >= 0)
-    pair = choice[child, measurement]
-    all_held[child, track[pair]] = False
-    all_held[child, branches + pair] = True
-    child, measurement = np.nonzero(choice == NEW)
-    all_held[child, branches + len(track) + measurement] = True
-    return all_held
+    return Cluster(rows[used], holds, weight)

@@ -61,10 +61,9 @@ class HypothesisOrientedMHT(Tracker):
     """
 
     name = "mht-hypothesis"
-    weighs_identities = False
 
     def __init__(
-        self, *arguments: Any, max_hypotheses: int = 20, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
+        self, *arguments: Any, max_hypotheses: int = 50, depth: int = 3, hypothesis_drop: float = 15.0, **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
         for value, what in ((depth, "depth"), (max_hypotheses, "max_hypotheses")):
@@ -141,7 +140,9 @@ class HypothesisOrientedMHT(Tracker):
     def _sorted(scan: Scan, orders: list[Array]) -> Scan:
         ordered = [z[order] for z, order in zip(scan.measurements, orders, strict=True)]
         stamps = None if scan.times is None else tuple(t[order] for t, order in zip(scan.times, orders, strict=True))
-        return Scan(scan.index, scan.time, tuple(ordered), times=stamps, sectors=scan.sectors)
+        told = scan.identities
+        codes = None if told is None else tuple(one[order] for one, order in zip(told, orders, strict=True))
+        return Scan(scan.index, scan.time, tuple(ordered), times=stamps, sectors=scan.sectors, identities=codes)
 
     def _grown(self, scan: Scan) -> Growth:
         """Branches and clusters after the scan's sensors, one after the other."""

@@ -22,9 +22,9 @@ from assoc._system.compiled import njit
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
 from assoc.packing.packing import PackingArrays, assembled
 
-# the smoothed ascent begins hot enough to move prices across the whole spread of scores, and is cooled until losses are
-# known to a fraction of the limits they are held against, in nats
-_COLDEST, _PASSES = 0.25, 15
+# temperatures of the smoothed ascent, in nats: alternatives of a tree differ by some ten, however large their scores
+# have grown, and losses must be known well enough to tell the best hypothesis from those next to it
+_HOTTEST, _COLDEST, _PASSES = 4.0, 0.05, 60
 
 
 class Priced(NamedTuple):
@@ -147,7 +147,7 @@ def _price(number: Any, score: Any, history: Any, first: Any, contested: Any, in
     point = SmoothPoint(duals, reduced, np.empty(count), np.empty(free.size))
     # trees come first in every component: they take what their best branches score, and the rest is differences
     hard_sweeps(packing, duals, reduced, 1)
-    temperature = np.maximum(START * spread(packing), 2.0 * _COLDEST)
+    temperature = np.minimum(np.maximum(START * spread(packing), 2.0 * _COLDEST), _HOTTEST)
     while temperature.max() > _COLDEST:
         smooth_passes(packing, point, temperature, _PASSES, np.inf)
         temperature = np.maximum(0.5 * temperature, 0.5 * _COLDEST)

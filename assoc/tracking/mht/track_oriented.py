@@ -53,8 +53,8 @@ class TrackOrientedMHT(Tracker):
     max_branches : int
         The most branches of a tree.
     branch_drop : float
-        A branch is cut if every global hypothesis that contains it scores this much less than the best one. Of
-        more than `max_branches` those stay that cost the best hypothesis least.
+        A branch is cut if every global hypothesis that contains it scores this much less than the best one: 7 is a
+        thousandth of its probability. Of more than `max_branches` those stay that cost the best hypothesis least.
     **options
         As for `Tracker`.
     """
@@ -62,7 +62,7 @@ class TrackOrientedMHT(Tracker):
     name = "mht"
 
     def __init__(
-        self, *arguments: Any, depth: int = 3, max_branches: int = 30, branch_drop: float = 15.0, **options: Any
+        self, *arguments: Any, depth: int = 3, max_branches: int = 30, branch_drop: float = 7.0, **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
         for value, what in ((depth, "depth"), (max_branches, "max_branches")):
@@ -93,21 +93,21 @@ class TrackOrientedMHT(Tracker):
 
     def _step(self, scan: Scan) -> Step:
         time, measurements = scan.time, scan.measurements
-        proved = self._grow(scan) if scan.at_once else self._grow_in_order(scan)
+        if scan.at_once:
+            self._grow(scan)
+        else:
+            self._grow_in_order(scan)
         self._window.insert(0, (time, np.array([len(z) for z in measurements], dtype=np.int64)))
-        if not proved or self.solver != "exact" or self.solver_parameters:
-            self._chosen = self._better(self._solved())
+        if self.solver != "exact" or self.solver_parameters:
+            self._chosen = self._better(self._solved(self._batch.track_id, self._batch.score, self._history))
         self._confirm()
         now = self._decision(0, self._chosen)
         final, kept = self._prune() if len(self._window) == self.depth else ((), None)
         ended = self._delete_tracks(time, kept)
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
 
-    def _grow(self, scan: Scan) -> bool:
-        """Grow every branch by the measurements in its gate and by misses, start trees, and choose the best hypothesis.
-
-        Returns whether it is proved to be the best.
-        """
+    def _grow(self, scan: Scan) -> None:
+        """Grow branches by the measurements in their gates and by misses, start trees, choose the best hypothesis."""
         time, count = scan.time, len(self.sensors)
         batch = self._predicted(self._batch, self._elapsed(time))
         states, tables = batch.states, self._tables()
@@ -118,20 +118,19 @@ class TrackOrientedMHT(Tracker):
             missed = np.full(len(states), self.terms.miss[s])
             when = np.full(len(gain), time)
             hits = Hits(pairs.track, pairs.measurement, gain, when)
-            kept, tables, chosen, proved = self._extended(tables, missed, hits, roots, s)
+            kept, tables, chosen = self._extended(tables, missed, hits, roots, s)
             require_states(states, len(kept))
             states = concatenate([states, pairs.states, begun])[kept]
         crossed = self._crossed_roots(scan, tables.history[chosen & (tables.counts[:, SURE] > 0), :count])
         if crossed is not None:
             nothing = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
-            kept, tables, chosen, proved = self._extended(tables, np.zeros(len(states)), nothing, crossed[1], 0)
+            kept, tables, chosen = self._extended(tables, np.zeros(len(states)), nothing, crossed[1], 0)
             states = concatenate([states, crossed[0]])[kept]
         count_scan(tables.counts, tables.history, count, np.ones(len(states), dtype=np.bool_))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born, self._chosen = tables.history, tables.born, chosen
-        return proved
 
-    def _grow_in_order(self, scan: Scan) -> bool:
+    def _grow_in_order(self, scan: Scan) -> None:
         """`_grow` where measurements have times of their own: each branch is filtered in their order."""
         count, timed = len(self.sensors), self._timed(scan)
         looked = timed.looked()
@@ -154,7 +153,7 @@ class TrackOrientedMHT(Tracker):
             single = np.zeros((len(own), count), dtype=np.int32)
             single[:, s] = own + 1
             roots = Roots(ids, single, since, score)
-            kept, tables, chosen, proved = self._extended(tables, missed, hits, roots, s)
+            kept, tables, chosen = self._extended(tables, missed, hits, roots, s)
             gained = np.concatenate([gained + missed, total, score])[kept]
             anchor = np.concatenate([anchor, anchor[grown.parent], own_anchor])[kept]
             parent_row = np.concatenate([parent_row, parent_row[grown.parent], np.full(len(own), -1)])[kept]
@@ -167,7 +166,6 @@ class TrackOrientedMHT(Tracker):
         count_scan(tables.counts, tables.history, count, looked[anchor].any(axis=1))
         self._batch = TrackBatch(states, tables.numbers, tables.counts)
         self._history, self._born, self._chosen = tables.history, tables.born, chosen
-        return proved
 
     def _tables(self) -> Tables:
         """The branches, with room for this scan in their histories."""
@@ -177,8 +175,9 @@ class TrackOrientedMHT(Tracker):
 
     def _extended(
         self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int
-    ) -> tuple[Array, Tables, Array, bool]:
-        done = extend(tables, missed, hits, roots, s, self._scan, self.max_branches, self.branch_drop)
+    ) -> tuple[Array, Tables, Array]:
+        most, drop = self.max_branches, self.branch_drop
+        done = extend(tables, missed, hits, roots, s, self._scan, most, drop, self._solved)
         if len(done[0]) > self.max_tuples:
             raise LimitExceededError(
                 f"scan {self._scan}: {len(done[0])} branches, more than max_tuples = {self.max_tuples}; "
@@ -220,22 +219,21 @@ class TrackOrientedMHT(Tracker):
         score = self._batch.score
         return other if score[other].sum() >= score[self._chosen].sum() else self._chosen
 
-    def _solved(self) -> Array:
+    def _solved(self, tree: Array, score: Array, history: Array) -> Array:
         """Branches of the best global hypothesis by the tracker's solver, as a mask."""
-        score, track_id = self._batch.score, self._batch.track_id
-        chosen = np.zeros(len(self._batch), dtype=np.bool_)
+        chosen = np.zeros(len(score), dtype=np.bool_)
         # a branch of no positive score is better left to false alarms
         rows = np.flatnonzero(score > 0)
         if not len(rows):
             return chosen
-        tuples = np.empty((len(rows), 1 + self._history.shape[1]), dtype=np.int64)
+        tuples = np.empty((len(rows), 1 + history.shape[1]), dtype=np.int64)
         sizes = np.zeros(tuples.shape[1], dtype=np.int64)
-        trees, tuples[:, 0] = np.unique(track_id[rows], return_inverse=True)
+        trees, tuples[:, 0] = np.unique(tree[rows], return_inverse=True)
         tuples[:, 0] += 1
         sizes[0] = len(trees)
-        for c in range(self._history.shape[1]):
+        for c in range(history.shape[1]):
             # only measurements that some branch uses take part
-            column = self._history[rows, c]
+            column = history[rows, c]
             used = np.zeros(int(column.max()) + 1, dtype=np.int64)
             used[column] = 1
             used[0] = 0

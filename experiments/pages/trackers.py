@@ -1,0 +1,219 @@
+"""Tables of measured trackers: docs/tracking.md, and biased radars for docs/registration.md."""
+
+from __future__ import annotations
+
+from experiments.common.claims import Claim
+from experiments.common.results import Results, number, table
+
+SHOWN = {
+    "oracle": "oracle",
+    "multi-sensor": "`multi-sensor`",
+    "static": "`static`",
+    "mht": "`mht`",
+    "mht-hypothesis": "`mht-hypothesis`",
+    "nearest-neighbour": "`nearest-neighbour`",
+    "GNN": "GNN",
+    "joint-probabilistic": "`joint-probabilistic`",
+}
+"""Trackers as the results name them, and in the tables; GNN is `nearest-neighbour` with the rule `assignment`."""
+GOALS = ("close_targets", "bearings", "asynchronous", "comparison", "biases", "benchmark", "capacity", "live")
+"""Experiments whose goals are listed, in this order."""
+
+
+def figure(value: float, digits: int = 3) -> str:
+    """A number, whole ones as such."""
+    return f"{value:,.0f}" if value == round(value) else number(value, digits)
+
+
+def mean(claim: Claim, digits: int = 3) -> str:
+    """A mean with half the width of its interval."""
+    text = figure(claim.ours, digits)
+    if claim.interval is None:
+        return text
+    low, high = claim.interval
+    return f"{text} ± {figure((high - low) / 2, 2 if high - low < 20 else 3)}"
+
+
+def with_size(results: Results, text: str) -> str:
+    """A table, and below it how many scenes were run: the last sentence of what the file says of itself."""
+    return f"{text}\n\nRun with: {results.head['about'].rstrip('.').rpartition('. ')[2]}."
+
+
+def _tenths(claim: Claim) -> str:
+    return f"{claim.ours:.1f}".removesuffix(".0")
+
+
+def _hota(results: Results, start: str) -> str:
+    """HOTA in three decimals; a dash where the file was written before it was measured."""
+    what = f"{start}: HOTA"
+    return f"{results[what].ours:.3f}" if what in results else "-"
+
+
+def labels(results: Results, words: str) -> list[str]:
+    """Kinds of scenes in the order of the file, by the claims that end so."""
+    found = [c.quantity.removesuffix(words) for c in results.claims if c.quantity.endswith(words)]
+    return [one for one in found if not one.startswith("goal: ")]
+
+
+def close_targets() -> str:
+    """GOSPA and identity switches of every tracker where association is hard."""
+    r = Results("trackers.close_targets")
+    rows = [
+        [
+            label,
+            *(f"{mean(r[f'{label}, {name}: GOSPA'])} / {_tenths(r[f'{label}, {name}: switches'])}" for name in SHOWN),
+        ]
+        for label in labels(r, ", oracle: GOSPA")
+    ]
+    return with_size(r, table(["GOSPA, m / switches", *SHOWN.values()], rows))
+
+
+def close_times() -> str:
+    """OSPA(2), HOTA and CPU time of a scan of every tracker where association is hard."""
+    r = Results("trackers.close_targets")
+
+    def cell(start: str) -> str:
+        time = number(r[f"{start}: CPU time of a scan"].ours, 2)
+        return f"{number(r[f'{start}: OSPA(2)'].ours)} / {_hota(r, start)} / {time}"
+
+    rows = [[label, *(cell(f"{label}, {name}") for name in SHOWN)] for label in labels(r, ", oracle: GOSPA")]
+    return table(["OSPA(2), m / HOTA / time of a scan, ms", *SHOWN.values()], rows)
+
+
+def bearings() -> str:
+    """Every tracker on bearings alone."""
+    r = Results("trackers.bearings")
+    heads = {
+        "targets (of 4) without a track in ten scans": "goal: {}: targets without a track in 10 scans",
+        "false tracks at a time after 20 scans": "goal: {}: false tracks at a time after 20 scans",
+        "targets with a track after 20 scans, %": "{}: targets with a track after 20 scans",
+        "CPU time of a scan, ms": "{}: CPU time of a scan",
+    }
+    names = [name for name in SHOWN if name != "oracle"]
+    rows = [[SHOWN[name], *(mean(r[words.format(name)], 2) for words in heads.values())] for name in names]
+    return with_size(r, table(["tracker", *heads], rows))
+
+
+def asynchronous() -> str:
+    """Trackers of turning radars."""
+    r = Results("trackers.asynchronous")
+    kinds = labels(r, ", oracle: GOSPA")
+    rows = []
+    for name in labels(r, ": GOSPA"):
+        if not name.startswith(f"{kinds[0]}, "):
+            continue
+        plain = name.removeprefix(f"{kinds[0]}, ")
+        cells = []
+        for kind in kinds:
+            gospa, switches = r[f"{kind}, {plain}: GOSPA"], r[f"{kind}, {plain}: switches"]
+            cells += [f"{mean(gospa)} / {_tenths(switches)}", number(r[f"{kind}, {plain}: OSPA(2)"].ours),
+                      number(r[f"{kind}, {plain}: CPU time of a scan"].ours, 2)]  # fmt: skip
+        rows.append([SHOWN.get(plain, plain.replace("as one", "as if of one")), *cells])
+    heads = [words for kind in kinds for words in (f"{kind}: GOSPA, m / switches", "OSPA(2), m", "time, ms")]
+    return with_size(r, table(["tracker", *heads], rows))
+
+
+def late() -> str:
+    """What comes of late plots."""
+    r = Results("trackers.asynchronous")
+    rows = [
+        [claim.quantity.removeprefix("late plots, ").removesuffix(": GOSPA"), mean(claim)]
+        for claim in r.starting("late plots, ")
+    ]
+    rows.append(["CPU time of a scan with late plots, ms", number(r["late plots: CPU time of a scan"].ours)])
+    return table(["plots", "GOSPA, m"], rows)
+
+
+def comparison() -> str:
+    """All trackers on three radars and on recorded traffic."""
+    r = Results("trackers.comparison")
+    rows = []
+    for label in labels(r, ", oracle: GOSPA"):
+        for name, shown in SHOWN.items():
+            start = f"{label}, {name}: "
+            parts = " / ".join(number(r[start + part].ours) for part in ("localisation", "missed", "false"))
+            rows.append(
+                [label, shown, mean(r[start + "GOSPA"]), parts, _tenths(r[start + "switches"]),
+                 number(r[start + "OSPA(2)"].ours), _hota(r, start.removesuffix(": ")),
+                 number(r[start + "CPU time of a scan"].ours, 2)]
+            )  # fmt: skip
+    heads = ["GOSPA, m", "localisation / missed / false, m", "switches", "OSPA(2), m", "HOTA", "time, ms"]
+    return with_size(r, table(["scenes", "tracker", *heads], rows, lambda column: column > 1))
+
+
+def benchmark() -> str:
+    """Ours and Stone Soup's on the same detections."""
+    r = Results("trackers.benchmark")
+    pairs = {
+        "mfa": ("mht", "MFA, `mht`"),
+        "gnn": ("nearest", "GNN, GNN"),
+        "jpda": ("joint", "JPDA, `joint-probabilistic`"),
+    }
+    rows = []
+    for label in labels(r, ", mfa: mean GOSPA"):
+        for peer, (own, words) in pairs.items():
+            done = r.starting(f"{label}, {peer}: scans done, of ")[0]
+            cells = (
+                number(r[f"{label}, {own}: CPU time of a scan"].ours),
+                number(r[f"{label}, {peer}: CPU time / ours"].ours),
+                number(r[f"{label}, {peer}: mean GOSPA"].ours),
+                mean(r[f"{label}, {peer}: mean GOSPA, ours - theirs"], 2),
+            )
+            rows.append([label, words, f"{done.ours:.0f} of {done.quantity.rpartition(' ')[2]}", *cells])
+    heads = ["scans", "ours, ms a scan", "theirs / ours", "GOSPA, theirs, m", "GOSPA, ours - theirs, m"]
+    return with_size(r, table(["", "theirs, ours", *heads], rows, lambda column: column > 1))
+
+
+def plain(name: str) -> str:
+    """Every claim of an experiment, a row each."""
+    rows = [[c.quantity.removeprefix("goal: "), f"{figure(c.ours)} {c.unit}".strip()] for c in Results(name).claims]
+    return table(["", ""], rows)
+
+
+def registration() -> str:
+    """Errors of the biases found, and GOSPA with them."""
+    r = Results("trackers.biases")
+    rows = []
+    for kind in labels(r, ", no biases: GOSPA"):
+        for size in ("0 m, 0 deg", "100 m, 0.1 deg", "200 m, 0.2 deg", "300 m, 0.3 deg"):
+            start = f"{kind}, {size}"
+            errors = [mean(r[f"{start}: RMS error of {what}"], 2) for what in ("range", "azimuth")]
+            ways = [r[f"{start}, {way}: GOSPA / without biases"] for way in ("with biases", "registered", "online")]
+            rows.append([kind, size, *errors, number(ways[0].ours, 2), *(mean(one, 4) for one in ways[1:])])
+    heads = ["error of range, m", "of azimuth, deg", "with biases", "registered", "online"]
+    return with_size(r, table(["traffic", "biases", *heads], rows, lambda column: column > 1))
+
+
+def goals() -> str:
+    """Every goal: measured, goal, met or not."""
+    rows = []
+    for name in GOALS:
+        for claim in Results(f"trackers.{name}").starting("goal: "):
+            assert claim.band is not None
+            low, high = claim.band
+            words = f"at least {low:.4g}" if low is not None else f"at most {high:.4g}"
+            unit = f" {claim.unit}" if claim.unit else ""
+            # of a ratio what it is above or below 1 matters
+            digits = 4 if not unit and 0.5 < claim.ours < 2 else 3
+            rows.append(
+                [f"`{name}`", claim.quantity.removeprefix("goal: "), mean(claim, digits) + unit, words + unit,
+                 "yes" if claim.holds else "**no**"]
+            )  # fmt: skip
+    met = sum(row[-1] == "yes" for row in rows)
+    head = f"{met} of {len(rows)} goals are met.\n\n"
+    return head + table(["experiment", "what", "measured", "goal", "met"], rows, lambda column: column in (2, 3))
+
+
+TRACKING = {
+    "close-targets": close_targets,
+    "close-targets-times": close_times,
+    "bearings": bearings,
+    "turning-radars": asynchronous,
+    "late-plots": late,
+    "trackers": comparison,
+    "stone-soup": benchmark,
+    "capacity": lambda: plain("trackers.capacity"),
+    "live": lambda: plain("trackers.live"),
+    "goals": goals,
+}
+REGISTRATION = {"biases": registration}

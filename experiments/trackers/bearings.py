@@ -1,0 +1,115 @@
+"""Bearings alone: which trackers find the targets among the ghosts, and how soon.
+
+    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE] [--figure FILE] [--publish]
+
+Four targets and three sensors that measure bearings alone (scenario `bearing-only`, 40 scans of 10 s, default
+settings). A target has a track where a reported one is within 2 km of it on the ground (a bearing says nothing of
+heights); a reported track that is further than that from every target is false. Seeds are --seed (200) and those that
+follow, --seeds of them (20).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc import simulation
+from assoc._types import Array
+from assoc.scene import Scene
+from assoc.tracking import TRACKERS
+from experiments.common.claims import Claim
+from experiments.common.command import make_parser, run
+from experiments.trackers.judging import goal, make, mean_claim
+from experiments.trackers.running import through
+
+TARGETS, SCANS, SEEDS, FIRST = 4, 40, 20, 200
+NEAR = 2_000.0
+"""A track within this distance of a target on the ground is that target's, metres."""
+STARTED, SETTLED = 10, 20
+"""All tracks should have begun after so many scans, and false ones have gone."""
+NAMES = (*TRACKERS, "GNN")
+
+
+class Found(NamedTuple):
+    """One tracker on one scene."""
+
+    late: int
+    """Targets that were there for ten scans and had no track in any of them."""
+    false: Array
+    """False tracks reported after each scan, (K,)."""
+    tracked: Array
+    """Share of the targets that have a track after each scan, (K,)."""
+    milliseconds: float
+
+
+def judge(name: str, scene: Scene) -> Found:
+    """Run a tracker over a scene."""
+    done = through(make(name, scene), scene)
+    assert scene.truth is not None
+    false, tracked, had = [], [], set()
+    for k in range(scene.num_scans):
+        truth, places = scene.truth.positions[k][:, :2], done.confirmed[k][1][:, :2]
+        near = np.linalg.norm(truth[:, None] - places[None], axis=2) <= NEAR
+        false.append(int((~near.any(axis=0)).sum()))
+        tracked.append(float(near.any(axis=1).mean()) if len(truth) else 1.0)
+        if k < STARTED:
+            had |= set(scene.truth.target_ids[k][near.any(axis=1)].tolist())
+    last = min(STARTED, scene.num_scans) - 1
+    late = len(set(scene.truth.target_ids[last].tolist()) - had)
+    return Found(late, np.array(false), np.array(tracked), 1e3 * float(np.median(done.seconds[1:])))
+
+
+def experiment(quick: bool, seed: int, seeds: int = SEEDS) -> tuple[list[Claim], dict[str, list[Found]]]:
+    """All trackers on the same scenes."""
+    count, scans = (2, 22) if quick else (seeds, SCANS)
+    scenes = [simulation.simulate("bearing-only", seed + k, targets=TARGETS, scans=scans) for k in range(count)]
+    claims: list[Claim] = []
+    shown = {}
+    for name in NAMES:
+        runs = shown[name] = [judge(name, scene) for scene in scenes]
+        late = np.array([float(one.late) for one in runs])
+        false = np.array([one.false[SETTLED:].mean() for one in runs])
+        tracked = np.array([100.0 * one.tracked[SETTLED:].mean() for one in runs])
+        claims += [
+            goal(f"{name}: targets without a track in {STARTED} scans", "", late, 0.0),
+            goal(f"{name}: false tracks at a time after {SETTLED} scans", "", false, 0.0),
+            mean_claim(f"{name}: targets with a track after {SETTLED} scans", "%", tracked),
+            Claim(f"{name}: CPU time of a scan", "ms", ours=float(np.median([one.milliseconds for one in runs]))),
+        ]
+    return claims, shown
+
+
+def draw(figure: Any, shown: dict[str, list[Found]]) -> None:
+    """Targets tracked, and false tracks, over the scans."""
+    for axes, part in zip(figure.subplots(1, 2), ("tracked", "false"), strict=True):
+        for name, runs in shown.items():
+            axes.plot(np.mean([getattr(one, part) for one in runs], axis=0), label=name)
+        axes.set_xlabel("scan")
+        axes.set_ylabel({"tracked": "share of targets with a track", "false": "false tracks"}[part])
+        axes.set_ylim(bottom=0)
+        axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize=8, frameon=False)
+
+
+NAME, TITLE = "trackers.bearings", "Trackers of bearings alone"
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; returns its exit code."""
+    parser = make_parser(NAME, TITLE)
+    parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes (default {SEEDS})")
+    parser.set_defaults(seed=FIRST)
+    chosen = parser.parse_args(arguments)
+    if chosen.seeds < 2:
+        parser.error("--seeds must be at least 2")
+    about = f"{__doc__} {chosen.seeds} scenes."
+    return run(
+        parser, chosen, NAME, TITLE, lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds), draw, (10, 4),
+        about,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())

@@ -1,0 +1,90 @@
+"""Plots as they come: the time of a step with 500 aircraft under three turning radars.
+
+    python -m experiments.trackers.live [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+
+What `assoc track --live` does with its defaults (tracker multi-sensor) and the antennas' turns of 4, 5 and 5.5 s,
+plots taken in every half second: 500 aircraft (scenario `rotating-radars`), 60 s of plots, the first 10 s not counted.
+CPU times of a step, from the plot that ends an interval to the picture, and wall times beside them, which on a busy
+machine hold what others do.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from assoc import simulation
+from assoc._cli.track.plot_lines import replayed
+from assoc._types import Array
+from assoc.tracking import LiveTracker, MultiSensorTracker
+from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
+from experiments.common.claims import Claim
+from experiments.common.command import main
+from experiments.trackers.judging import GOAL
+
+TURNS, INTERVAL, AIRCRAFT, DURATION, SETTLED = (4.0, 5.0, 5.5), 0.5, 500, 60.0, 10.0
+GOAL_MS = 100.0
+"""For the 99th percentile of a step, milliseconds."""
+
+
+def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
+    """CPU and wall seconds of each step (n, 2), and how many confirmed tracks there are at the end."""
+    turns = ",".join(f"{one:g}" for one in TURNS)
+    scene = simulation.simulate("rotating-radars", seed, aircraft=aircraft, turns=turns, duration=duration)
+
+    def make() -> MultiSensorTracker:
+        return MultiSensorTracker(scene.sensors, two_speeds(manoeuvre_noise(min(TURNS))), region=scene.region)
+
+    tracker = LiveTracker(scene, make, interval=INTERVAL, turns=TURNS, tell=lambda line: None)
+    tracker.warm_up()
+    found, tracks = [], 0
+    for plot in replayed(scene, 0.0):
+        cpu, wall = time.process_time(), time.perf_counter()
+        pictures = tracker.take(*plot)
+        if pictures:
+            seconds = np.array([time.process_time() - cpu, time.perf_counter() - wall]) / len(pictures)
+            found += [seconds] * len(pictures)
+            tracks = len(pictures[-1].tracks)
+    return np.array(found), tracks
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Measure the steps."""
+    aircraft, duration = (30, 20.0) if quick else (AIRCRAFT, DURATION)
+    seconds, tracks = steps(aircraft, duration, int(rng.integers(1_000)))
+    settled = 1e3 * seconds[int(SETTLED / INTERVAL) :]
+    middle, high = np.quantile(settled, [0.5, 0.99], axis=0).tolist()
+    label = f"{aircraft} aircraft"
+    return [
+        Claim(f"{label}: steps", "", ours=len(settled)),
+        Claim(f"{label}: CPU time of a step, median", "ms", ours=middle[0]),
+        Claim(f"goal: {label}: CPU time of a step, p99", "ms", ours=high[0], band=(None, GOAL_MS), source=GOAL),
+        Claim(f"{label}: wall time of a step, median", "ms", ours=middle[1]),
+        Claim(f"{label}: wall time of a step, p99", "ms", ours=high[1]),
+        Claim(f"{label}: confirmed tracks at the end", "", ours=tracks),
+    ], settled
+
+
+def draw(figure: Any, settled: Array) -> None:
+    """CPU and wall time of each step."""
+    axes = figure.subplots()
+    for column, name in enumerate(("CPU", "wall")):
+        axes.plot(settled[:, column], ".", label=name)
+    axes.axhline(GOAL_MS, color="black", linewidth=1, linestyle=":")
+    axes.set(xlabel="step", ylabel="ms", ylim=(0.0, None))
+    axes.legend(fontsize=8, frameon=False)
+
+
+TITLE = "Plots as they come"
+
+
+def program(arguments: Sequence[str] | None = None) -> int:
+    """Run the measurement; returns its exit code."""
+    return main("trackers.live", TITLE, experiment, draw, (7, 4), arguments, about=__doc__)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
