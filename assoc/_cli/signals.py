@@ -88,6 +88,7 @@ class Interruption:
             if not self.code:
                 # a library let the signal through to this thread
                 self.word, self.code = ending[number], 128 + number
+                _end_at_the_latest(self.code, f"{self.line()}\n")
             raise KeyboardInterrupt
 
         def unraisable(problem: Any) -> None:
@@ -212,7 +213,18 @@ class EarlyEnd:
         if self._signal:
             line = "; ".join(filter(None, [f"{self._name}: {ending_signals()[self._signal]}", kept]))
             print(line, file=sys.stderr, flush=True)
+            _end_at_the_latest(128 + self._signal, "")
             raise SystemExit(128 + self._signal)
+
+
+def _end_at_the_latest(code: int, text: str) -> None:
+    """End the process if it is not done with cleaning up in five seconds.
+
+    An interrupt may leave a lock of a pool of processes locked for ever, and Python waits for its threads at the end.
+    """
+    timer = threading.Timer(_CLEAN_UP_SECONDS, temporary.end_process, (code, text))
+    timer.daemon = True
+    timer.start()
 
 
 def _wait_for_signals(

@@ -111,7 +111,7 @@ def _picked(parser: argparse.ArgumentParser, names: list[str], family: str | Non
 
 def _make(*, compare: bool) -> int:
     different = 0
-    every = [one for one in instances() if recorded.PATH in os.environ or not one.recorded]
+    every = [one for one in instances() if not one.kept and (recorded.PATH in os.environ or not one.recorded)]
     with tempfile.TemporaryDirectory() as folder:
         for one in every:
             target = store.instance_file(one.name)
@@ -122,7 +122,7 @@ def _make(*, compare: bool) -> int:
                 different += 1
                 print(f"{one.name}: differs from what is stored", file=sys.stderr)
     left = len(instances()) - len(every)
-    without = f", {left} left out for want of a recording" if left else ""
+    without = f", {left} stay as they are" if left else ""
     print(f"{len(every)} instances{without}" + (f", {different} differ" if compare else ""))
     return 1 if different else 0
 

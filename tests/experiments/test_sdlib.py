@@ -38,6 +38,8 @@ def test_names_and_files_are_those_of_the_table():
 
 @pytest.mark.parametrize("one", [pytest.param(one, marks=() if one in LIGHT else pytest.mark.slow) for one in EVERY])
 def test_stored_instances_are_made_by_code_and_seed(one, tmp_path):
+    if one.kept:
+        pytest.skip("posed by a tracker that has changed since")
     if one.recorded and recorded.PATH not in os.environ:
         pytest.skip(f"{recorded.PATH} names no recording")
     one.make().save(tmp_path / "made.txt.xz")

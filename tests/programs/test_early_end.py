@@ -76,6 +76,16 @@ def test_what_is_finished_is_written(work, number, word):
     assert "interrupted" in (work / "o.csv").read_text()
 
 
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
+def test_it_ends_though_a_thread_does_not(work):
+    hanging = ASLEEP.replace(
+        "solve.calls += 1", "solve.calls += 1\n    threading.Thread(target=time.sleep, args=(600,)).start()"
+    )
+    (work / "asleep.py").write_text("import threading\n" + hanging)
+    code, _, errors = interrupted(["solve", "scene.npz", "--import", "asleep", "--solver", "asleep"], work, "scan 3")
+    assert (code, errors) == (130, "assoc.solve: interrupted; 3 of 5 scans are finished and written\n")
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
 def test_tracks_that_are_finished_are_written(work):

@@ -182,6 +182,6 @@ def test_a_task_that_cannot_be_sent_leaves_no_file(tmp_path, monkeypatch):
     from assoc.errors import InvalidInputError
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with pytest.raises(InvalidInputError, match=r"top level of a module .* pickle"):
+    with pytest.raises(InvalidInputError, match="top level of a module"):
         list(ordered_map(lambda item: item, [1, 2], 2))
     assert os.listdir(tmp_path) == []
