@@ -78,63 +78,80 @@ def extend(
     chosen
         Which of them are the best global hypothesis found.
     """
-    known, doubtful, *cut = _extend(*tables, miss, *hits, *roots, column, scan, most, drop, VISITS)
+    limits = _Limits(most, drop, VISITS)
+    history, doubtful, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
     if doubtful.size:
-        tree, score, history, loss, chosen = known
+        tree, score, _, chosen = grown
         other = solve(tree[doubtful], score[doubtful], history[doubtful])
         if score[doubtful[other]].sum() > score[doubtful[chosen[doubtful]]].sum():
             chosen[doubtful] = other
-            cut = _cut(*tables, *hits, *roots, column, scan, most, drop, tree, score, loss, chosen)
+            cut = _cut(tables, hits, roots, _Grown(*grown), column, scan, limits)
     kept, chosen, *rest = cut
     return kept, Tables(*rest), chosen
 
 
+class _Grown(NamedTuple):
+    """All next branches before they are cut: tree, score, loss, and whether the best global hypothesis has it; (K,)."""
+
+    tree: Any
+    score: Any
+    loss: Any
+    chosen: Any
+
+
+class _Limits(NamedTuple):
+    """Branches of a tree and losses to keep (`keep_best`), and work on the best hypothesis (`choose`)."""
+
+    most: int
+    drop: float
+    visits: int
+
+
 @search_njit
-def _extend(
-    numbers: Any, counts: Any, history: Any, born: Any, miss: Any, branch: Any, measurement: Any, gain: Any,
-    when: Any, ids: Any, rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float, visits: int,
-) -> Any:  # fmt: skip
-    old, hits = born.size, branch.size
-    tree, score = np.empty(old + hits + ids.size, np.int64), np.empty(old + hits + ids.size)
+def _extend(tables: Tables, miss: Any, hits: Hits, roots: Roots, column: int, scan: int, limits: _Limits) -> Any:
+    """Grow all next branches and cut them; also returns what is needed to cut them anew."""
+    numbers, counts, history, born = tables
+    branch, measurement, gain, _ = hits
+    ids, rows, _, first = roots
+    old, pairs = born.size, branch.size
+    tree, score = np.empty(old + pairs + ids.size, np.int64), np.empty(old + pairs + ids.size)
     for i in range(old):
         tree[i], score[i] = counts[i, ID], numbers[i, SCORE] + miss[i]
-    for i in range(hits):
+    for i in range(pairs):
         tree[old + i], score[old + i] = counts[branch[i], ID], numbers[branch[i], SCORE] + gain[i]
     for i in range(ids.size):
-        tree[old + hits + i], score[old + hits + i] = ids[i], first[i]
+        tree[old + pairs + i], score[old + pairs + i] = ids[i], first[i]
     wide = np.zeros((score.size, history.shape[1]), np.int32)
     for i in range(old):
         wide[i] = history[i]
-    for i in range(hits):
+    for i in range(pairs):
         wide[old + i] = history[branch[i]]
         wide[old + i, column] = measurement[i] + 1
     for i in range(ids.size):
-        wide[old + hits + i, : rows.shape[1]] = rows[i]
+        wide[old + pairs + i, : rows.shape[1]] = rows[i]
     known = priced(tree, score, wide)
-    chosen, doubtful = choose(score, wide, known, visits)
-    kept, ours, new_numbers, new_counts, new_history, new_born = _cut(
-        numbers, counts, history, born, branch, measurement, gain, when, ids, rows, since, first, column, scan, most,
-        drop, tree, score, known.loss, chosen,
-    )  # fmt: skip
-    told = (tree, score, wide, known.loss, chosen)
-    return told, np.flatnonzero(doubtful), kept, ours, new_numbers, new_counts, new_history, new_born
+    chosen, doubtful = choose(score, wide, known, limits.visits)
+    grown = _Grown(tree, score, known.loss, chosen)
+    kept, ours, new_numbers, new_counts, new_history, new_born = _cut(tables, hits, roots, grown, column, scan, limits)
+    told = (tree, score, known.loss, chosen)
+    return wide, np.flatnonzero(doubtful), told, kept, ours, new_numbers, new_counts, new_history, new_born
 
 
 @njit
-def _cut(
-    numbers: Any, counts: Any, history: Any, born: Any, branch: Any, measurement: Any, gain: Any, when: Any, ids: Any,
-    rows: Any, since: Any, first: Any, column: int, scan: int, most: int, drop: float, tree: Any, score: Any, loss: Any,
-    chosen: Any,
-) -> Any:  # fmt: skip
+def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, scan: int, limits: _Limits) -> Any:
     """The branches that stay, and their tables."""
-    old, hits = born.size, branch.size
-    kept = keep_best(tree, score, np.where(chosen, -1.0, loss), most, drop)
+    numbers, counts, history, born = tables
+    branch, measurement, _, when = hits
+    ids, rows, since, first = roots
+    score = grown.score
+    old, pairs = born.size, branch.size
+    kept = keep_best(grown.tree, score, np.where(grown.chosen, -1.0, grown.loss), limits.most, limits.drop)
     new_numbers, new_counts = np.empty((kept.size, numbers.shape[1])), np.zeros((kept.size, counts.shape[1]), np.int64)
     new_history, new_born = np.zeros((kept.size, history.shape[1]), np.int32), np.full(kept.size, scan)
     for k in range(kept.size):
         row = kept[k]
-        if row >= old + hits:
-            i = row - old - hits
+        if row >= old + pairs:
+            i = row - old - pairs
             new_numbers[k, SCORE] = new_numbers[k, BEST] = new_numbers[k, EXISTS] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
             new_counts[k, ID] = ids[i]
@@ -151,7 +168,7 @@ def _cut(
         if row >= old:
             new_numbers[k, LAST] = max(numbers[source, LAST], when[row - old])
             new_history[k, column] = measurement[row - old] + 1
-    return kept, chosen[kept], new_numbers, new_counts, new_history, new_born
+    return kept, grown.chosen[kept], new_numbers, new_counts, new_history, new_born
 
 
 @njit
