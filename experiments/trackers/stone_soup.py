@@ -7,6 +7,7 @@ enumeration of all joint events is for a few targets.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from typing import Any
@@ -68,7 +69,11 @@ def multi_frame(plane: Plane, window: int, gate: float) -> Iterator[tuple[float,
         tracks.add(Track([GaussianMixture([prior])]))
     for when, detections in _scans(plane, model):
         started = time.process_time()
-        for track, hypotheses in associator.associate(tracks, detections, when).items():
+        with warnings.catch_warnings():
+            # where its shortcut finds nothing it says so, and solves the whole problem
+            warnings.filterwarnings("ignore", "Infeasible primal problem")
+            found = associator.associate(tracks, detections, when)
+        for track, hypotheses in found.items():
             components = [updater.update(one) if one else one.prediction for one in hypotheses]
             track.append(GaussianMixture(components))
         elapsed = time.process_time() - started
