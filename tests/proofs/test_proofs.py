@@ -20,7 +20,7 @@ from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.proofs import write_proof
 from assoc.proofs.write import exact_problem
 from assoc.simulation import simulate
-from tests.reliability.problems import exact_optimum
+from tests.reliability.exact import exact_optimum
 
 ALONE = Path(check.__file__)
 

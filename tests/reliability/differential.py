@@ -29,7 +29,8 @@ from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
 from assoc.solvers.assign import assign
-from tests.reliability.problems import Case, draw, exact_cost, exact_marginals, exact_optimum
+from tests.reliability.exact import exact_cost, exact_marginals, exact_optimum
+from tests.reliability.problems import Case, draw
 
 Way = Callable[[AssignmentProblem], list[Solution]]
 

@@ -6,15 +6,12 @@ random by `draw`, or one after the other by whoever wants them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 
 Ints = NDArray[np.int64]
@@ -48,171 +45,6 @@ def make(rng: np.random.Generator, structure: str, temper: str) -> AssignmentPro
     costs = TEMPERS[temper](rng, tuples, sizes)
     order = rng.permutation(len(tuples))
     return AssignmentProblem(tuples[order], costs[order], sizes, dummy=dummy)
-
-
-def exact_optimum(problem: AssignmentProblem) -> Fraction:
-    """Optimal cost in exact arithmetic, part by part, by recursion over the sets of covered measurements.
-
-    Raises
-    ------
-    InfeasibleError
-        The problem has no solution.
-    """
-    return sum((optimum_of_part(part) for _, part in _parts(problem)), Fraction(0))
-
-
-def optimum_of_part(problem: AssignmentProblem) -> Fraction:
-    """Optimal cost of a problem with few measurements."""
-    covering, to_cover, unit = _coverings(problem)
-    memo: dict[int, int | None] = {}
-
-    def rest(covered: int) -> int | None:
-        low = (~covered & -~covered).bit_length() - 1
-        if low >= to_cover:
-            return 0
-        if covered not in memo:
-            least = None
-            for mask, price in covering[low]:
-                if not mask & covered:
-                    more = rest(covered | mask)
-                    if more is not None and (least is None or price + more < least):
-                        least = price + more
-            memo[covered] = least
-        return memo[covered]
-
-    answer = rest(0)
-    if answer is None:
-        raise InfeasibleError("no solution")
-    return Fraction(answer, unit)
-
-
-def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
-    """Probability of each tuple where a solution weighs exp(-cost), from exact differences of costs.
-
-    Raises
-    ------
-    InfeasibleError
-        The problem has no solution.
-    """
-    tuples = problem.tuples.tolist()
-    return {
-        tuple(tuples[k]): p
-        for rows, part in _parts(problem)
-        for k, p in zip(rows, marginals_of_part(part), strict=True)
-    }
-
-
-def _parts(problem: AssignmentProblem) -> list[tuple[list[int], AssignmentProblem]]:
-    """Split a problem with dummies into parts that share no measurement: the rows of each, and a problem of them."""
-    if not problem.dummy or len(problem.tuples) == 0:
-        return [(list(range(len(problem.tuples))), problem)]
-    measurements = [[(s, i) for s, i in enumerate(row) if i] for row in problem.tuples.tolist()]
-    chief = {one: one for own in measurements for one in own}
-
-    def root(one: tuple[int, int]) -> tuple[int, int]:
-        while chief[one] != one:
-            one = chief[one]
-        return one
-
-    for own in measurements:
-        for one in own[1:]:
-            chief[root(one)] = root(own[0])
-    members: dict[tuple[int, int], list[int]] = {}
-    for k, own in enumerate(measurements):
-        members.setdefault(root(own[0]), []).append(k)
-    parts = []
-    for rows in members.values():
-        columns = [np.unique(column, return_inverse=True) for column in problem.tuples[rows].T]
-        # numbers from 1, and 0 for none also where no tuple has none
-        tuples = np.stack([place + (values[0] > 0) for values, place in columns], axis=1)
-        parts.append((rows, AssignmentProblem(tuples, problem.costs[rows], tuples.max(axis=0))))
-    return parts
-
-
-def marginals_of_part(problem: AssignmentProblem) -> list[float]:
-    """Probability of each tuple of a problem with few measurements."""
-    covering, to_cover, unit = _coverings(problem)
-    # for each set of covered measurements: the least cost of the rest, the weight of all rests relative to that
-    memo: dict[int, tuple[int, float] | None] = {}
-
-    def ways(covered: int) -> list[tuple[int, int, int, float]]:
-        low = (~covered & -~covered).bit_length() - 1
-        found = []
-        for mask, price in covering[low] if low < to_cover else []:
-            more = None if mask & covered else rest(covered | mask)
-            if more is not None:
-                found.append((mask, price + more[0], covered | mask, more[1]))
-        return found
-
-    def rest(covered: int) -> tuple[int, float] | None:
-        if (~covered & -~covered).bit_length() - 1 >= to_cover:
-            return 0, 1.0
-        if covered not in memo:
-            found = ways(covered)
-            least = min((cost for _, cost, _, _ in found), default=0)
-            weight = math.fsum(_weight(least - cost, unit) * own for _, cost, _, own in found)
-            memo[covered] = (least, weight) if found else None
-        return memo[covered]
-
-    if rest(0) is None:
-        raise InfeasibleError("no solution")
-    reached = {0: 1.0}
-    probability: dict[int, float] = {}
-    # a set comes after all sets that it contains
-    for covered in sorted({0, *memo}):
-        here = memo.get(covered)
-        if here is None or covered not in reached:
-            continue
-        for mask, cost, after, own in ways(covered):
-            share = reached[covered] * _weight(here[0] - cost, unit) * own / here[1]
-            probability[mask] = probability.get(mask, 0.0) + share
-            reached[after] = reached.get(after, 0.0) + share
-    offsets = _offsets(problem)[0]
-    masks = (sum(1 << (offsets[s] + i - 1) for s, i in enumerate(row) if i) for row in problem.tuples.tolist())
-    return [probability.get(mask, 0.0) for mask in masks]
-
-
-def _weight(exponent: int, unit: int) -> float:
-    return math.exp(max(exponent / unit, -1e4))
-
-
-def _offsets(problem: AssignmentProblem) -> tuple[list[int], int]:
-    """Each sensor's first bit, sensors whose measurements must be covered first; how many bits must be covered."""
-    sizes = problem.sizes.tolist()
-    smallest = min(sizes)
-    order = sorted(range(len(sizes)), key=lambda s: not (problem.dummy or sizes[s] == smallest))
-    offset, bits, to_cover = [0] * len(sizes), 0, 0
-    for s in order:
-        offset[s] = bits
-        bits += sizes[s]
-        if problem.dummy or sizes[s] == smallest:
-            to_cover = bits
-    return offset, to_cover
-
-
-def _coverings(problem: AssignmentProblem) -> tuple[list[list[tuple[int, int]]], int, int]:
-    """For each measurement that must be covered the tuples that begin in it, as bits and cost; cost unit last."""
-    offset, to_cover = _offsets(problem)
-    # all costs as whole numbers of the smallest unit among them: sums are exact and quick
-    ratios = [cost.as_integer_ratio() for cost in problem.costs.tolist()]
-    unit = max((denominator for _, denominator in ratios), default=1)
-    covering: list[list[tuple[int, int]]] = [[] for _ in range(to_cover)]
-    best: dict[int, int] = {}
-    for row, (numerator, denominator) in zip(problem.tuples.tolist(), ratios, strict=True):
-        mask = sum(1 << (offset[s] + i - 1) for s, i in enumerate(row) if i)
-        price = numerator * (unit // denominator)
-        if mask not in best or price < best[mask]:
-            best[mask] = price
-    for mask, price in best.items():
-        low = (mask & -mask).bit_length() - 1
-        if low < to_cover:
-            covering[low].append((mask, price))
-    return covering, to_cover, unit
-
-
-def exact_cost(problem: AssignmentProblem, indices: NDArray[np.intp]) -> Fraction:
-    """Cost of a choice of tuples in exact arithmetic."""
-    return sum((Fraction(cost) for cost in problem.costs[indices].tolist()), Fraction(0))
 
 
 # --- structures: which tuples there are -------------------------------------------------------------------

@@ -7,18 +7,8 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from tests.reliability.differential import LISTED, WAYS, faults, judge
-from tests.reliability.problems import (
-    STRUCTURES,
-    TEMPERS,
-    Case,
-    draw,
-    exact_marginals,
-    exact_optimum,
-    make,
-    many_parts,
-    marginals_of_part,
-    optimum_of_part,
-)
+from tests.reliability.exact import exact_marginals, exact_optimum, marginals_of_part, optimum_of_part
+from tests.reliability.problems import STRUCTURES, TEMPERS, Case, draw, make, many_parts
 from tests.sizes import few_or_all
 
 # the structures there were when the faults below were found: the same numbers then draw the same problems
