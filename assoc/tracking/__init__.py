@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.identity_evidence import IdentityParameters
-from assoc.tracking.initiation import Initiation
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.live.late_plots import LatePlots

@@ -26,8 +26,8 @@ from assoc.filters.state import gaussian
 from assoc.registration.online import OnlineRegistration
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
+from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.identity_evidence import Identities
-from assoc.tracking.initiation import Initiation
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.track_batch import TrackBatch
 

@@ -29,14 +29,14 @@ from assoc.sensors import Sensor
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
+from assoc.tracking.births.initiation import Initiation
+from assoc.tracking.births.joint_starts import Crossings
+from assoc.tracking.births.new_tracks import NewTracks
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint, Memory
 from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.identity_evidence import Identities, IdentityParameters, checked_identities
-from assoc.tracking.initiation import Initiation
-from assoc.tracking.joint_starts import Crossings
 from assoc.tracking.life_cycle import LifeCycle
-from assoc.tracking.new_tracks import NewTracks
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_batch import TrackBatch, empty_batch
 

@@ -10,7 +10,7 @@ from assoc.sensors import BearingSensor
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth
 from assoc.tracking import TRACKERS
-from assoc.tracking.joint_starts import crossings
+from assoc.tracking.births.joint_starts import crossings
 from tests.sizes import sample
 
 REGION = np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 100.0]])

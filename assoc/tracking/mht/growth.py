@@ -21,7 +21,7 @@ from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate
 from assoc.scene.scan import Scan
 from assoc.sensors import Sensor
-from assoc.tracking.new_tracks import NewTracks
+from assoc.tracking.births.new_tracks import NewTracks
 from assoc.tracking.track_batch import STARTED, TrackBatch
 
 

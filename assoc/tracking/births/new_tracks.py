@@ -14,8 +14,8 @@ from assoc.costs.tracks.scores import ScoreTerms, log_birth
 from assoc.filters.base import Filter
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.tracking.initiation import Initiation
-from assoc.tracking.joint_starts import Crossings, crossings
+from assoc.tracking.births.initiation import Initiation
+from assoc.tracking.births.joint_starts import Crossings, crossings
 
 
 class NewTracks:
@@ -87,7 +87,7 @@ class NewTracks:
         """Tuples that may start tracks where all sensors measure angles alone, and their scores as new targets.
 
         `free` are masks over the measurements of each sensor, `options` those of `assoc.build_problem`; see
-        `assoc.tracking.joint_starts`.
+        `assoc.tracking.births.joint_starts`.
         """
         # angles alone tell no distance
         if not all(all(sensor.angular[: sensor.dim]) for sensor in self._place.sensors):
