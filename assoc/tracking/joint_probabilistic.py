@@ -128,6 +128,11 @@ class JointProbabilisticTracker(NursingTracker):
         ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
+    def _detected(self, step: Step) -> Array:
+        ids = self._batch.track_id[:, None]
+        shares = [(ids == one.track_id) @ one.probability for one in self.probabilities]
+        return np.minimum(np.stack(shares, axis=1), 1.0)
+
     def _probabilities(self, batch: TrackBatch, pairs: TrackPairs, s: int, count: int) -> PairProbabilities:
         """Sum the joint events of one sensor's measurements and the tracks."""
         exists = _probability(batch.existence)
