@@ -42,31 +42,34 @@ def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
     ----------
     Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 1.4.16.
     """
-    if isinstance(states, Gaussian):
-        return gaussian(*_matched(states.mean, states.covariance, target, weights, count))
-    if not isinstance(states, Mixture):
+    if not isinstance(states, (Gaussian, Mixture)):
         raise InvalidInputError(
             f"filter: states of the kind {type(states).__name__} cannot be merged; use a Kalman filter, extended or "
             "unscented, or interacting multiple models"
         )
+    # by target, so that sums are those of stretches
+    order = np.argsort(target, kind="stable")
+    states, target, weights = states[order], target[order], weights[order]
+    begin = np.searchsorted(target, np.arange(count))
+    if isinstance(states, Gaussian):
+        return gaussian(*_matched(states.mean, states.covariance, target, weights, begin))
     modes = states.weights.shape[1]
     each = weights[:, None] * states.weights
-    total = _sums(each, target, count)
+    total = _sums(each, begin)
     # a model that nothing speaks for is merged all the same
     share = np.where(total[target] > 0.0, each / np.maximum(total[target], 1e-300), weights[:, None])
-    parts = [_matched(states.means[:, j], states.covariances[:, j], target, share[:, j], count) for j in range(modes)]
+    parts = [_matched(states.means[:, j], states.covariances[:, j], target, share[:, j], begin) for j in range(modes)]
     means, covariances = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
     return Mixture(means, covariances, total / total.sum(axis=1, keepdims=True))
 
 
-def _matched(mean: Array, covariance: Array, target: Array, weights: Array, count: int) -> tuple[Array, Array]:
-    whole = _sums(weights[:, None] * mean, target, count)
+def _matched(mean: Array, covariance: Array, target: Array, weights: Array, begin: Array) -> tuple[Array, Array]:
+    whole = _sums(weights[:, None] * mean, begin)
     away = mean - whole[target]
     spread = covariance + away[:, :, None] * away[:, None, :]
-    return whole, _sums(weights[:, None, None] * spread, target, count)
+    return whole, _sums(weights[:, None, None] * spread, begin)
 
 
-def _sums(values: Array, target: Array, count: int) -> Array:
-    total = np.zeros((count, *values.shape[1:]))
-    np.add.at(total, target, values)
-    return total
+def _sums(values: Array, begin: Array) -> Array:
+    """Sums of the stretches that begin there."""
+    return np.asarray(np.add.reduceat(values, begin, axis=0)) if len(begin) else values[:0]

@@ -40,11 +40,12 @@ def identity_after_each(sources: Array, tracks: Array) -> Array:
         if taker >= 0:
             plots = recent.setdefault(taker, deque(maxlen=MEMORY))
             plots.append(aircraft)
-            identity[row] = _majority(plots)
+            identity[row] = majority(plots)
     return identity
 
 
-def _majority(plots: deque[int]) -> int:
+def majority(plots: deque[int]) -> int:
+    """Whose most of these plots are, of equals the last one's; -1 if no plot is anyone's."""
     votes = Counter(aircraft for aircraft in plots if aircraft >= 0)
     if not votes:
         return -1

@@ -7,7 +7,8 @@ from assoc.tracking.identity_evidence import IdentityParameters
 from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.live.late_plots import LatePlots
-from assoc.tracking.live.live_tracker import LiveTracker, Picture
+from assoc.tracking.live.live_tracker import LiveTracker
+from assoc.tracking.live.pictures import Picture
 from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
 from assoc.tracking.mht.track_oriented import TrackOrientedMHT
 from assoc.tracking.nearest_neighbour import NearestNeighbourTracker

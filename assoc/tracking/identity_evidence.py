@@ -170,6 +170,11 @@ def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: flo
     return np.where(says, np.log(own / other), 0.0), np.where(known.any(axis=1), best, UNKNOWN)
 
 
+def no_identities(measurements: Sequence[Array]) -> list[Array]:
+    """Identities of measurements, none of which has any."""
+    return [np.zeros((len(z), 2), dtype=np.int64) for z in measurements]
+
+
 def checked_identities(identities: Sequence[Array], sizes: Sequence[int]) -> list[Array]:
     """Codes and addresses of each sensor's measurements, int64 (n_s, 2).
 

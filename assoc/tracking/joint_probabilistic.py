@@ -1,8 +1,8 @@
 """The joint probabilistic tracker: each track takes every measurement in its gate, each as far as it is its own.
 
 Sensor after sensor, the joint events "these measurements are of these tracks, the others are false alarms" are the
-solutions of a 2-D assignment problem, and their probabilities are the exponentials of its costs. `assoc.ranking`
-sums them cluster by cluster, with a bound on what was not listed, so that each probability comes as an interval that
+matchings of a graph of tracks and measurements. `assoc.ranking.pairs` sums them cluster by cluster, exactly where a
+cluster is not too wide, and with a bound on what was left out, so that each probability comes as an interval that
 holds. A track may be none: with existence probability p the pair of a track and a measurement weighs
 
     p P_D N(z; expected, S) / beta_FA,    against    1 - p P_D    for a track without a measurement,
@@ -34,8 +34,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.base import predict_each
 from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
-from assoc.problem import AssignmentProblem
-from assoc.ranking.marginals import marginals
+from assoc.ranking.pairs.events import pair_probabilities
 from assoc.scene.scan import Scan
 from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
 from assoc.tracking.track import Step, decision
@@ -75,7 +74,8 @@ class JointProbabilisticTracker(Tracker):
     sensors, filter, ...
         As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
     max_events : int
-        Joint events listed for each cluster of tracks and measurements; more make the intervals narrower.
+        Joint events, as far as they are summed, that are kept apart at a time in a cluster of tracks and measurements.
+        Where a cluster would need more, its least likely pairs are left out: more make the intervals narrower.
     **options
         As for `Tracker`.
 
@@ -87,7 +87,7 @@ class JointProbabilisticTracker(Tracker):
 
     name = "joint-probabilistic"
 
-    def __init__(self, *arguments: Any, max_events: int = 100, **options: Any) -> None:
+    def __init__(self, *arguments: Any, max_events: int = 4096, **options: Any) -> None:
         super().__init__(*arguments, **options)
         if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)) or max_events < 1:
             raise InvalidInputError(f"max_events must be a whole number above 0, got {max_events!r}")
@@ -133,21 +133,11 @@ class JointProbabilisticTracker(Tracker):
 
     def _probabilities(self, batch: TrackBatch, pairs: TrackPairs, s: int, count: int) -> PairProbabilities:
         """Sum the joint events of one sensor's measurements and the tracks."""
-        rows = np.stack([pairs.track, pairs.measurement], axis=1)
-        ids = batch.track_id[pairs.track]
-        if not len(rows):
-            nothing = np.zeros(0)
-            return PairProbabilities(ids, pairs.measurement, nothing, nothing, nothing)
         exists = _probability(batch.existence)
         absent = np.log1p(-exists * -np.expm1(self.terms.miss[s]))
         weight = np.log(exists)[pairs.track] + self.terms.detection[s] + pairs.log_likelihood - absent[pairs.track]
-        known = marginals(AssignmentProblem(rows + 1, -weight, [len(batch), count]), self.max_events)
-        # the rows of the answer that are pairs, in the order of ours
-        paired = np.flatnonzero((known.tuples > 0).all(axis=1))
-        order = paired[np.lexsort(known.tuples[paired].T[::-1])]
-        back = np.empty(len(rows), dtype=np.int64)
-        back[np.lexsort(rows.T[::-1])] = order
-        return PairProbabilities(ids, pairs.measurement, known.probability[back], known.lower[back], known.upper[back])
+        known = pair_probabilities(pairs.track, pairs.measurement, weight, (len(batch), count), self.max_events)
+        return PairProbabilities(batch.track_id[pairs.track], pairs.measurement, *known)
 
     def _take_in(self, batch: TrackBatch, gated: GatedPairs, share: Array, s: int) -> tuple[TrackBatch, Array]:
         """Tracks after a sensor's scan, and which of them were rather detected than not."""

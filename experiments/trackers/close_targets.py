@@ -5,7 +5,7 @@
 
 Twelve targets, 40 scans of 4 s, default settings; GOSPA, OSPA(2) and HOTA with a cutoff of 500 m, identity switches a
 scene and CPU time of a scan, beside an oracle that is told which measurement is whose. Seeds are --seed (200) and those
-that follow, --seeds of them (20); mht-hypothesis does the first half of them, joint-probabilistic the first sixth.
+that follow, --seeds of them (20).
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from experiments.trackers.close_scenes import SCANS, SETTINGS, simulate
 from experiments.trackers.judging import NAMES, Judged, claims_of, goal, judge, means
 
 SEEDS, FIRST = 20, 200
-SHARE = {"mht-hypothesis": 2, "joint-probabilistic": 6}
-"""Slow ones, which do a half and a sixth of the scenes."""
 CLEARLY_BETTER = ("formations, unequal radars, P_d 0.6", "crossings", "crossings, P_d 0.6")
 """Where the MHT should win: low P_d, and crossings."""
 
@@ -33,8 +31,7 @@ def experiment(quick: bool, seed: int, seeds: int = SEEDS) -> tuple[list[Claim],
     shown: dict[str, dict[str, list[Judged]]] = {}
     for label, setting in list(SETTINGS.items())[: 2 if quick else None]:
         scenes = [simulate(setting, seed + k, 8 if quick else SCANS) for k in range(2 if quick else seeds)]
-        count = {name: max(2, len(scenes) // SHARE.get(name, 1)) for name in NAMES}
-        found = {name: [judge(name, scene) for scene in scenes[: count[name]]] for name in NAMES}
+        found = {name: [judge(name, scene) for scene in scenes] for name in NAMES}
         shown[label] = found
         for name, runs in found.items():
             claims += claims_of(label, name, runs)

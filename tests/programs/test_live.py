@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -22,6 +23,7 @@ from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker
 from assoc.tracking.checkpoint import described
 from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
+from tests.tracking.crossing import crossing, radar
 
 
 @pytest.fixture(scope="module")
@@ -157,3 +159,51 @@ def test_lines_that_are_none_are_refused_in_one_line(scene_file, line):
     with pytest.raises(InvalidInputError) as caught:
         parse_line(line, scene)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+
+
+def test_lines_with_identities(scene_file):
+    scene = Scene.load(scene_file)
+    assert parse_line("1,2.5,1000,0.5,0.1,1234,a0b1C2", scene).identity == (1234, 0xA0B1C2)
+    assert parse_line("1,2.5,1000,0.5,0.1,1234", scene) == ("1", 2.5, [1000.0, 0.5, 0.1], (1234, 0))
+    assert parse_line("1,2.5,1000,0.5,0.1,,a0b1c2", scene).identity == (0, 0xA0B1C2)
+    for line in ("1,2.5,1000,0.5,0.1,,", "1,2.5,1000,0.5,0.1"):
+        assert parse_line(line, scene).identity == (0, 0)
+    plain = {"sensor": 1, "time": 2.5, "values": [1000.0, 0.5, 0.1]}
+    for more, expected in [
+        ({"mode3": 1234, "address": "A0B1C2"}, (1234, 0xA0B1C2)),
+        ({"mode3": "0457", "address": 5}, (457, 5)),
+        ({"mode3": None, "address": ""}, (0, 0)),
+        ({}, (0, 0)),
+    ]:
+        assert parse_line(json.dumps(plain | more), scene) == ("1", 2.5, plain["values"], expected)
+    for bad in ("8000", "-1", "12.5", "x", "1_0", "0,1000000", "0,zz", "0,1,2"):
+        with pytest.raises(InvalidInputError, match="mode3|address|values") as caught:
+            parse_line(f"1,2.5,1000,0.5,0.1,{bad}", scene)
+        assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+    for more in ({"mode3": 1.5}, {"mode3": True}, {"address": [1]}, {"address": 2**24}):
+        with pytest.raises(InvalidInputError, match="expected sensor, time and values"):
+            parse_line(json.dumps(plain | more), scene)
+
+
+def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
+    recording = crossing(2, begin=1.0)
+    place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
+    place.save(tmp_path / "radar.npz")
+    columns = recording.times, recording.ranges, recording.azimuths, recording.identities
+    rows = zip(*(one.tolist() for one in columns), strict=True)
+    lines = "\n".join(["sensor,time,range,azimuth,mode3", *(f"1,{t!r},{r!r},{a!r},{code}" for t, r, a, code in rows)])
+    told, tracks = {}, {}
+    for how in (None, "score-only", "ignore", "use"):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines.encode())))
+        out = tmp_path / "tracks.csv"
+        more = [] if how is None else ["--identity", how]
+        given = [str(tmp_path / "radar.npz"), "--live", "--interval", "4", "--tracker", "nearest-neighbour"]
+        assert track.main([*given, "-o", str(out), *more]) == 0
+        told[how], tracks[how] = capsys.readouterr().err.strip().splitlines()[-1], out.read_text()
+    for how in (None, "score-only"):
+        assert told[how].endswith("; 0 of 2 tracks with an identity kept one")
+    assert "identity" not in told["ignore"]
+    assert told["use"].endswith("; 2 of 2 tracks with an identity kept one (identities were used to make them)")
+    assert tracks[None] == tracks["score-only"] == tracks["ignore"] != tracks["use"]
+    assert track.main([*given, "--replay", "0", "--identity", "use", "-o", str(out)]) == 2
+    assert "--identity: is for plots; the measurements of a scene have no codes" in capsys.readouterr().err

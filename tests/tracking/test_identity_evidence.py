@@ -13,9 +13,9 @@ from assoc.tracking import TRACKERS, IdentityParameters
 from assoc.tracking.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
 from assoc.tracking.plots.plot_tracks import track_plots
 from tests.sizes import few_or_all
+from tests.tracking.crossing import TURN, crossing, radar
 
 NAMES = ("mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic")
-TURN = 4.0
 
 
 def by_enumeration(told, given, count, garbled, shared):
@@ -79,27 +79,8 @@ def test_another_address_is_not_in_the_gate():
     assert known.evidence(np.array([2]), plots[:1]).possible.all()
 
 
-def crossing(seed, wrong=(), address=False):
-    """Two aircraft that fly side by side for long, 150 m apart, and cross; codes as (plot of aircraft 0, code)."""
-    rng = np.random.default_rng(seed)
-    rows = []
-    for k in range(50):
-        for aircraft in (0, 1):
-            time = TURN * k + 0.3 * aircraft
-            x, y = -20_000.0 + 200.0 * time, 30_000.0 + (2 * aircraft - 1) * 8.0 * (time - TURN * 25)
-            code = (0o1234, 0o4567)[aircraft]
-            if aircraft == 0 and k in wrong:
-                code = 0o7654
-            noisy = np.hypot(x, y) + rng.normal(0.0, 100.0), np.arctan2(y, x) + rng.normal(0.0, 2e-3)
-            rows.append((time, *noisy, code, 0xA00000 + aircraft if address else 0, aircraft))
-    rows.sort()
-    times, ranges, azimuths, codes, addresses, sources = map(np.array, zip(*rows, strict=True))
-    return Recording(times, ranges, azimuths, identities=codes, addresses=addresses, sources=sources)
-
-
 def followed(name, recording, identity):
-    radar = radar_of(recording, detection_probability=0.9, range_noise=100.0, azimuth_noise=2e-3, false_alarm_rate=2.5)
-    tracker = TRACKERS[name]([radar], identity=identity)
+    tracker = TRACKERS[name]([radar(recording)], identity=identity)
     return track_plots(tracker, recording, clustering_time_window(recording, TURN))
 
 
@@ -152,9 +133,8 @@ def test_identities_without_codes_change_nothing(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_restored_tracker_knows_the_codes(name, tmp_path):
     recording = crossing(1)
-    radar = radar_of(recording, detection_probability=0.9, range_noise=100.0, azimuth_noise=2e-3, false_alarm_rate=2.5)
     windows = clustering_time_window(recording, TURN)
-    one, two = (TRACKERS[name]([radar], identity=IdentityParameters()) for _ in range(2))
+    one, two = (TRACKERS[name]([radar(recording)], identity=IdentityParameters()) for _ in range(2))
     track_plots(one, recording, windows[:24])
     one.save(tmp_path / "state.npz")
     two.restore(tmp_path / "state.npz")
@@ -162,17 +142,17 @@ def test_a_restored_tracker_knows_the_codes(name, tmp_path):
     np.testing.assert_array_equal(
         track_plots(one, recording, windows[24:]).tracks, track_plots(two, recording, windows[24:]).tracks
     )
-    other = TRACKERS[name]([radar], identity=IdentityParameters(code_garbled=0.1))
+    other = TRACKERS[name]([radar(recording)], identity=IdentityParameters(code_garbled=0.1))
     with pytest.raises(InvalidInputError, match="other settings"):
         other.restore(tmp_path / "state.npz")
 
 
 def test_bad_identities_are_refused():
     recording = crossing(0)
-    radar = radar_of(recording, range_noise=100.0, azimuth_noise=2e-3)
+    own = radar_of(recording, range_noise=100.0, azimuth_noise=2e-3)
     with pytest.raises(InvalidInputError, match="identity must be IdentityParameters"):
-        TRACKERS["mht"]([radar], identity="use")
-    tracker = TRACKERS["mht"]([radar], identity=IdentityParameters())
+        TRACKERS["mht"]([own], identity="use")
+    tracker = TRACKERS["mht"]([own], identity=IdentityParameters())
     z = recording.measurements[:2]
     for bad, words in (
         ([], "one array for each of 1 sensors"),

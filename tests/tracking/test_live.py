@@ -9,8 +9,14 @@ import pytest
 
 from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
+from assoc.metrics import tracks_of_one_identity
+from assoc.recordings import Window
+from assoc.scene import Scene
 from assoc.simulation import simulate
-from assoc.tracking import TRACKERS, LiveTracker
+from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
+from assoc.tracking.live.kept_identities import KeptIdentities
+from assoc.tracking.plots.plot_tracks import track_plots
+from tests.tracking.crossing import TURN, crossing, radar
 
 TURNS = [4.0, 5.0, 5.5]
 
@@ -145,3 +151,85 @@ def test_what_is_refused(scene):
     ]:
         with pytest.raises(InvalidInputError, match=words):
             live(scene, **options)
+
+
+def partition(tracks):
+    """Tracks by the order in which they first took a plot."""
+    number = {0: 0, -1: 0}
+    return [number.setdefault(one, len(number) - 1) for one in tracks]
+
+
+@pytest.mark.parametrize("name", ["mht", "nearest-neighbour"])
+def test_identities_give_the_tracks_of_the_recording(name):
+    recording = crossing(2, begin=1.0)
+    number = np.floor(recording.times / TURN)
+    windows = [Window.of(recording, np.flatnonzero(number == k), k) for k in np.unique(number)]
+    told = np.stack([recording.identities, recording.addresses], axis=1)
+    everywhere = np.array([[0.0, 2.0 * np.pi]])
+    found = {}
+    for how, identity in (("use", IdentityParameters()), ("ignore", None)):
+        plain, online, stored = (TRACKERS[name]([radar(recording)], identity=identity) for _ in range(3))
+        expected = []
+        for k, window in enumerate(windows):
+            rows = window.rows
+            step = plain.step(
+                TURN * (k + 1), [recording.measurements[rows]], [recording.times[rows]], everywhere, [told[rows]]
+            )
+            expected += step.assigned[0].tolist()
+        place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
+        live, taken = LiveTracker(place, lambda made=online: made, interval=TURN, tell=pytest.fail), []
+        step_of = online.step
+
+        def noted(*given, step_of=step_of, taken=taken):
+            step = step_of(*given)
+            taken += step.assigned[0].tolist()
+            return step
+
+        online.step = noted
+        for time, z, pair in zip(recording.times.tolist(), recording.measurements.tolist(), told.tolist(), strict=True):
+            live.take("1", time, z, tuple(pair))
+        last = live.finish()[-1]
+        assert taken == expected
+        sure = [track for track in plain.tracks if track.confirmed]
+        np.testing.assert_array_equal([one.mean for one in last.tracks], [one.mean for one in sure])
+        # the program's own way through a recording ends its windows elsewhere: new tracks are confirmed a little sooner
+        done = track_plots(stored, recording, windows)
+        kept, known = done.kept
+        assert partition(taken[20:]) == partition(done.tracks[20:])
+        assert known == 2 and f"{kept} of 2 tracks with an identity kept one" in live.summary()
+        assert ("were used" in live.summary()) == (how == "use")
+        found[how] = partition(taken)
+    assert found["use"] != found["ignore"] and set(found["use"][20:]) == {1, 2}
+
+
+def test_identities_that_are_none_are_told():
+    recording = crossing(0)
+    place = Scene(sensors=[radar(recording)], times=[0.0], measurements=[[np.zeros((0, 2))]])
+    told = []
+    live = LiveTracker(place, lambda: TRACKERS["mht"]([radar(recording)]), tell=told.append)
+    for pair in ((-1, 0), (0, 2**24), (0.5, 0), (1,), "use", None):
+        live.take("1", 0.0, recording.measurements[0], pair)
+    assert live.counts["unusable"] == 6 and len(told) == 1 and "identities" in told[0]
+    live.take("1", 0.0, recording.measurements[0])
+    live.finish()
+    assert "identity" not in live.summary()
+
+
+def test_kept_identities_are_those_of_the_metric():
+    rng = np.random.default_rng(5)
+    for column in (0, 1):
+        n = 400
+        tracks, sure = rng.integers(0, 12, n), rng.random(n) < 0.7
+        codes = np.where(rng.random(n) < 0.6, 1 + tracks, rng.integers(0, 9, n))
+        expected = tracks_of_one_identity(np.where(codes > 0, codes, -1), np.where(tracks > 0, tracks, -1), sure)
+        told = np.zeros((n, 2), dtype=np.int64)
+        told[:, column] = codes
+        judge = KeptIdentities()
+        for k in range(0, n, 7):
+            part = slice(k, k + 7)
+            judge.take(tracks[part], sure[part], np.full(len(tracks[part]), float(k)), told[part])
+            assert k < 200 or judge.counts()[1] > 5
+        assert 0 < expected[0] < expected[1] and judge.counts() == expected
+        # what is judged is counted once, and forgotten
+        judge.settle({1, 2}, 1e9)
+        assert judge.counts() == expected and len(judge._tracks) == 2

@@ -20,7 +20,7 @@ from assoc.tracking.filter_choice import pace_of
 
 def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
     """Track plots as they come, until they end or a signal ends the program."""
-    for flag in ("report", "rates", "window", "identity", "rotation", "registration", *RADAR):
+    for flag in ("report", "rates", "window", "rotation", "registration", *RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
     if parsed["smooth"]:
@@ -34,6 +34,8 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
     ports = {
         name: None if parsed[name] is None else whole_number(parsed[name], flag_of(name), 0) for name in ("udp", "page")
     }
+    if parsed["identity"] is not None and parsed["replay"] is not None:
+        raise InvalidInputError("--identity: is for plots; the measurements of a scene have no codes")
     speed = None if parsed["replay"] is None else number(parsed["replay"], "--replay")
     if speed is not None and not 0 <= speed < math.inf:
         raise InvalidInputError(f"--replay: expected a number >= 0, got {parsed['replay']!r}")
@@ -78,6 +80,7 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
             tell(f"{lines.lost} lines lost: they came quicker than tracks can be made")
         tell(tracker.summary())
 
+    ignored = parsed["identity"] == "ignore"
     with interruption.reported(end):
         if lines is None:
             for plot in replayed(scene, speed or 0.0):
@@ -90,5 +93,5 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
                     tracker.leave_out("lines not understood", f"line left out: {error}")
                     continue
                 if found is not None:
-                    show(tracker.take(*found))
+                    show(tracker.take(*(found[:3] if ignored else found)))
     end()

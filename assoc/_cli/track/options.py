@@ -83,7 +83,7 @@ _TRACKING = (
     ("--depth", "N", "mht: number of scans after which a decision is final (default 3)"),
     ("--max-branches", "N", "mht: largest number of branches of a track tree (default 30)"),
     ("--max-hypotheses", "N", "mht-hypothesis: most hypotheses of a cluster (default 50)"),
-    ("--max-events", "N", "joint-probabilistic: joint events listed for each cluster (default 100)"),
+    ("--max-events", "N", "joint-probabilistic: joint events kept apart at a time (default 4096)"),
     ("--rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver"),
     ("--import", "MODULE", IMPORT_HELP),
 )

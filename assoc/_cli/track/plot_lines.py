@@ -16,8 +16,11 @@ from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from assoc.scene.scene import Scene
+    from assoc.sensors import Sensor
     from assoc.tracking import Picture
 
+ADDRESSES = 2**24
+"""ICAO addresses that there are."""
 LONGEST = 10_000
 """Characters of a line at the most."""
 # lines that may wait: stdin is not read on while they do, datagrams are lost and counted
@@ -38,13 +41,16 @@ class Plot(NamedTuple):
     sensor: str
     time: float
     values: list[float]
+    identity: tuple[int, int] = (0, 0)
+    """Mode 3/A code and ICAO address, 0 where there is none."""
 
 
 def parse_line(line: str, scene: Scene) -> Plot | None:
     """Read a line of CSV or JSON; None for an empty line, a comment or the header.
 
-    CSV: sensor, time, then the components of the measurement. JSON: an object with sensor, time, and either values (an
-    array) or the components by their names. Metres, seconds, radians.
+    CSV: sensor, time, the components of the measurement, then mode3 and address if it has them. JSON: an object with
+    sensor, time, and either values (an array) or the components by their names; mode3 and address if it has them.
+    Metres, seconds, radians; a code is a whole number, an address has hexadecimal digits (in JSON it may be a number).
 
     Raises
     ------
@@ -61,11 +67,48 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
     parts = [one.strip() for one in text.split(",")]
     if parts[0].lower() == "sensor":
         return None
+    sensor = _sensor(parts[0], scene)
+    # how many values an unknown one sends is not known: the tracker says that it does not know it
+    dim = len(parts) if sensor is None else sensor.dim
+    identity, more = parts[2 + dim : 4 + dim], parts[4 + dim :]
     try:
-        time, *values = [float(one) for one in parts[1:]]
-    except ValueError:
-        raise InvalidInputError(f"expected sensor,time,values or a JSON object, got {text[:60]!r}") from None
-    return Plot(parts[0], time, values)
+        time, *values = [float(one) for one in parts[1 : 2 + dim]]
+        if more:
+            raise ValueError(f"{len(parts) - 2} values, at most {dim}, mode3 and address")
+        return Plot(parts[0], time, values, _identity(*identity))
+    except ValueError as error:
+        expected = "expected sensor,time,values[,mode3,address] or a JSON object"
+        raise InvalidInputError(f"{expected}, got {text[:60]!r} ({str(error)[:80]})") from None
+
+
+def _sensor(name: str, scene: Scene) -> Sensor | None:
+    """The sensor of this name or number; None if there is none."""
+    return next((one for k, one in enumerate(scene.sensors, 1) if name in (one.name, str(k))), None)
+
+
+def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
+    """Mode 3/A code and address, as text or numbers; nothing is 0.
+
+    Raises
+    ------
+    ValueError
+        They are neither.
+    """
+    found = []
+    for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, ADDRESSES - 1)):
+        number = 0
+        if isinstance(given, str) and given.strip():
+            digits = given.strip()
+            number = int(digits, base) if digits.isascii() and digits.isalnum() else -1
+        elif isinstance(given, int) and not isinstance(given, bool):
+            number = given
+        elif given is not None and given != "":
+            number = -1
+        if not 0 <= number <= most:
+            kind = "a whole number up to 7777" if base == 10 else "six hexadecimal digits"
+            raise ValueError(f"{what}: expected {kind}")
+        found.append(number)
+    return found[0], found[1]
 
 
 def _from_json(text: str, scene: Scene) -> Plot:
@@ -74,11 +117,12 @@ def _from_json(text: str, scene: Scene) -> Plot:
         sensor, time = str(found["sensor"]), float(found["time"])
         values = found.get("values")
         if values is None:
-            matching = [one for k, one in enumerate(scene.sensors, 1) if sensor in (one.name, str(k))]
+            known = _sensor(sensor, scene)
             # of an unknown sensor nothing is read: the tracker says that it does not know it
-            names = matching[0].components[: matching[0].dim] if matching else ()
+            names = known.components[: known.dim] if known is not None else ()
             values = [found[name] for name in names]
-        return Plot(sensor, time, [float(one) for one in values])
+        identity = _identity(found.get("mode3"), found.get("address"))
+        return Plot(sensor, time, [float(one) for one in values], identity)
     except (ValueError, TypeError, KeyError, RecursionError, AttributeError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None

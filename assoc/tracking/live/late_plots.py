@@ -20,6 +20,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Memory
+from assoc.tracking.identity_evidence import checked_identities, no_identities
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.tracker import Tracker
 
@@ -39,6 +40,7 @@ class _Kept:
     measurements: list[Array]
     times: list[Array] | None
     sectors: Array | None
+    identities: list[Array] | None = None
     assigned: tuple[Array, ...] = ()
 
 
@@ -117,12 +119,13 @@ class LatePlots:
         measurements: Sequence[Array],
         times: Sequence[Array] | None = None,
         sectors: Array | None = None,
+        identities: Sequence[Array] | None = None,
     ) -> Step:
         """Take one scan in, as `Tracker.step` does; times may lie before the last scan's.
 
         Parameters
         ----------
-        time, measurements, sectors
+        time, measurements, sectors, identities
             See `Tracker.step`. The sectors are those of the time since the last scan, whatever arrives.
         times : sequence over sensors of arrays (n_s,), optional
             Each measurement's own time, not after `time`.
@@ -142,21 +145,25 @@ class LatePlots:
         tracker = self.tracker
         checked = checked_measurements(measurements, tracker.sensors)
         now = tracker.time
+        codes = None
+        if identities is not None and tracker.identities is not None:
+            codes = checked_identities(identities, [len(z) for z in checked])
         if times is None or now is None:
-            return self._finish(self._advance(time, checked, times, sectors), [], 0)
+            return self._finish(self._advance(time, checked, times, sectors, codes), [], 0)
         stamps = checked_times(times, checked, float(time), "times")
         on_time = [one >= now for one in stamps]
         if all(one.all() for one in on_time):
-            return self._finish(self._advance(time, checked, list(stamps), sectors), [], 0)
+            return self._finish(self._advance(time, checked, list(stamps), sectors, codes), [], 0)
         start = tracker.remember(), list(self._kept), dict(self._names), dict(self._decided), self.next_id
         confirmed = {track.track_id for track in self.tracks if track.confirmed}
         try:
-            moves, refused = self._insert(checked, stamps, on_time)
+            moves, refused = self._insert(checked, stamps, codes, on_time)
             if moves:
                 self._again(min(k for k, *_ in moves))
             fresh = [z[one] for z, one in zip(checked, on_time, strict=True)]
             own = [t[one] for t, one in zip(stamps, on_time, strict=True)]
-            step = self._advance(time, fresh, own, sectors)
+            told = None if codes is None else [i[one] for i, one in zip(codes, on_time, strict=True)]
+            step = self._advance(time, fresh, own, sectors, told)
         except BaseException:
             tracker.go_back(start[0])
             self._kept, self._names, self._decided, self.next_id = deque(start[1]), *start[2:]
@@ -173,7 +180,7 @@ class LatePlots:
         return self._finish(done, [rows for _, _, rows, _ in moves], refused)
 
     def _insert(
-        self, measurements: list[Array], stamps: Sequence[Array], on_time: list[Array]
+        self, measurements: list[Array], stamps: Sequence[Array], codes: list[Array] | None, on_time: list[Array]
     ) -> tuple[list[tuple[int, int, Array, int]], int]:
         """Put late measurements into their scans: scan, sensor, rows and place there; and how many are too old."""
         assert self.tracker.time is not None
@@ -195,6 +202,11 @@ class LatePlots:
                 if old.times is None:
                     old.times = [np.full(len(one), old.time) for one in old.measurements]
                 old.measurements, old.times = list(old.measurements), list(old.times)
+                if codes is not None or old.identities is not None:
+                    known = no_identities(old.measurements) if old.identities is None else list(old.identities)
+                    told = no_identities(measurements) if codes is None else codes
+                    known[s] = np.concatenate([known[s], told[s][mine]])
+                    old.identities = known
                 moves.append((k, s, mine, len(old.measurements[s])))
                 old.measurements[s] = np.concatenate([old.measurements[s], z[mine]])
                 old.times[s] = np.concatenate([old.times[s], times[mine]])
@@ -213,7 +225,7 @@ class LatePlots:
         for k in range(first, len(past)):
             kept = past[k]
             self._kept[k] = kept = replace(kept, before=self.tracker.remember())
-            step = self.tracker.step(kept.time, kept.measurements, kept.times, kept.sectors)
+            step = self.tracker.step(kept.time, kept.measurements, kept.times, kept.sectors, kept.identities)
             steps.append(step)
             for new, old in zip(step.assigned, kept.assigned, strict=True):
                 votes.update(zip(new[: len(old)].tolist(), old.tolist(), strict=True))
@@ -228,12 +240,13 @@ class LatePlots:
             self._decide(step.final)
 
     def _advance(
-        self, time: float, measurements: list[Array], times: Sequence[Array] | None, sectors: Array | None
-    ) -> Step:
+        self, time: float, measurements: list[Array], times: Sequence[Array] | None, sectors: Array | None,
+        codes: list[Array] | None,
+    ) -> Step:  # fmt: skip
         """Take in a scan that is in time."""
         before = self.tracker.remember()
-        step = self.tracker.step(time, measurements, times, sectors)
-        kept = _Kept(before, step.time, measurements, None if times is None else list(times), sectors)
+        step = self.tracker.step(time, measurements, times, sectors, codes)
+        kept = _Kept(before, step.time, measurements, None if times is None else list(times), sectors, codes)
         kept.assigned = self._named(step.assigned)
         self._kept.append(kept)
         self._decide(step.final)

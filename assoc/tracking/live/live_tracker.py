@@ -7,19 +7,19 @@ import math
 import time as clock
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from assoc._parameters import positive
 from assoc._system.door import doors
-from assoc._types import Array
 from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.tracking.checking import checked
+from assoc.tracking.identity_evidence import checked_identities
+from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
-from assoc.tracking.track import Track
+from assoc.tracking.live.pictures import Picture, SoundPlot
 from assoc.tracking.tracker import Tracker
 
 FULL_TURN = 2.0 * math.pi
@@ -32,21 +32,6 @@ SILENCE = 15.0
 # the antenna's phase is a mean over about this many turns, with this weight for a plot, and known after so many
 _TURNS_KEPT, _WEIGHT, _KNOWN = 10.0, 0.05, 5
 _MOST_TIMED = 100_000
-
-
-class Picture(NamedTuple):
-    """What is known at the end of a step."""
-
-    time: float
-    """Seconds."""
-    tracks: list[Track]
-    """Confirmed ones, by their ids."""
-    ended: list[int]
-    """Confirmed tracks that are no more."""
-    plots: Array
-    """Positions of the plots that came in since the last step, (n, 3), metres."""
-    sensors: Array
-    """Sensor of each of these, (n,)."""
 
 
 @doors
@@ -101,8 +86,8 @@ class LiveTracker:
         self._tracker = LatePlots(make(), self.horizon)
         self._end = math.nan
         self._newest = -math.inf
-        self._pending: list[tuple[int, float, Array]] = []
-        self._ahead: list[tuple[int, float, Array]] = []
+        self._pending: list[SoundPlot] = []
+        self._ahead: list[SoundPlot] = []
         self._behind = 0
         self._last = [-math.inf] * count
         self._silent = [False] * count
@@ -110,6 +95,7 @@ class LiveTracker:
         self._heard = [0] * count
         self._recent: dict[tuple[int, float, bytes], None] = {}
         self._confirmed: set[int] = set()
+        self._kept = KeptIdentities()
         self.counts: Counter[str] = Counter()
         """Plots taken, late, and those that could not be used, by what was wrong."""
         self.seconds: deque[float] = deque(maxlen=_MOST_TIMED)
@@ -144,7 +130,9 @@ class LiveTracker:
             ]
             spare.step(float(k), z, [np.array([k - 0.5 / (s + 1)]) for s in range(len(z))] if k else None)
 
-    def take(self, sensor: object, time: float, values: Sequence[float]) -> list[Picture]:
+    def take(
+        self, sensor: object, time: float, values: Sequence[float], identity: tuple[int, int] = (0, 0)
+    ) -> list[Picture]:
         """Take in one plot.
 
         Parameters
@@ -155,6 +143,9 @@ class LiveTracker:
             Seconds.
         values : sequence of float
             The components of the measurement, metres and radians.
+        identity : (int, int)
+            Mode 3/A code and ICAO address, 0 where there is none. A tracker that was made with `identity` associates
+            by them, too; in any case `summary` says how many tracks kept one.
 
         Returns
         -------
@@ -168,26 +159,28 @@ class LiveTracker:
         where = self._scene.sensors[s].name or s + 1
         try:
             z = checked(np.array([values], dtype=np.float64), s, self._scene.sensors[s])[0]
+            known = checked_identities([np.array([identity])], [1])[0][0]
         except (AssocError, TypeError, ValueError) as error:
             self.leave_out("unusable", f"plot of {where} left out: {error}")
             return []
         if not math.isfinite(time):
             self.leave_out("unusable", f"plot of {where} left out: its time is {time}")
             return []
-        key = (s, time, z.tobytes())
-        if key in self._recent:
+        plot = SoundPlot(s, time, z, known)
+        if plot.key in self._recent:
             self.leave_out("repeated", f"{where} repeats a plot of {time:g} s: left out")
             return []
-        return self._timed(s, time, z, key)
+        return self._timed(plot)
 
-    def _timed(self, s: int, time: float, z: Array, key: tuple[int, float, bytes]) -> list[Picture]:
+    def _timed(self, plot: SoundPlot) -> list[Picture]:
         """Take in a plot that is sound, if its time is."""
+        time = plot.time
         if math.isnan(self._end):
             self._begin(time)
         if time > self._newest + JUMP and self._newest > -math.inf:
-            if self._ahead and abs(time - self._ahead[-1][1]) > JUMP:
+            if self._ahead and abs(time - self._ahead[-1].time) > JUMP:
                 self._drop_ahead()
-            self._ahead.append((s, time, z))
+            self._ahead.append(plot)
             if len(self._ahead) < _AGREE:
                 return []
             return self._jump()
@@ -197,16 +190,16 @@ class LiveTracker:
             if self._behind >= _AGREE:
                 self._tell(f"the clock went back from {self._newest:g} s to {time:g} s: tracks begin anew")
                 self._restart()
-                return self._timed(s, time, z, key)
+                return self._timed(plot)
             return []
         if self._ahead:
             self._drop_ahead()
         self._behind = 0
-        self._recent[key] = None
+        self._recent[plot.key] = None
         self.counts["plots"] += 1
-        self._hear(s, time, z)
+        self._hear(plot)
         pictures = self._close_before(time) if time > self._newest else []
-        self._pending.append((s, time, z))
+        self._pending.append(plot)
         return pictures
 
     def finish(self) -> list[Picture]:
@@ -219,6 +212,7 @@ class LiveTracker:
         self._end = self.interval * (math.floor(time / self.interval) + 1)
 
     def _restart(self) -> None:
+        self._kept.settle(set(), math.inf)
         first = self._tracker.next_id
         self._tracker = LatePlots(self._make(), self.horizon, first_id=first)
         self._end, self._newest, self._behind = math.nan, -math.inf, 0
@@ -227,24 +221,25 @@ class LiveTracker:
         self._heard = [0] * len(self._last)
 
     def _drop_ahead(self) -> None:
-        for s, time, _ in self._ahead:
-            where = self._scene.sensors[s].name or s + 1
-            self.leave_out("ahead", f"plot of {where} is {time - self._newest:g} s ahead of all others: left out")
+        for plot in self._ahead:
+            where = self._scene.sensors[plot.sensor].name or plot.sensor + 1
+            self.leave_out("ahead", f"plot of {where} is {plot.time - self._newest:g} s ahead of all others: left out")
         self._ahead = []
 
     def _jump(self) -> list[Picture]:
         """Believe the plots that were ahead."""
         plots, self._ahead = self._ahead, []
-        first = min(time for _, time, _ in plots)
+        first = min(plot.time for plot in plots)
         self._tell(f"the clock jumped from {self._newest:g} s to {first:g} s: tracks begin anew")
         pictures = [self._step()] if self._pending else []
         self._restart()
-        for s, time, z in sorted(plots, key=lambda one: one[1]):
-            pictures += self._timed(s, time, z, (s, time, z.tobytes()))
+        for plot in sorted(plots, key=lambda one: one.time):
+            pictures += self._timed(plot)
         return pictures
 
-    def _hear(self, s: int, time: float, z: Array) -> None:
+    def _hear(self, plot: SoundPlot) -> None:
         """Learn of a sensor that it lives, and where its antenna is."""
+        s, time, z, _ = plot
         sensor = self._scene.sensors[s]
         if self._silent[s]:
             self._silent[s] = False
@@ -271,17 +266,20 @@ class LiveTracker:
         end, count = self._end, len(self._scene.sensors)
         self._end += self.interval
         self._listen(end)
-        now = [one for one in self._pending if one[1] <= end]
-        self._pending = [one for one in self._pending if one[1] > end]
+        now = [[one for one in self._pending if one.time <= end and one.sensor == s] for s in range(count)]
+        self._pending = [one for one in self._pending if one.time > end]
         z = [
-            np.reshape(np.array([one for t, _, one in now if t == s]), (-1, self._scene.sensors[s].dim))
-            for s in range(count)
+            np.reshape(np.array([one.z for one in own]), (-1, sensor.dim))
+            for own, sensor in zip(now, self._scene.sensors, strict=True)
         ]
-        times = [np.array([when for t, when, _ in now if t == s]) for s in range(count)]
+        times = [np.array([one.time for one in own]) for own in now]
+        identities = [np.reshape(np.array([one.identity for one in own], dtype=np.int64), (-1, 2)) for own in now]
         sectors = np.array([self._sector(s, end, len(times[s]) > 0) for s in range(count)])
         begin = clock.perf_counter()
         try:
-            step = self._tracker.step(end, z, times, sectors)
+            step = self._tracker.step(end, z, times, sectors, identities)
+            for known in zip(step.assigned, step.confirmed, times, identities, strict=True):
+                self._kept.take(*known)
             self.counts["late"] += step.late
             if step.refused:
                 self.counts["too old"] += step.refused
@@ -290,7 +288,10 @@ class LiveTracker:
         self.seconds.append(clock.perf_counter() - begin)
         for key in [key for key in self._recent if key[1] < end - self.horizon - self.interval]:
             del self._recent[key]
-        tracks = [track for track in self._tracker.tracks if track.confirmed]
+        living = self._tracker.tracks
+        # what is gone may come back with late plots
+        self._kept.settle({track.track_id for track in living}, end - self.interval - self.horizon)
+        tracks = [track for track in living if track.confirmed]
         ids = {track.track_id for track in tracks}
         ended, self._confirmed = sorted(self._confirmed - ids), ids
         found = [single_positions(self._scene, s, one)[0] for s, one in enumerate(z)]
@@ -319,11 +320,17 @@ class LiveTracker:
         return low, low + min(FULL_TURN * self.interval / turn, FULL_TURN)
 
     def summary(self) -> str:
-        """One line: plots, steps and their times, and what was left out."""
+        """One line: plots, steps and their times, what was left out, and how many tracks kept an identity."""
         steps = np.array(self.seconds) if self.seconds else np.zeros(1)
         middle, high = 1e3 * np.quantile(steps, [0.5, 0.99])
         odd = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count and kind != "plots")
+        kept, known = self._kept.counts()
+        told = ""
+        if known:
+            # what was used says nothing of how good the result is
+            used = " (identities were used to make them)" if self._tracker.tracker.identities is not None else ""
+            told = f"; {kept} of {known} tracks with an identity kept one{used}"
         return (
             f"{self.counts['plots']} plots in {len(self.seconds)} steps; a step takes {middle:.3g} ms, "
-            f"p99 {high:.3g} ms{'; ' if odd else ''}{odd}"
+            f"p99 {high:.3g} ms{'; ' if odd else ''}{odd}{told}"
         )

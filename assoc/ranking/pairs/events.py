@@ -1,0 +1,173 @@
+"""Probability of each pair of two lists among all joint events, as an interval that holds.
+
+Clusters of pairs are summed exactly (`assoc.ranking.pairs.sweep`) as long as few of their vertices are open at a time.
+A cluster that is too wide for that is made narrower: its least likely pairs are left out, until what remains can be
+summed. What that changes is bounded. Let D be the pairs left out that touch a cluster of those that remain: in events
+without them the cluster is by itself, therefore
+
+    | P(pair) - P(pair among the pairs that remain) |  <=  P(any of D)  <=  sum over D of bounds on their probabilities,
+
+with the bounds of `assoc.ranking.pairs.messages`. The probability between the bounds is better than that of the pairs
+that remain alone: at each vertex stands for each pair left out one that ends there, weighed by belief propagation. It
+moves probabilities by as much as such pairs have probability, at most, which is added to the width of the interval.
+
+References
+----------
+T. Fortmann, Y. Bar-Shalom, M. Scheffe, Sonar tracking of multiple targets using joint probabilistic data association,
+IEEE J. Oceanic Engineering 8, 1983.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc._types import Array, Floats
+from assoc.packing.kernels.matching import match
+from assoc.ranking.pairs.graph import PairGraph, pair_graph
+from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
+from assoc.ranking.pairs.sweep import new_work, planned, swept
+
+_NARROWEST = 2
+"""Open vertices that any tree of one vertex and its neighbours needs."""
+_LEAST, _STEP = math.log(1e-12), math.log(4.0)
+"""Pairs left out of a cluster that is too wide: first those below this probability, then up to so many times more."""
+_ROUNDING = 1e-12
+
+
+class PairIntervals(NamedTuple):
+    """Of K pairs: the probability, and the interval in which it lies for certain."""
+
+    probability: Floats
+    lower: Floats
+    upper: Floats
+
+
+def pair_probabilities(
+    first: Array, second: Array, log_weight: Floats, sizes: tuple[int, int], states: int
+) -> PairIntervals:
+    """Sum all joint events: sets of pairs in which no member of either list is twice.
+
+    Parameters
+    ----------
+    first, second : int arrays (K,)
+        Members of the two lists, from 0, of each pair; no pair is given twice.
+    log_weight : array (K,)
+        ln of what a pair multiplies an event's weight with; finite.
+    sizes : (int, int)
+        Lengths of the lists.
+    states : int
+        Partial events that are kept apart at a time, in a table; where a cluster would need more, pairs are left out.
+    """
+    if not len(first):
+        return PairIntervals(*np.zeros((3, 0)))
+    graph = pair_graph(first, second, sizes)
+    weight = np.ascontiguousarray(log_weight, dtype=np.float64)
+    plan = _plan(graph, weight, max(_NARROWEST, int(states).bit_length() - 1))
+    probability = np.zeros(len(first))
+    rounding = _ROUNDING + 8.0 * np.finfo(float).eps * sum(sizes) * float(np.abs(weight).max())
+    if plan.kept.all():
+        swept(plan.steps, *_reduced(graph, weight, plan.kept, np.zeros(sum(sizes)), sizes[0]), probability)
+        low, high = probability - rounding, probability + rounding
+        return PairIntervals(probability, np.maximum(low, 0.0), np.minimum(high, 1.0))
+    log_free, log_part = log_dropped(graph, weight, plan.kept, log_beliefs(graph, weight))
+    swept(plan.steps, *_reduced(graph, weight, plan.kept, log_free, sizes[0]), probability)
+    free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
+    free = np.clip(free, 0.0, 1.0)
+    # pairs left out, by what stands for them at the first list's end
+    out = np.flatnonzero(~plan.kept)
+    place = np.empty(len(first), dtype=np.int64)
+    count = graph.ptr[sizes[0]]
+    place[graph.edge[:count]] = np.arange(count)
+    least, most = np.exp(plan.log_lower), np.exp(plan.log_upper)
+    ends = graph.ends[out]
+    probability[out] = (free[graph.ends[:, 0]] * np.exp(log_part[place] - log_free[graph.ends[:, 0]]))[out]
+    width = np.bincount(plan.label, -free * np.expm1(-log_free))
+    first_label, second_label = plan.label[ends].T
+    apart = first_label != second_label
+    np.add.at(width, first_label, most[out])
+    np.add.at(width, second_label[apart], most[out][apart])
+    around = np.where(plan.kept, width[plan.label[graph.ends[:, 0]]], np.inf)
+    lower = np.maximum(probability - around, least) - rounding
+    upper = np.minimum(probability + around, most) + rounding
+    return PairIntervals(np.clip(probability, lower, upper), np.maximum(lower, 0.0), np.minimum(upper, 1.0))
+
+
+class _Plan(NamedTuple):
+    kept: Any
+    """Edges that are summed, bool (K,)."""
+    steps: Any
+    """Of the sweep over all clusters."""
+    label: Any
+    """Cluster of each vertex, (V,)."""
+    log_lower: Any
+    log_upper: Any
+    """Bounds on each edge's probability, (K,); -inf and 0 if none is left out."""
+
+
+@njit
+def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
+    """Leave pairs out until every cluster can be summed with at most so many open vertices."""
+    vertices, edges = graph.ptr.size - 1, log_weight.size
+    kept, label = np.ones(edges, np.bool_), np.full(vertices, -1, np.int64)
+    steps = np.empty((2 * vertices + edges, 4), np.int64)
+    limit = np.full(vertices, _LEAST)
+    members, work = np.empty(vertices, np.int64), new_work(vertices)
+    lower, upper, known = np.full(edges, -np.inf), np.zeros(edges), False
+    count = clusters = 0
+    for v in range(vertices):
+        while label[v] < 0:
+            size = _cluster(graph, kept, v, clusters, label, members)
+            own = members[:size]
+            added = planned(graph, kept, own, most, steps[count:], work)
+            if added >= 0:
+                count += added
+                clusters += 1
+                continue
+            if not known:
+                lower, upper = log_bounds(graph, log_weight)
+                known = True
+            level = limit[own].max()
+            for u in own:
+                label[u] = -1
+                limit[u] = level + _STEP
+                for x in range(graph.ptr[u], graph.ptr[u + 1]):
+                    if upper[graph.edge[x]] < level or level >= 0.0:
+                        kept[graph.edge[x]] = False
+    return _Plan(kept, steps[:count], label, lower, upper)
+
+
+@njit
+def _cluster(graph: PairGraph, kept: Any, start: int, number: int, label: Any, members: Any) -> int:
+    """Label the cluster of a vertex and list its members; return how many."""
+    members[0], label[start] = start, number
+    size = 1
+    at = 0
+    while at < size:
+        v = members[at]
+        at += 1
+        for x in range(graph.ptr[v], graph.ptr[v + 1]):
+            e = graph.edge[x]
+            u = graph.ends[e, 0] + graph.ends[e, 1] - v
+            if kept[e] and label[u] < 0:
+                label[u] = number
+                members[size] = u
+                size += 1
+    return size
+
+
+def _reduced(
+    graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int
+) -> tuple[Floats, Floats]:
+    """Weights of edges and of leaving vertices alone, relative to the best event's by its multipliers.
+
+    The first list are the graph's first so many `rows`.
+    """
+    edge = graph.edge[: graph.ptr[rows]]
+    costs = np.where(kept, -log_weight, np.inf)
+    best = match(graph.ptr[: rows + 1], graph.ends[edge, 1] - rows, costs[edge], -log_free[:rows], -log_free[rows:])
+    dual = np.concatenate([best.row_duals, best.column_duals])
+    return np.exp(dual[graph.ends].sum(axis=1) - costs), np.exp(dual + log_free)

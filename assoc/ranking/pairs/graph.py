@@ -1,0 +1,43 @@
+"""Pairs of two lists as a graph: members of both lists are vertices, pairs are edges, joint events are matchings."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+
+
+class PairGraph(NamedTuple):
+    """V vertices, first those of the first list, and K edges; each edge stands at two places, one for either end.
+
+    Attributes
+    ----------
+    ends : int64 array (K, 2)
+        Vertices of each edge.
+    ptr : int64 array (V + 1,)
+        Vertex v has the places ``ptr[v]:ptr[v + 1]``.
+    edge : int64 array (2 K,)
+        Edge of each place.
+    mate : int64 array (2 K,)
+        The edge's place at its other end.
+    """
+
+    ends: Any
+    ptr: Any
+    edge: Any
+    mate: Any
+
+
+def pair_graph(first: Array, second: Array, sizes: tuple[int, int]) -> PairGraph:
+    """Graph of the pairs of members (from 0) of two lists of these sizes."""
+    count = len(first)
+    ends = np.stack([first, sizes[0] + second], axis=1).astype(np.int64)
+    vertex = ends.T.reshape(-1)
+    order = np.argsort(vertex, kind="stable")
+    ptr = np.zeros(sum(sizes) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(vertex, minlength=sum(sizes)), out=ptr[1:])
+    place = np.empty(2 * count, dtype=np.int64)
+    place[order] = np.arange(2 * count)
+    return PairGraph(ends, ptr, order % max(count, 1), place[(order + count) % max(2 * count, 1)])

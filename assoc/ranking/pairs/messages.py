@@ -1,0 +1,112 @@
+"""What a vertex says to its neighbours of how free it is: bounds on the probability of each pair, and an approximation.
+
+With P(v; G) the probability that vertex v is in no pair of a joint event of the graph G,
+
+    P(v; G) = 1 / ( 1 + sum over neighbours u of w_uv P(u; G - v) ),
+
+and a pair is in the event with probability w_uv P(u; G) P(v; G - u). A message of v to u is a value for P(v; G - u).
+From a bound on one side of all messages the equation makes one on the other side: 1 is at least any probability, so
+that the first round gives lower bounds, the second upper, the third lower. (The fourth would walk back to vertices that
+are not there any more.) Rounds without end, messages that are no bounds, are belief propagation: exact on trees.
+
+All are logarithms.
+
+References
+----------
+M. Bayati, D. Gamarnik, D. Katz, C. Nair, P. Tetali, Simple deterministic approximation algorithms for counting
+matchings, STOC 2007, section 2.
+J. Williams, R. Lau, Approximate evaluation of marginal association probabilities with belief propagation, IEEE Trans.
+Aerospace and Electronic Systems 50, 2014.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from assoc._system.compiled import njit
+from assoc._types import Array, Floats
+from assoc.ranking.pairs.graph import PairGraph
+
+_ROUNDS, _SETTLED = 200, 1e-10
+"""Of belief propagation: the most rounds, and the change of messages at which it ends."""
+
+
+@njit
+def next_round(graph: PairGraph, log_weight: Floats, heard: Floats, said: Floats) -> None:
+    """Fill in what each vertex says at each of its places, from what all have said before."""
+    ptr, edge, mate = graph.ptr, graph.edge, graph.mate
+    for v in range(ptr.size - 1):
+        for x in range(ptr[v], ptr[v + 1]):
+            said[x] = -_log_one_and(ptr[v], ptr[v + 1], x, edge, mate, log_weight, heard)
+
+
+@njit
+def _log_one_and(first: int, last: int, but: int, edge: Any, mate: Any, log_weight: Floats, heard: Floats) -> float:
+    """ln(1 + sum over a vertex' places, one left out, of weight times what is heard there)."""
+    top = 0.0
+    for y in range(first, last):
+        if y != but:
+            top = max(top, log_weight[edge[y]] + heard[mate[y]])
+    total = math.exp(-top)
+    for y in range(first, last):
+        if y != but:
+            total += math.exp(log_weight[edge[y]] + heard[mate[y]] - top)
+    return top + math.log(total)
+
+
+@njit
+def log_bounds(graph: PairGraph, log_weight: Floats) -> tuple[Floats, Floats]:
+    """Lower and upper bounds on the logarithm of each pair's probability."""
+    heard = np.zeros(graph.edge.size)
+    low, high = np.empty(heard.size), np.empty(heard.size)
+    next_round(graph, log_weight, heard, low)
+    next_round(graph, log_weight, low, high)
+    next_round(graph, log_weight, high, low)
+    lower, upper = np.full(log_weight.size, -np.inf), np.zeros(log_weight.size)
+    for v in range(graph.ptr.size - 1):
+        for x in range(graph.ptr[v], graph.ptr[v + 1]):
+            e, y = graph.edge[x], graph.mate[x]
+            lower[e] = max(lower[e], _log_share(graph, v, x, log_weight, low[y], high))
+            upper[e] = min(upper[e], _log_share(graph, v, x, log_weight, high[y], low))
+    return lower, upper
+
+
+@njit
+def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, heard_there: float, heard: Floats) -> float:
+    """Logarithm of the probability of the pair at place x of vertex v, given what is heard there and at the others."""
+    others = _log_one_and(graph.ptr[v], graph.ptr[v + 1], x, graph.edge, graph.mate, log_weight, heard)
+    own = log_weight[graph.edge[x]] + heard_there
+    top = max(own, others)
+    return own - top - math.log(math.exp(own - top) + math.exp(others - top))
+
+
+@njit
+def log_beliefs(graph: PairGraph, log_weight: Floats) -> Floats:
+    """Messages of belief propagation, one for each place."""
+    heard, said = np.zeros(graph.edge.size), np.zeros(graph.edge.size)
+    for _ in range(_ROUNDS):
+        next_round(graph, log_weight, heard, said)
+        next_round(graph, log_weight, said, heard)
+        if np.abs(heard - said).max() < _SETTLED:
+            break
+    return heard
+
+
+def log_dropped(graph: PairGraph, log_weight: Floats, kept: Array, beliefs: Floats) -> tuple[Floats, Floats]:
+    """What stands for the edges that are not kept, at either end.
+
+    Returns
+    -------
+    log_free : array (V,)
+        ln(1 + sum of weight times belief), of each vertex over its edges that are not kept.
+    log_part : array (2 K,)
+        The terms of these sums, -inf at places of edges that are kept.
+    """
+    part = np.where(kept[graph.edge], -np.inf, log_weight[graph.edge] + beliefs[graph.mate])
+    free = np.zeros(graph.ptr.size - 1)
+    vertex = np.repeat(np.arange(free.size), np.diff(graph.ptr))
+    np.logaddexp.at(free, vertex, part)
+    return free, part

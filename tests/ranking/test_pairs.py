@@ -1,0 +1,150 @@
+"""Probabilities of pairs against the enumeration of all joint events, closed forms, and the ranking of solutions."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from assoc import AssignmentProblem, marginals
+from assoc.ranking.pairs.events import pair_probabilities
+from assoc.ranking.pairs.graph import pair_graph
+from assoc.ranking.pairs.messages import log_beliefs, log_bounds
+from tests.sizes import few_or_all
+
+WIDE = 2**14
+"""States with which every problem here is summed exactly."""
+
+
+def drawn(rng, spread=3.0, largest=5):
+    """Pairs of two short lists, not all of them, and their log weights."""
+    n, m = rng.integers(1, largest + 1, 2)
+    first, second = np.nonzero(rng.random((n, m)) < rng.uniform(0.3, 1.0))
+    return first, second, rng.normal(rng.uniform(-2.0, 4.0), spread, len(first)), (int(n), int(m))
+
+
+def enumerated(first, second, log_weight):
+    """Probability of each pair by all joint events, in logarithms."""
+    choices = [[-1, *np.flatnonzero(first == one).tolist()] for one in np.unique(first)]
+    events = []
+    for way in itertools.product(*choices):
+        chosen = [pair for pair in way if pair >= 0]
+        if len(set(second[chosen].tolist())) == len(chosen):
+            events.append((chosen, float(log_weight[chosen].sum())))
+    top = max(log for _, log in events)
+    total, pair = 0.0, np.zeros(len(first))
+    for chosen, log in events:
+        total += math.exp(log - top)
+        pair[chosen] += math.exp(log - top)
+    return pair / total
+
+
+@few_or_all("count", 40, 400)
+def test_small_problems_are_those_of_all_joint_events(count):
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        # the last are weights that no floating point number holds
+        first, second, log_weight, sizes = drawn(rng, [0.5, 3.0, 30.0, 700.0][seed % 4], 4)
+        expected = enumerated(first, second, log_weight)
+        exact = pair_probabilities(first, second, log_weight, sizes, WIDE)
+        digits = 1e-11 * max(1.0, np.abs(log_weight).max(initial=0.0))
+        np.testing.assert_allclose(exact.probability, expected, atol=digits)
+        for states in (1, 8, WIDE):
+            found = pair_probabilities(first, second, log_weight, sizes, states)
+            assert (found.lower <= expected).all() and (expected <= found.upper).all()
+            assert (found.lower <= found.probability).all() and (found.probability <= found.upper).all()
+            assert (np.bincount(first, found.probability, sizes[0]) <= 1.0 + 1e-9).all()
+        if len(first):
+            low, high = np.exp(log_bounds(pair_graph(first, second, sizes), log_weight))
+            assert (low <= expected + 1e-12).all() and (expected <= high + 1e-12).all()
+
+
+def test_pairs_left_out_are_missed_by_little():
+    """With four states hardly anything is summed exactly: belief propagation has to stand for the rest."""
+    wrong, alone, widest = [], [], 0.0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        first, second, log_weight, sizes = drawn(rng, 1.0, 4)
+        expected = enumerated(first, second, log_weight - 3.0)
+        found = pair_probabilities(first, second, log_weight - 3.0, sizes, 4)
+        wrong.append(np.abs(found.probability - expected).max(initial=0.0))
+        weight = np.exp(log_weight - 3.0)
+        alone.append(np.abs(weight / (1.0 + weight) - expected).max(initial=0.0))
+        widest = max(widest, (found.upper - found.lower).max(initial=0.0))
+    assert widest > 0.1
+    assert np.mean(wrong) < 0.005 and np.mean(wrong) < 0.1 * np.mean(alone)
+
+
+@pytest.mark.parametrize("size", [6, 9])
+def test_every_pair_of_two_lists_alike(size):
+    """All pairs weigh the same: events of k pairs are counted by the rook polynomial."""
+    first, second = (one.reshape(-1) for one in np.indices((size, size)))
+    weight = 0.7
+    counts = np.array([math.comb(size, k) ** 2 * math.factorial(k) * weight**k for k in range(size + 1)])
+    expected = float(counts @ np.arange(size + 1) / counts.sum()) / size**2
+    found = pair_probabilities(first, second, np.full(size**2, math.log(weight)), (size, size), WIDE)
+    np.testing.assert_allclose(found.probability, expected, rtol=1e-12)
+    narrow = pair_probabilities(first, second, np.full(size**2, math.log(weight)), (size, size), 16)
+    assert (narrow.lower <= expected).all() and (expected <= narrow.upper).all()
+
+
+def test_belief_propagation_is_exact_where_the_graph_is_a_tree():
+    rng = np.random.default_rng(3)
+    # 0 - 0 - 1 - 1 - 2 ..., a path, with a leaf at each member of the first list
+    first = np.array([0, 1, 1, 2, 2, 3, 0, 1, 2])
+    second = np.array([0, 0, 1, 1, 2, 2, 3, 4, 5])
+    log_weight = rng.normal(1.0, 2.0, len(first))
+    graph = pair_graph(first, second, (4, 6))
+    heard = np.exp(log_beliefs(graph, log_weight))[graph.mate]
+    weight = np.exp(log_weight)[graph.edge] * heard
+    vertex = np.repeat(np.arange(10), np.diff(graph.ptr))
+    share = weight / (1.0 + np.bincount(vertex, weight))[vertex]
+    expected = enumerated(first, second, log_weight)
+    np.testing.assert_allclose(share, expected[graph.edge], rtol=1e-8)
+
+
+def test_order_and_sides_do_not_matter():
+    rng = np.random.default_rng(5)
+    first, second, log_weight, sizes = drawn(rng, largest=12)
+    found = pair_probabilities(first, second, log_weight, sizes, WIDE)
+    turned = pair_probabilities(second, first, log_weight, sizes[::-1], WIDE)
+    np.testing.assert_allclose(turned.probability, found.probability, atol=1e-12)
+    order = rng.permutation(len(first))
+    mixed = pair_probabilities(first[order], second[order], log_weight[order], sizes, WIDE)
+    np.testing.assert_allclose(mixed.probability, found.probability[order], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_ranking_of_solutions_says_the_same(seed):
+    rng = np.random.default_rng(seed)
+    first, second = np.nonzero(rng.random((9, 9)) < 0.3)
+    log_weight = rng.normal(0.0, 2.0, len(first))
+    rows = np.stack([first, second], axis=1) + 1
+    known = marginals(AssignmentProblem(rows, -log_weight, [9, 9]), 20_000)
+    intervals = zip(known.tuples.tolist(), known.lower, known.upper, strict=True)
+    of_pair = {tuple(row): (low, high) for row, low, high in intervals}
+    found = pair_probabilities(first, second, log_weight, (9, 9), WIDE)
+    for row, low, high in zip(rows.tolist(), found.lower, found.upper, strict=True):
+        below, above = of_pair[tuple(row)]
+        assert low <= above + 1e-9 and below <= high + 1e-9
+    assert known.unseen < 0.01 and (found.upper - found.lower).max() < 1e-9
+
+
+def test_more_states_make_narrower_intervals_that_agree():
+    """A cluster too large to enumerate, and wide for a sweep."""
+    rng = np.random.default_rng(8)
+    first, second = np.nonzero(rng.random((20, 20)) < 0.15)
+    log_weight = rng.normal(3.0, 2.0, len(first))
+    narrow, exact = (pair_probabilities(first, second, log_weight, (20, 20), states) for states in (4, WIDE))
+    assert (narrow.lower <= exact.upper).all() and (exact.lower <= narrow.upper).all()
+    assert (exact.upper - exact.lower).max() < 1e-9
+    assert 0.1 < (narrow.upper - narrow.lower).mean() < 0.2
+    assert np.abs(narrow.probability - exact.probability).mean() < 0.03
+
+
+def test_no_pairs():
+    nothing = np.zeros(0, dtype=np.int64)
+    found = pair_probabilities(nothing, nothing, np.zeros(0), (3, 0), 16)
+    assert [len(one) for one in found] == [0, 0, 0]
