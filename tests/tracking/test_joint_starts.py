@@ -37,7 +37,7 @@ def scene(seed, scans=25):
     return observe(sensors, times, ids, list(paths), rng, region=REGION, velocities=[velocity] * scans)
 
 
-@sample("name", ["mht", "mht-hypothesis", "joint-probabilistic", "multi-sensor"], every=2)
+@sample("name", ["mht", "mht-hypothesis", "joint-probabilistic", "multi-sensor"], every=4)
 def test_three_bearings_start_all_tracks_and_ghosts_die(name):
     one = scene(7)
     tracker = TRACKERS[name].for_scene(one)
