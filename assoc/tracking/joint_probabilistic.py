@@ -37,9 +37,9 @@ from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.scene.scan import Scan
 from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
+from assoc.tracking.nursing import NursingTracker
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import TrackBatch
-from assoc.tracking.tracker import Tracker
 
 _SURE = 30.0
 """Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
@@ -66,7 +66,7 @@ class PairProbabilities:
 
 
 @doors
-class JointProbabilisticTracker(Tracker):
+class JointProbabilisticTracker(NursingTracker):
     """Joint integrated probabilistic data association, with certified probabilities.
 
     Parameters
@@ -96,7 +96,7 @@ class JointProbabilisticTracker(Tracker):
         # refuse a filter that cannot merge now, not in the first scan
         merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
 
-    def _step(self, scan: Scan) -> Step:
+    def _decide(self, scan: Scan) -> Step:
         time, times, batch = scan.time, scan.times, self._batch
         if scan.sectors is not None or (times is not None and len(self.sensors) > 1):
             raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
@@ -121,9 +121,6 @@ class JointProbabilisticTracker(Tracker):
             batch = TrackBatch.concatenate([batch, new])
             seen = np.concatenate([seen | hit, np.ones(len(new), dtype=np.bool_)])
             assigned.append(ids)
-        crossed = self._crossed(scan, assigned) if times is None else batch[:0]
-        batch = TrackBatch.concatenate([batch, crossed])
-        seen = np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])
         batch = batch.counted(seen).confirm(self.life_cycle)
         now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
         gone = self._to_delete(batch, time)
