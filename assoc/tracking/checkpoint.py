@@ -193,8 +193,9 @@ class Memory(NamedTuple):
 
     @property
     def track_ids(self) -> set[int]:
-        """Ids of the tracks that lived."""
-        return set(self.values["_batch"].track_id.tolist())
+        """Ids of the tracks that lived, also of those in the making elsewhere."""
+        young = self.values.get("_young_memory")
+        return set(self.values["_batch"].track_id.tolist()) | (set() if young is None else young.track_ids)
 
 
 def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:

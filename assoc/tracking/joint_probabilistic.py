@@ -37,10 +37,10 @@ from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.scene.scan import Scan
+from assoc.tracking.nursing import NursingTracker
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import STARTED, TrackBatch
 from assoc.tracking.track_parts import ScoredPairs, TrackParts
-from assoc.tracking.tracker import Tracker
 
 _SURE = 30.0
 """Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
@@ -83,7 +83,7 @@ class _Update(NamedTuple):
 
 
 @doors
-class JointProbabilisticTracker(Tracker):
+class JointProbabilisticTracker(NursingTracker):
     """Joint integrated probabilistic data association, with certified probabilities.
 
     Parameters
@@ -113,7 +113,7 @@ class JointProbabilisticTracker(Tracker):
         # refuse a filter that cannot merge now, not in the first scan
         merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
 
-    def _step(self, scan: Scan) -> Step:
+    def _decide(self, scan: Scan) -> Step:
         batch, assigned, found = self._at_once(scan) if scan.at_once else self._in_order(scan)
         batch = batch.confirm(self.life_cycle)
         now = decision(self._scan, scan.time, assigned, batch.track_id[batch.confirmed])
@@ -144,9 +144,7 @@ class JointProbabilisticTracker(Tracker):
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             found.append(known)
             assigned.append(ids)
-        crossed = self._crossed(scan, assigned)
-        batch = TrackBatch.concatenate([batch, crossed])
-        return batch.counted(np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)])), assigned, found
+        return batch.counted(seen), assigned, found
 
     def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
         """Take in a scan whose measurements have times of their own; as `_at_once`."""

@@ -15,15 +15,15 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
+from assoc.tracking.nursing import NursingTracker
 from assoc.tracking.track import Step, decision
 from assoc.tracking.track_batch import STARTED, TrackBatch
-from assoc.tracking.tracker import Tracker
 
 Rule = Literal["greedy", "assignment"]
 
 
 @doors
-class NearestNeighbourTracker(Tracker):
+class NearestNeighbourTracker(NursingTracker):
     """The plain tracker that others are measured against.
 
     The sensors of a scan are taken in one after the other, whatever the measurements' times. Pairs of tracks and
@@ -48,7 +48,7 @@ class NearestNeighbourTracker(Tracker):
             raise InvalidInputError(f"rule must be 'greedy' or 'assignment', got {rule!r}")
         self.rule = rule
 
-    def _step(self, scan: Scan) -> Step:
+    def _decide(self, scan: Scan) -> Step:
         batch, assigned, seen, looked = self._at_once(scan) if scan.at_once else self._in_order(scan)
         batch = batch.counted(seen, looked).confirm(self.life_cycle)
         now = decision(scan.index, scan.time, assigned, batch.track_id[batch.confirmed])
@@ -77,9 +77,7 @@ class NearestNeighbourTracker(Tracker):
             batch = TrackBatch.concatenate([batch, TrackBatch.new(states[order], new, score[order], time)])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             assigned.append(ids)
-        crossed = self._crossed(scan, assigned)
-        batch = TrackBatch.concatenate([batch, crossed])
-        return batch, assigned, np.concatenate([seen, np.ones(len(crossed), dtype=np.bool_)]), None
+        return batch, assigned, seen, None
 
     def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], Array, Array]:
         """Take in a scan whose measurements have times of their own; as `_at_once`, and which were looked at."""

@@ -396,18 +396,3 @@ class Tracker(Checkpoint):
     def _crossings(self, scan: Scan, free: Sequence[Array]) -> tuple[Crossings, Array] | None:
         options = {"gate_probability": self.gate_probability, "max_tuples": self.max_tuples}
         return self._new_tracks.crossings(scan, free, **options)
-
-    def _crossed(self, scan: Scan, assigned: list[Array]) -> TrackBatch:
-        """New tracks of what is left over of sensors that start none alone; their ids are put into `assigned`."""
-        found = self._crossings(scan, [ids == 0 for ids in assigned])
-        if found is None or not len(found[1]):
-            return self._batch[:0]
-        several, scores = found
-        solution = self._assign(AssignmentProblem(several.rows, several.costs, scan.sizes))
-        chosen = solution.indices[solution.indices < len(scores)]
-        chosen = chosen[np.lexsort(several.positions[chosen].T)]
-        ids = self._new_ids(len(chosen))
-        for s, numbers in enumerate(several.rows[chosen].T):
-            assigned[s][numbers[numbers > 0] - 1] = ids[numbers > 0]
-        states = self.initiation.start(self.filter, several.positions[chosen], several.covariances[chosen])
-        return TrackBatch.new(states, ids, scores[chosen], scan.time)

@@ -18,6 +18,12 @@ from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
+
+
+def angles_alone(sensors: Sequence[Sensor]) -> bool:
+    """Whether no sensor tells a distance, so that none starts a track alone."""
+    return all(all(sensor.angular[: sensor.dim]) for sensor in sensors)
 
 
 class Crossings(NamedTuple):

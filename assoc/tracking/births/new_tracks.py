@@ -15,7 +15,7 @@ from assoc.filters.base import Filter
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.joint_starts import Crossings, crossings
+from assoc.tracking.births.joint_starts import Crossings, angles_alone, crossings
 
 
 class NewTracks:
@@ -89,8 +89,7 @@ class NewTracks:
         `free` are masks over the measurements of each sensor, `options` those of `assoc.build_problem`; see
         `assoc.tracking.births.joint_starts`.
         """
-        # angles alone tell no distance
-        if not all(all(sensor.angular[: sensor.dim]) for sensor in self._place.sensors):
+        if not angles_alone(self._place.sensors):
             return None
         found = crossings(self._place, scan, free, speed=self._initiation.speed, **options)
         if found is None:

@@ -299,6 +299,20 @@ class TrackOrientedMHT(Tracker):
         self._born, self._chosen = self._born[stay], self._chosen[stay]
         return np.unique(lost) if len(lost) else lost
 
+    def hand_over(self, age: int) -> TrackBatch:
+        """Give away the confirmed tracks that began at least so many scans ago, as the best hypothesis knows them.
+
+        Branches that contradict them go, too.
+        """
+        grown = self._chosen & self._batch.confirmed & (self._born <= self._scan - age)
+        given, taken = self._batch[grown], self._history[grown]
+        stay = ~np.isin(self._batch.track_id, given.track_id)
+        for row in taken:
+            stay &= ~((self._history == row) & (row > 0)).any(axis=1)
+        self._batch, self._history = self._batch[stay], self._history[stay]
+        self._born, self._chosen = self._born[stay], self._chosen[stay]
+        return given
+
     def flush(self) -> tuple[Decision, ...]:
         """What the best hypothesis says of the scans that are not final yet, oldest first; for the end."""
         self._scan -= 1

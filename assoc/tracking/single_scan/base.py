@@ -13,9 +13,9 @@ from assoc.costs.positions import tuple_costs
 from assoc.costs.tracks.own_times import TimedScan, score_costs
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
+from assoc.tracking.nursing import NursingTracker
 from assoc.tracking.track import Decision, Step, decision
 from assoc.tracking.track_batch import STARTED, TrackBatch
-from assoc.tracking.tracker import Tracker
 
 
 class ScanOutcome(NamedTuple):
@@ -35,10 +35,10 @@ class ScanOutcome(NamedTuple):
     """Whether any sensor looked at each track, bool (T,); None: all did."""
 
 
-class SingleScanTracker(Tracker):
+class SingleScanTracker(NursingTracker):
     """Predict, associate (which the children do), start tracks, confirm, delete."""
 
-    def _step(self, scan: Scan) -> Step:
+    def _decide(self, scan: Scan) -> Step:
         if scan.at_once:
             predicted = self._predicted(self._batch, self._elapsed(scan.time))
             outcome = self._associate(scan, predicted.states, predicted.score)
@@ -105,8 +105,8 @@ class SingleScanTracker(Tracker):
     def _begin(self, scan: Scan, tuples: Array) -> tuple[TrackBatch, Array]:
         """New tracks of tuples that tell a position, numbered by place."""
         tuples = np.asarray(tuples, dtype=np.int32).reshape(-1, len(self.sensors))
-        if not len(tuples):
-            return self._batch[:0], tuples
+        if not len(tuples) or self.has_nursery:
+            return self._batch[:0], tuples[:0]
         positions, covariances, fit = self._new_tracks.fused(scan, tuples)
         order = np.flatnonzero(fit)
         order = order[np.lexsort(positions[order].T)]
