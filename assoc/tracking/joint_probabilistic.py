@@ -10,6 +10,10 @@ holds. A track may be none: with existence probability p the pair of a track and
 and what is left of p without a measurement is p (1 - P_D) / (1 - p P_D). A track's score is the logarithm of the odds
 of its existence, which the events update as well.
 
+Where measurements have times of their own, a track is not merged after each sensor but at the end of the scan: until
+then it is several parts, each with measurements of its own, filtered in the order of their times
+(`assoc.tracking.track_parts`). The pair of a track and a measurement then weighs by the density averaged over parts.
+
 References
 ----------
 T. Fortmann, Y. Bar-Shalom, M. Scheffe, Sonar tracking of multiple targets using joint probabilistic data association,
@@ -20,26 +24,23 @@ Systems 40, 2004.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._system.door import doors
 from assoc._types import Array
-from assoc.costs.tracks.own_times import PairEvidence
-from assoc.costs.tracks.tuples import TrackPairs
+from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
-from assoc.filters.base import predict_each
 from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.scene.scan import Scan
-from assoc.tracking.gated_pairs import GatedPairs, gated_pairs
 from assoc.tracking.nursing import NursingTracker
 from assoc.tracking.track import Step, decision
-from assoc.tracking.track_batch import TrackBatch
+from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.track_parts import ScoredPairs, TrackParts
 
 _SURE = 30.0
 """Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
@@ -63,6 +64,22 @@ class PairProbabilities:
     probability: Array
     lower: Array
     upper: Array
+
+
+class _Update(NamedTuple):
+    """What one sensor's measurements say of T tracks."""
+
+    detected: Array
+    """Probability that a measurement is the track's."""
+    missed: Array
+    """Probability that the target is there and was missed."""
+    odds: Array
+    """Logarithm of the odds of existence."""
+
+    @property
+    def after(self) -> Array:
+        """Probability of existence, above 0."""
+        return np.maximum(self.detected + self.missed, 1e-300)
 
 
 @doors
@@ -97,33 +114,10 @@ class JointProbabilisticTracker(NursingTracker):
         merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
 
     def _decide(self, scan: Scan) -> Step:
-        time, times, batch = scan.time, scan.times, self._batch
-        if scan.sectors is not None or (times is not None and len(self.sensors) > 1):
-            raise InvalidInputError("times: measurements with own times need a tracker of a single sensor")
-        before = time if self._time is None else self._time
-        seen = np.zeros(len(batch), dtype=np.bool_)
-        # identities come with times, and so from a single sensor: its tracks are those of the batch
-        says = self._evidence(scan)
-        assigned, found = [], []
-        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
-            stamps = None if times is None else times[s]
-            near = gated_pairs(
-                self.filter, batch.states, before, time, z, stamps, sensor, self.gate_probability,
-                None if says is None else _of_sensor(says, s),
-            )  # fmt: skip
-            before = time
-            pairs = self._probabilities(batch, near.pairs, s, len(z))
-            found.append(pairs)
-            batch, hit = self._take_in(batch, near, pairs.probability, s)
-            ids, taken = self._owners(pairs, len(z))
-            new, numbers = self._begin(s, z, taken, time, stamps)
-            ids[numbers] = new.track_id
-            batch = TrackBatch.concatenate([batch, new])
-            seen = np.concatenate([seen | hit, np.ones(len(new), dtype=np.bool_)])
-            assigned.append(ids)
-        batch = batch.counted(seen).confirm(self.life_cycle)
-        now = decision(self._scan, time, assigned, batch.track_id[batch.confirmed])
-        gone = self._to_delete(batch, time)
+        batch, assigned, found = self._at_once(scan) if scan.at_once else self._in_order(scan)
+        batch = batch.confirm(self.life_cycle)
+        now = decision(self._scan, scan.time, assigned, batch.track_id[batch.confirmed])
+        gone = self._to_delete(batch, scan.time)
         self._batch, self.probabilities = batch[~gone], tuple(found)
         ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
@@ -133,36 +127,108 @@ class JointProbabilisticTracker(NursingTracker):
         shares = [(ids == one.track_id) @ one.probability for one in self.probabilities]
         return np.minimum(np.stack(shares, axis=1), 1.0)
 
-    def _probabilities(self, batch: TrackBatch, pairs: TrackPairs, s: int, count: int) -> PairProbabilities:
-        """Sum the joint events of one sensor's measurements and the tracks."""
-        exists = _probability(batch.existence)
-        absent = np.log1p(-exists * -np.expm1(self.terms.miss[s]))
-        weight = np.log(exists)[pairs.track] + self.terms.detection[s] + pairs.log_likelihood - absent[pairs.track]
-        known = pair_probabilities(pairs.track, pairs.measurement, weight, (len(batch), count), self.max_events)
-        return PairProbabilities(batch.track_id[pairs.track], pairs.measurement, *known)
+    def _at_once(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
+        """Take in a scan of one instant: tracks, each measurement's track, and probabilities of each sensor."""
+        time, batch = scan.time, self._predicted(self._batch, self._elapsed(scan.time))
+        seen = np.zeros(len(batch), dtype=np.bool_)
+        assigned, found = [], []
+        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
+            pairs = track_pairs(self.filter, batch.states, z, sensor, gate_of(sensor, self.gate_probability))
+            missed = np.full(len(batch), self.terms.miss[s])
+            scored = ScoredPairs(pairs.track, pairs.measurement, self.terms.detection[s] + pairs.log_likelihood)
+            known, update = self._probabilities(batch.track_id, batch.existence, missed, scored, len(z))
+            batch, hit = self._take_in(batch, pairs, known.probability, update, time)
+            ids, taken = self._owners(known, len(z))
+            free = np.flatnonzero(taken < 0.5)
+            states, fit, positions, score = self._new_tracks.singles(s, z[free])
+            free = free[fit]
+            order = np.lexsort(positions.T)
+            score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
+            ids[free[order]] = new = self._new_ids(len(free))
+            batch = TrackBatch.concatenate([batch, TrackBatch.new(states[order], new, score[order], time)])
+            seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
+            found.append(known)
+            assigned.append(ids)
+        return batch.counted(seen), assigned, found
 
-    def _take_in(self, batch: TrackBatch, gated: GatedPairs, share: Array, s: int) -> tuple[TrackBatch, Array]:
+    def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
+        """Take in a scan whose measurements have times of their own; as `_at_once`."""
+        timed, old = self._timed(scan), len(self._batch)
+        looked = timed.looked()
+        # the sensors that have been taken in: only they can have missed a track
+        past = np.zeros_like(looked)
+        parts = TrackParts.of_tracks(old, len(self.sensors))
+        track_id, odds = self._batch.track_id, self._batch.existence
+        seen, anchor = np.zeros(old, dtype=np.bool_), np.arange(old)
+        assigned, found, done = {}, {}, list[int]()
+        for s in timed.order:
+            past[:, s] = looked[:, s]
+            grown = parts.grown(timed, s, done, self.terms, past)
+            missed = looked[anchor, s] * self.terms.miss[s]
+            count = len(timed.times[s])
+            known, update = self._probabilities(track_id, odds, missed, grown.pairs, count)
+            of_pair = known.probability / update.after[grown.pairs.track]
+            parts = parts.after(grown, of_pair, update.missed / update.after, missed)
+            ids, taken = self._owners(known, count)
+            own = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
+            own = own[np.lexsort((*timed.places.positions[s][own].T, timed.times[s][own]))]
+            first = timed.offsets[s] + own
+            begun = timed.places.births[s][own] + past[first] @ self.terms.miss - self.terms.miss[s]
+            ids[own] = self._new_ids(len(own))
+            parts = parts.begun(len(odds), first, s, own, begun)
+            anchor, track_id = np.append(anchor, first), np.append(track_id, ids[own])
+            odds = np.append(update.odds, np.clip(begun + np.log1p(-taken[own]), -_SURE, _SURE))
+            seen = np.append(seen | (update.detected > 0.5), np.ones(len(own), dtype=np.bool_))
+            found[s], assigned[s] = known, ids
+            done.append(s)
+        states, when, started = parts.merged(timed, len(odds))
+        when = np.where(seen, when, np.nan)
+        new = TrackBatch.new(states[old:], track_id[old:], odds[old:], when[old:])
+        new.numbers[:, STARTED] = started[old:]
+        known_before = self._batch.scored(states[:old], odds[:old] - self._batch.existence, when[:old])
+        at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(new), dtype=np.bool_)])
+        batch = TrackBatch.concatenate([known_before, new]).counted(seen, at_all)
+        sensors = range(len(self.sensors))
+        return batch, [assigned[s] for s in sensors], [found[s] for s in sensors]
+
+    def _probabilities(
+        self, track_id: Array, existence: Array, missed: Array, pairs: ScoredPairs, count: int
+    ) -> tuple[PairProbabilities, _Update]:
+        """Sum the joint events of T tracks and one sensor's measurements, so many.
+
+        Parameters
+        ----------
+        track_id, existence : arrays (T,)
+            Ids, and logarithms of the odds of existence.
+        missed : array (T,)
+            ln of the probability that a target that is there is missed.
+        pairs : ScoredPairs
+        count : int
+        """
+        track, measurement, gain = pairs
+        exists = 1.0 / (1.0 + np.exp(-np.clip(existence, -_SURE, _SURE)))
+        unseen = 1.0 - exists * -np.expm1(missed)
+        weight = (np.log(exists) - np.log(unseen))[track] + gain
+        known = pair_probabilities(track, measurement, weight, (len(exists), count), self.max_events)
+        detected = np.bincount(track, known.probability, len(exists))
+        there = np.maximum(1.0 - detected, 0.0) * exists * np.exp(missed) / unseen
+        # a miss alone lowers the odds by what it costs, to the last digit; no 1 - 1 for "there is no target"
+        odds = existence + missed + np.log1p(detected / np.maximum(there, 1e-300))
+        update = _Update(detected, there, np.clip(odds, -_SURE, _SURE))
+        return PairProbabilities(track_id[track], measurement, *known), update
+
+    def _take_in(
+        self, batch: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
+    ) -> tuple[TrackBatch, Array]:
         """Tracks after a sensor's scan, and which of them were rather detected than not."""
-        count, pairs = len(batch), gated.pairs
+        count = len(batch)
         if not count:
             return batch, np.zeros(0, dtype=np.bool_)
-        exists = _probability(batch.existence)
-        detected = np.bincount(pairs.track, share, count)
-        silent = np.maximum(1.0 - detected, 0.0)
-        missed = silent * exists * np.exp(self.terms.miss[s]) / (1.0 - exists * -np.expm1(self.terms.miss[s]))
-        # what remains for "there is no target" as odds, without 1 - 1
-        none = silent * (1.0 - exists) / (1.0 - exists * -np.expm1(self.terms.miss[s]))
-        after = detected + missed
-        odds = np.clip(np.log(np.maximum(after, 1e-300)) - np.log(np.maximum(none, 1e-300)), -_SURE, _SURE)
         target = np.concatenate([pairs.track, np.arange(count)])
-        weights = np.concatenate([share, missed]) / np.maximum(after, 1e-300)[target]
-        states = merged(concatenate([pairs.states, gated.predicted]), target, weights, count)
-        hit = detected > 0.5
-        # when a track was last seen: by the likeliest of its measurements
-        when = np.full(count, np.nan)
-        order = np.argsort(share, kind="stable")
-        when[pairs.track[order]] = gated.when[order]
-        return batch.scored(states, odds - batch.existence, np.where(hit, when, np.nan)), hit
+        weights = np.concatenate([share, update.missed]) / update.after[target]
+        states = merged(concatenate([pairs.states, batch.states]), target, weights, count)
+        hit = update.detected > 0.5
+        return batch.scored(states, update.odds - batch.existence, np.where(hit, time, np.nan)), hit
 
     @staticmethod
     def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
@@ -172,25 +238,5 @@ class JointProbabilisticTracker(NursingTracker):
         ids[pairs.measurement[likely]] = pairs.track_id[likely]
         return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
 
-    def _begin(self, s: int, z: Array, taken: Array, time: float, stamps: Array | None) -> tuple[TrackBatch, Array]:
-        """New tracks of measurements that are rather no track's, and their numbers."""
-        free = np.flatnonzero(taken < 0.5)
-        states, fit, positions, score = self._new_tracks.singles(s, z[free])
-        free = free[fit]
-        when = np.full(len(free), time) if stamps is None else stamps[free]
-        order = np.lexsort((*positions.T, when))
-        score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
-        aged = predict_each(self.filter, states[order], (time - when)[order])
-        return TrackBatch.new(aged, self._new_ids(len(free)), score[order], when[order]), free[order]
-
     def _settings(self) -> dict[str, str]:
         return super()._settings() | {"max_events": repr(self.max_events)}
-
-
-def _of_sensor(evidence: PairEvidence, s: int) -> Callable[[Array, Array], tuple[Array, Array]]:
-    return lambda track, measurement: evidence(track, s, measurement)
-
-
-def _probability(score: Array) -> Array:
-    """That a track of this score is a target."""
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(score, -_SURE, _SURE))))

@@ -11,7 +11,7 @@ import numpy as np
 
 from assoc._files.output import write_atomically
 from assoc._types import Array
-from experiments.common.claims import Claim, print_table, save_json
+from experiments.common.claims import Claim, load_json, print_table, save_json
 from experiments.common.results import result_file
 
 Experiment = Callable[[bool, np.random.Generator], tuple[list[Claim], Any]]
@@ -66,11 +66,33 @@ def add_publish(parser: argparse.ArgumentParser, name: str) -> None:
     )
 
 
-def publish(claims: list[Claim], name: str, seed: int, about: str | None) -> None:
-    """Write the result file of an experiment."""
+def add_only(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
+    """Add the option that runs a part of what is compared; with --publish it replaces these rows of the result file."""
+    parser.add_argument(
+        "--only", nargs="+", choices=names, metavar="NAME",
+        help=f"run these alone; with --publish their rows of the file are replaced: {', '.join(names)}",
+    )  # fmt: skip
+
+
+def publish(claims: list[Claim], name: str, seed: int, about: str | None, *, partly: bool = False) -> None:
+    """Write the result file of an experiment; `partly`: what these claims do not say stays as it is."""
     path = result_file(name)
-    save_json(path, claims, name, seed, about or "")
+    save_json(path, replaced(load_json(path), claims) if partly else claims, name, seed, about or "")
     print(f"{path}: written; now: python -m experiments.pages")
+
+
+def replaced(claims: list[Claim], newer: list[Claim]) -> list[Claim]:
+    """Claims, those of a quantity that newer ones have replaced by them; new quantities follow those before them."""
+    found, place = list(claims), len(claims)
+    for claim in newer:
+        known = [i for i, one in enumerate(found) if one.quantity == claim.quantity]
+        if known:
+            place = known[0]
+            found[place] = claim
+        else:
+            place = min(place + 1, len(found))
+            found.insert(place, claim)
+    return found
 
 
 def run(
@@ -93,7 +115,7 @@ def run(
     if chosen.json:
         save_json(chosen.json, claims, name, chosen.seed, about or "")
     if chosen.publish:
-        publish(claims, name, chosen.seed, about)
+        publish(claims, name, chosen.seed, about, partly=bool(getattr(chosen, "only", None)))
     figure_file = Path(chosen.figure or _picture(name))
     save_figure(figure_file, draw, shown, size)
     print(f"{figure_file}: written")

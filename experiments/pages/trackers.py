@@ -99,10 +99,8 @@ def asynchronous() -> str:
     r = Results("trackers.asynchronous")
     kinds = labels(r, ", oracle: GOSPA")
     rows = []
-    for name in labels(r, ": GOSPA"):
-        if not name.startswith(f"{kinds[0]}, "):
-            continue
-        plain = name.removeprefix(f"{kinds[0]}, ")
+    own = [name.removeprefix(f"{kinds[0]}, ") for name in labels(r, ": GOSPA") if name.startswith(f"{kinds[0]}, ")]
+    for plain in sorted(own, key=lambda name: [*SHOWN, name].index(name)):
         cells = []
         for kind in kinds:
             gospa, switches = r[f"{kind}, {plain}: GOSPA"], r[f"{kind}, {plain}: switches"]

@@ -1,6 +1,7 @@
 """Bearings alone: which trackers find the targets among the ghosts, and how soon.
 
-    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE] [--figure FILE]
+                                            [--only NAME ...] [--publish]
 
 Four targets and three sensors that measure bearings alone (scenario `bearing-only`, 40 scans of 10 s, default
 settings). A target has a track where a reported one is within 2 km of it on the ground (a bearing says nothing of
@@ -20,7 +21,7 @@ from assoc._types import Array
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import make_parser, run
+from experiments.common.command import add_only, make_parser, run
 from experiments.trackers.judging import goal, make, mean_claim
 from experiments.trackers.running import through
 
@@ -61,13 +62,15 @@ def judge(name: str, scene: Scene) -> Found:
     return Found(late, np.array(false), np.array(tracked), 1e3 * float(np.median(done.seconds[1:])))
 
 
-def experiment(quick: bool, seed: int, seeds: int = SEEDS) -> tuple[list[Claim], dict[str, list[Found]]]:
-    """All trackers on the same scenes."""
+def experiment(
+    quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES
+) -> tuple[list[Claim], dict[str, list[Found]]]:
+    """Trackers of these names on the same scenes."""
     count, scans = (2, 22) if quick else (seeds, SCANS)
     scenes = [simulation.simulate("bearing-only", seed + k, targets=TARGETS, scans=scans) for k in range(count)]
     claims: list[Claim] = []
     shown = {}
-    for name in NAMES:
+    for name in names:
         runs = shown[name] = [judge(name, scene) for scene in scenes]
         late = np.array([float(one.late) for one in runs])
         false = np.array([one.false[SETTLED:].mean() for one in runs])
@@ -100,14 +103,15 @@ def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
     parser = make_parser(NAME, TITLE)
     parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes (default {SEEDS})")
+    add_only(parser, NAMES)
     parser.set_defaults(seed=FIRST)
     chosen = parser.parse_args(arguments)
     if chosen.seeds < 2:
         parser.error("--seeds must be at least 2")
     about = f"{__doc__} {chosen.seeds} scenes."
     return run(
-        parser, chosen, NAME, TITLE, lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds), draw, (10, 4),
-        about,
+        parser, chosen, NAME, TITLE,
+        lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds, chosen.only or NAMES), draw, (10, 4), about,
     )  # fmt: skip
 
 

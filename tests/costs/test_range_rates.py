@@ -9,7 +9,6 @@ from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.sensors import Radar3D
 from tests.costs.reference import CIRCLE, REGION, SIDE, all_tuples
-from tests.sizes import sample
 
 SPEED = 100.0
 
@@ -36,8 +35,9 @@ def doppler_scene(seed, mixed=False, targets=2):
     return Scene(sensors, [0.0], [scan], region=REGION), places, velocities
 
 
-@sample("mixed", [False, True], every=2)
-@sample("seed", range(2), every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("mixed", [False, True])
+@pytest.mark.parametrize("seed", range(2))
 def test_costs_are_the_likelihood_summed_over_all_velocities(seed, mixed):
     scene, _, _ = doppler_scene(seed, mixed)
     # those of one target: of others the likelihood lies beyond any grid

@@ -10,6 +10,7 @@ import pytest
 
 from experiments.common import claims
 from experiments.common.claims import Claim
+from experiments.common.command import replaced
 
 SAMPLE = [
     Claim("mean cycles", "", 4.03, 4.9, (4.8, 5.0), (3.5, 5.5)),
@@ -74,3 +75,11 @@ def test_table_shows_every_claim(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(c.quantity in text for c in SAMPLE)
     assert "<= 2" in text
     assert "3.5 .. 5.5" in text
+
+
+def test_rows_of_a_partial_run_replace_those_of_the_file() -> None:
+    newer = [Claim("time of a scan", "ms", ours=1.0), Claim("p99 of a scan", "ms", ours=3.0)]
+    found = replaced(SAMPLE, newer)
+    assert [c.quantity for c in found] == ["mean cycles", "time of a scan", "p99 of a scan", "no accepted band"]
+    assert found[1] is newer[0] and found[0] is SAMPLE[0] and len(SAMPLE) == 3
+    assert replaced([], newer) == newer

@@ -27,6 +27,7 @@ def test_every_picture_is_on_a_page_and_sharp():
                 assert image.width >= 1_250, path.name
 
 
+@pytest.mark.slow
 def test_a_picture_is_drawn_anew(tmp_path, capsys):
     assert gallery.main(["scene", "-o", str(tmp_path)]) == 0
     drawn, known = Image.open(tmp_path / "scene.png"), Image.open(gallery.FOLDER / "scene.png")

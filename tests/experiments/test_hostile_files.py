@@ -73,6 +73,7 @@ def test_hostile_instances(program, how, tmp_path):
     _refused(run(program, tmp_path / "i.txt", tmp_path / "s.txt"), "i.txt")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["check", "verify"])
 def test_packed_files_that_are_cut_or_unpack_to_too_much(program, tmp_path):
     (tmp_path / "s.txt").write_text("assoc-solution 1\n1 1\n0 2\n")
@@ -116,6 +117,7 @@ def test_hostile_proofs(content, tmp_path):
     _refused(run("check", tmp_path / "i.txt", tmp_path / "p.json"), "p.json")
 
 
+@pytest.mark.slow
 def test_a_tree_without_end_is_refused(tmp_path):
     """Nodes that are shared would double the work at each, and a chain of them would keep all its siblings."""
     (tmp_path / "i.txt").write_text(GOOD)

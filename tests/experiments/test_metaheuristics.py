@@ -147,6 +147,7 @@ def test_claims_of_a_case():
     assert claims[f"rank of table 1's advice of {len(every)}"].ours == (share + 1) / 2
 
 
+@pytest.mark.slow
 def test_answers_of_ours_and_peers(tmp_path, monkeypatch, capsys):
     entries = (against_peers.Entry("tabu", 0.3), against_peers.Entry("highs", 20.0))
     monkeypatch.setattr(against_peers, "ENTRIES", entries)

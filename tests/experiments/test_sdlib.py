@@ -79,6 +79,7 @@ def test_whoever_wants_recorded_traffic_made_is_told_what_is_missing(monkeypatch
     assert capsys.readouterr().err == "no/such.csv: there is no such file\n"
 
 
+@pytest.mark.slow
 def test_solvers_are_compared(tmp_path, capsys):
     """A run of our solvers and a peer: judged by the verifier, written as a file, told as tables."""
     from experiments.sdlib.__main__ import main

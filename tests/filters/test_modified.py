@@ -10,7 +10,6 @@ import pytest
 from assoc.filters import ConstantVelocity, ExtendedKalmanFilter, Gaussian, ModifiedEKF
 from assoc.sensors import Radar3D
 from tests.filters.common import FLAT
-from tests.sizes import sample
 
 MOTION = ConstantVelocity(0.01)
 
@@ -23,7 +22,8 @@ def radar(range_noise: float, angle: float) -> Radar3D:
     )
 
 
-@sample("elevation", [5.0, 35.0, 60.0], every=3)
+@pytest.mark.slow
+@pytest.mark.parametrize("elevation", [5.0, 35.0, 60.0])
 def test_debiased_mean_and_covariance_against_samples(elevation):
     """What is left of the residual, less H times the error, has mean 0 and the stated covariance.
 

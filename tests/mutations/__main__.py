@@ -13,7 +13,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from tests.mutations.faults import FAULTS, Fault
+from tests.mutations.faults import FAULTS
+from tests.mutations.faults.fault import Fault
 
 _ROOT = Path(__file__).parents[2]
 # a fault may also show by never ending: tests may take so many times what they take without it, and this many seconds

@@ -67,6 +67,7 @@ assert not is_over(float("inf")) and sum(is_over.stats.cache_hits.values()) == 1
 """
 
 
+@pytest.mark.slow
 def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     source = "from assoc._system.clock import is_over\n\n\ndef prepare_clock():\n    is_over(1e300)\n"
     (tmp_path / "prepares.py").write_text(source)

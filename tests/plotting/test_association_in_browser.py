@@ -55,6 +55,7 @@ def test_it_draws_without_a_complaint(browser, page, pictures, size):
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_slider_table_and_pictures_follow_one_another(browser, page):
     show(browser, page)
     found = "const p = document.getElementById('scene-plot'); return p.data.find((t) => t.name === 'targets found').x"

@@ -15,7 +15,6 @@ from assoc.plotting.live import LivePage
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot
-from tests.sizes import sample
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +38,9 @@ def wait_for(browser, script, seconds=60.0):
     raise AssertionError(f"{script} did not come true: {browser.execute_script('return state.textContent')}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-@sample("dark", [False, True], every=2)
+@pytest.mark.parametrize("dark", [False, True])
 def test_the_picture_moves(browser, scene, film, pictures, size, dark):
     page = LivePage(scene, 0, "<b>Radars</b>")
     metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}

@@ -116,6 +116,7 @@ def click_all(browser):
     return names
 
 
+@pytest.mark.slow
 def test_no_script_opens_a_window(browser, pages):
     """What plotly offers where there is no WebGL: a click that opens its help page."""
     show(browser, pages / "scene.html")

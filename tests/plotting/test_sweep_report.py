@@ -85,7 +85,8 @@ def test_the_program_writes_it(folder, tmp_path):
     assert (done.returncode, done.stdout) == (2, "") and "does not exist" in done.stderr
 
 
-@pytest.mark.parametrize("size", [DESKTOP, pytest.param(PHONE, marks=pytest.mark.slow)], ids=["desktop", "phone"])
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_it_works_in_a_browser(browser, page, pictures, size):
     show(browser, page, size)
     assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"

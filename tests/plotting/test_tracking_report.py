@@ -94,7 +94,8 @@ def test_the_program_writes_it(tmp_path):
     assert "python -m assoc.track " + " ".join(words) in " ".join(parsed(tmp_path / "tracks.html").text)
 
 
-@pytest.mark.parametrize("size", [DESKTOP, pytest.param(PHONE, marks=pytest.mark.slow)], ids=["desktop", "phone"])
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_it_works_in_a_browser(browser, page, pictures, size):
     show(browser, page, size)
     assert browser.execute_script("return document.documentElement.dataset.ready") == "yes"

@@ -195,6 +195,7 @@ def test_limits_and_infeasible_problems_leave_with_3(run, tmp_path, scene_fields
     check(done, tmp_path, "measurement", before, code=3)
 
 
+@pytest.mark.slow
 def test_a_failure_leaves_an_older_result_as_it_was(run, tmp_path, scene_fields):
     np.savez(tmp_path / "s.npz", **scene_fields)
     (tmp_path / "o.json").write_text("old")

@@ -68,6 +68,7 @@ def test_the_command_is_installed():
     assert callable(getattr(importlib.import_module(module), name))
 
 
+@pytest.mark.slow
 def test_subcommands_are_the_programs(run, here):
     done = run("assoc", "solve", "s.npz", "--solver", "greedy", "--json", "-")
     assert done.returncode == 0 and len(json.loads(done.stdout)["scans"]) == 6
@@ -273,6 +274,7 @@ COMPLETED = [
 ]
 
 
+@pytest.mark.slow
 def test_bash_completes(run, tmp_path):
     bash = shutil.which("bash") or pytest.skip("bash is not installed")
     script = run("assoc", "completion", "bash").stdout

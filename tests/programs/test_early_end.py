@@ -76,6 +76,7 @@ def test_what_is_finished_is_written(work, number, word):
     assert "interrupted" in (work / "o.csv").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs POSIX signals")
 def test_it_ends_though_a_thread_does_not(work):
     hanging = ASLEEP.replace(

@@ -52,6 +52,7 @@ def test_table_json_and_csv_agree(run, scene_file, tmp_path):
         assert row["sizes"] == " ".join(map(str, scan["sizes"]))
 
 
+@pytest.mark.slow
 def test_jobs_do_not_change_the_result(run, scene_file, tmp_path):
     results = []
     for jobs in (1, 2):
@@ -120,6 +121,7 @@ def test_help_is_silent_and_quick(run):
     assert times["help"] < 3 * times["numpy"] + 0.2
 
 
+@pytest.mark.slow
 def test_time_limit_is_for_each_scan(run, tmp_path):
     path = tmp_path / "ghosts.npz"
     simulate("bearing-only", targets=40, scans=2).save(path)
@@ -191,6 +193,7 @@ register("waiting", WaitingParameters, solve)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 def test_a_terminal_shows_each_scan_when_it_is_done(run, scene_file, tmp_path):
     """The solver goes on with its third scan only after the second one's row was seen."""

@@ -73,6 +73,7 @@ def test_the_same_command_again_runs_nothing_and_a_larger_grid_the_rest(whole, r
     assert "27 runs in" in done.stdout and "15 new, 12 there before" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_study_from_a_file(run, scene_file, tmp_path):
     (tmp_path / "study.toml").write_text(
         f'files = "{scene_file}"\noutput = "study"\nrepeats = 2\nscans = "0:2"\nrandom = 3\n'

@@ -129,6 +129,7 @@ def test_partition_function_is_never_underestimated(work, a):
             assert value <= exact + 1e-6
 
 
+@pytest.mark.slow
 def test_more_solutions_narrow_the_intervals():
     problem = gated_problem(np.random.default_rng(3), (7, 7, 7), 0.3, "mixed")
     shares = [marginals(problem, k).unseen for k in (1, 5, 50, 500)]

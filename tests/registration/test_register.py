@@ -58,6 +58,7 @@ def test_errors_agree_with_the_covariance():
     assert chi2.ppf(0.005, 8 * n) < sum(squares) < chi2.ppf(0.995, 8 * n)
 
 
+@pytest.mark.slow
 def test_estimate_is_the_least_squares_solution():
     """All positions and biases at once by scipy, true tuples, no false alarms, against positions eliminated."""
     scene = with_biases(scene_of(radars(false_alarms=1e-9), 3, 3, aircraft=6), BIASES)
@@ -155,6 +156,7 @@ def test_clocks_only_by_their_differences():
     assert np.abs(left - left.mean()).max() < 0.1
 
 
+@pytest.mark.slow
 def test_clocks_with_a_reference():
     scene = late_scene(radars(), (0.0, -0.7, 0.2), scans=20)
     result = register(scene, components=("time",), reference=("radar 1",))
@@ -186,6 +188,7 @@ def test_sensors_that_report_positions():
     np.testing.assert_allclose(result.biases, [200.0, -100.0, 50.0], atol=4.0 * 60.0 * np.sqrt(2.0 / 200))
 
 
+@pytest.mark.slow
 def test_range_and_azimuth_without_heights():
     flat = [
         Radar2D(
@@ -201,6 +204,7 @@ def test_range_and_azimuth_without_heights():
     assert np.degrees(np.abs(off[:, 1]).max()) < 0.03 and np.abs(off[:, 0]).max() < 60.0
 
 
+@pytest.mark.slow
 def test_bearings_beside_radars():
     sensors = radars(2) + [
         BearingSensor(
@@ -213,6 +217,7 @@ def test_bearings_beside_radars():
     assert np.degrees(result.of(2)["azimuth"]) == pytest.approx(-0.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_measurements_with_times_of_their_own():
     """Antennas that turn in 4, 5 and 5.5 s: looks are moved to one time by their targets' motion."""
     scene = with_biases(simulate("rotating-radars", 1, duration=80.0), BIASES)
@@ -228,6 +233,7 @@ def test_false_alarms_do_not_disturb():
     assert (np.abs(result.biases - truth_of(result, BIASES)) < 4.5 * result.deviations).all()
 
 
+@pytest.mark.slow
 def test_pairs_of_the_wrong_targets_count_little():
     """A third of the targets seen by the third radar 900 m off, too far for noise: the others decide."""
     scene = scene_of(radars(), 9, 20)

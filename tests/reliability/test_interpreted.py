@@ -64,7 +64,8 @@ def test_switched_off(tmp_path):
     run(_CALLS + "assert call(5) == 1 and not asked", tmp_path, switch="0")
 
 
-@sample("solver", ["exact", "greedy", "lagrangian", "aco", "genetic", "tabu"], every=6)
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", ["exact", "greedy", "lagrangian", "aco", "genetic", "tabu"])
 def test_the_same_answers_with_and_without_compiled_kernels(solver, tmp_path):
     scene = tmp_path / "s.npz"
     simulate("three-radar", seed=5, scans=4).save(scene)

@@ -69,6 +69,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 def test_while_a_result_is_converted():
     # a signal that comes during a kernel is heard when its result is converted: a record's class is then missing
     done = subprocess.run([sys.executable, "-c", CONVERTING], capture_output=True, text=True, timeout=300)
@@ -106,6 +107,7 @@ print(heard > 3, cost, flush=True)
 """
 
 
+@pytest.mark.slow
 def test_while_a_kernel_is_loaded():
     # LLVM asks Python for compiled code, and takes none for empty code
     compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}

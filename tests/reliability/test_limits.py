@@ -110,6 +110,7 @@ def test_hardly_any_time(way):
     assert answer.stopped_by == "time_limit"
 
 
+@pytest.mark.slow
 def test_ranking_returns_a_good_solution_when_none_is_proved():
     """Where the best cannot be proved in the time, what the exact solver's heuristics find, not the greedy choice."""
     problem = axial(45, seed=3)
@@ -136,6 +137,7 @@ def test_a_solver_that_gives_up_or_finds_little_is_helped_out(monkeypatch, probl
         assert assign(fresh(problem), "poor", time_limit=5.0).cost == greedy_cost
 
 
+@pytest.mark.slow
 def test_searches_end_before_what_follows_them(problem):
     packing = prepare(problem).packing
     run = Run(0, time_limit=100.0)

@@ -21,7 +21,7 @@ from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from assoc.tracking import MultiSensorTracker
 from experiments.common.oracles import gated_problem, small_problems
-from tests.sizes import few_or_all, sample
+from tests.sizes import few_or_all
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute
 KERNEL = """
@@ -90,7 +90,8 @@ def test_threads_rank_track_and_weigh_alone():
             assert list(pool.map(work, range(8))) == alone
 
 
-@sample("method", ["spawn", "forkserver"], every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
 def test_pools_of_processes(method):
     items = work(1)
     with ProcessPoolExecutor(2, mp_context=get_context(method)) as pool:

@@ -14,7 +14,6 @@ import pytest
 
 from assoc.simulation import simulate
 from tests.reliability.test_faults import PYTHON, children
-from tests.sizes import sample
 
 UNREADABLE = os.fsdecode(b"\xff \n-.npz")
 """A name that is no text, with a blank, a line break and a dash."""
@@ -128,8 +127,9 @@ def test_nobody_reads_the_list_of_programs():
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds the workers through /proc")
-@sample("name", ["SIGTERM", "SIGKILL", "SIGINT"], every=3)
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL", "SIGINT"])
 def test_no_process_and_no_file_stays_behind(tmp_path, name):
     simulate("three-radar", 2, scans=400).save(tmp_path / "long.npz")
     (tmp_path / "tmp").mkdir()

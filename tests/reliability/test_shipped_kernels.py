@@ -14,7 +14,6 @@ from llvmlite.binding import get_host_cpu_features
 
 from assoc._system.shipped import NEEDED
 from tests.release.kernels import PROCESSOR, pack
-from tests.sizes import few_or_all
 
 _PROGRAM = """
 import sys
@@ -98,7 +97,8 @@ def test_nothing_is_compiled(made, tmp_path, what):
     assert not any(tmp_path.rglob("*.nb?"))
 
 
-@few_or_all("what", "sorting", "both")
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["sorting", "both"])
 def test_the_same_bytes_as_compiled_here(made, tmp_path, what):
     compiled, answer = solved(Path("nowhere"), tmp_path, what)
     assert compiled

@@ -48,7 +48,8 @@ print(json.dumps(times))
 """
 
 
-@pytest.mark.parametrize("text", [_PROGRAM, pytest.param(_SOLVER, marks=pytest.mark.slow)], ids=["kernel", "solver"])
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [_PROGRAM, _SOLVER], ids=["kernel", "solver"])
 def test_a_first_process_and_a_second(text, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(text)

@@ -134,6 +134,7 @@ def test_the_job_is_small_and_shared_once(study):
     assert len(pickle.dumps(batch)) < 3000
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_in_processes_and_is_the_same(slow, expected, tmp_path):
     class EnoughError(Exception):
         pass
@@ -149,6 +150,7 @@ def test_an_interrupted_study_goes_on_in_processes_and_is_the_same(slow, expecte
     assert counts.before >= 30 and same(tmp_path / "s", expected)
 
 
+@pytest.mark.slow
 def test_a_killed_process_of_the_pool_loses_nothing_finished(slow, expected, tmp_path):
     import psutil
 

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
 from assoc.tracking.mht.children import FALSE, NEW, Meanings, Parents, best_children
-from assoc.tracking.mht.clusters import cluster, merged
+from assoc.tracking.mht.clusters import cluster, merged, parts, without
 from tests.tracking import plain
 
 GATE = 0.99
@@ -194,3 +194,21 @@ def test_of_the_combinations_those_stay_that_may_become_the_best():
     assert {tuple(one.branches[held].tolist()) for held in one.holds} == {(0, 1), (0, 1, 2)}
     everything = merged(doubtful, gain, 100)
     assert sorted(everything.weight.tolist()) == sorted(-2.0 * n for n in (0, 1, 1, 1, 2, 2, 2, 3))
+
+
+def test_hypotheses_that_differ_in_what_is_gone_alone_add_up():
+    holds = np.array([[True, True], [True, False], [False, False]])
+    one = without(cluster(np.array([4, 7]), holds, np.array([0.0, -0.5, -2.0])), np.array([False, True]))
+    assert one.branches.tolist() == [4] and one.holds.tolist() == [[True], [False]]
+    np.testing.assert_allclose(one.weight, [0.0, -2.0 - math.log(1.0 + math.exp(-0.5))])
+
+
+def test_what_deleted_tracks_have_left_behind_stays_with_its_hypotheses():
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        holds = np.unique(rng.random((9, 4)) < 0.5, axis=0)
+        whole = cluster(np.arange(4), holds, rng.normal(0, 3, len(holds)))
+        # all in one part: the weights are those of before, whatever the scores of what is left
+        (one,) = parts(whole, np.zeros(len(whole.branches), dtype=np.int64), rng.normal(0, 3, len(whole.branches)))
+        before = dict(zip(map(tuple, whole.holds.tolist()), whole.weight, strict=True))
+        assert dict(zip(map(tuple, one.holds.tolist()), one.weight, strict=True)) == pytest.approx(before)

@@ -12,7 +12,7 @@ from assoc.recordings import Recording, clustering_time_window, radar_of
 from assoc.tracking import TRACKERS, IdentityParameters
 from assoc.tracking.identity_evidence import ADDRESSES, MEMORY, Identities, log_ratio
 from assoc.tracking.plots.plot_tracks import track_plots
-from tests.sizes import few_or_all
+from tests.sizes import few_or_all, sample
 from tests.tracking.crossing import TURN, crossing, radar
 
 NAMES = ("mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic")
@@ -92,7 +92,7 @@ def taken(done, aircraft):
 
 @few_or_all("seeds", 3, 10)
 @pytest.mark.parametrize("address", [False, True], ids=["codes", "addresses"])
-@pytest.mark.parametrize("name", NAMES)
+@sample("name", NAMES, every=3)
 def test_codes_keep_crossing_aircraft_apart(name, address, seeds):
     switched = {"use": 0, "ignore": 0}
     for seed in range(seeds):

@@ -95,6 +95,85 @@ def test_intervals_of_few_events_hold(seed):
     assert (found.upper - found.lower).max() > 1e-3
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_measurements_of_own_times_are_compared_at_these(seed):
+    """One sensor whose plots contend: each track is predicted to each plot's own time."""
+    rng, sensor = np.random.default_rng(seed), plain.sensor()
+    mean, cov, z = close_targets(rng)
+    tracker = tracker_of(sensor)
+    tracker.begin(0.0, Gaussian(mean, np.repeat(cov[None], len(mean), axis=0)), score=SCORE)
+    times = rng.uniform(0.0, 2.0, len(z))
+    # targets leave: the tracks of the step exist a little less likely than before it
+    before = tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence
+    tracker.step(2.0, [z], [times])
+    P, density = sensor.detection_probability, sensor.false_alarm_rate / sensor.volume
+    p = 1 / (1 + np.exp(-before))
+    plots = list(zip(times, z, strict=True))
+    done = [[plain.correct(*plain.predict(m, cov, t), one, sensor.covariance) for t, one in plots] for m in mean]
+    weight = np.array([[p[t] * P * math.exp(one[2]) / density for one in row] for t, row in enumerate(done)])
+    pair, total = np.zeros_like(weight), 0.0
+    for way in itertools.product(range(-1, len(z)), repeat=len(mean)):
+        used = [w for w in way if w >= 0]
+        if len(used) == len(set(used)):
+            one = math.prod(weight[t, w] if w >= 0 else 1 - p[t] * P for t, w in enumerate(way))
+            total += one
+            for t, w in enumerate(way):
+                if w >= 0:
+                    pair[t, w] += one
+    pair /= total
+    (found,) = tracker.probabilities
+    true = pair[found.track_id - 1, found.measurement]
+    np.testing.assert_allclose(found.probability, true, atol=1e-9)
+    left = (1 - pair.sum(axis=1)) * p * (1 - P) / (1 - p * P)
+    tracks = {track.track_id: track for track in tracker.tracks}
+    for t in range(len(mean)):
+        parts = [(left[t], *plain.predict(mean[t], cov, 2.0))]
+        parts += [(pair[t, m], *plain.predict(*done[t][m][:2], 2.0 - times[m])) for m in range(len(z))]
+        exists = sum(w for w, _, _ in parts)
+        middle = sum(w * x for w, x, _ in parts) / exists
+        # parts with a share below 1e-5 are dropped
+        np.testing.assert_allclose(tracks[t + 1].mean, middle, rtol=1e-4, atol=1e-3)
+        assert tracks[t + 1].score == pytest.approx(math.log(exists / (1 - exists)) + SCORE - before[t], abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sensors_are_taken_in_in_the_order_of_their_times(seed):
+    """One track and a plot or two of each sensor, the last sensor's first: all ways by which they may be its own."""
+    rng = np.random.default_rng(seed)
+    sensors = [plain.sensor(0.8), plain.sensor(0.6, sigma=5.0)]
+    mean, cov = np.array([500.0, 500, 250, 20, -10, 5]), np.diag([60.0] * 3 + [20.0] * 3)
+    motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
+    tracker = JointProbabilisticTracker(
+        sensors, filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12
+    )
+    tracker.begin(0.0, Gaussian(mean[None], cov[None]), score=SCORE)
+    p = 1 / (1 + math.exp(-float(tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence[0])))
+    times = [np.array([1.6, 1.7]), np.array([0.4, 0.7])]
+    # far enough off to be doubted, and near enough to start no track of their own
+    z = [mean[:3] + t[:, None] * mean[3:] + rng.normal(0, 10, (2, 3)) for t in times]
+    tracker.step(2.0, z, times)
+    ways = []
+    for a, b in itertools.product(range(3), repeat=2):
+        weight, x, C, now = 1.0, mean, cov, 0.0
+        for s, number in ((1, b), (0, a)):
+            P, density = sensors[s].detection_probability, sensors[s].false_alarm_rate / sensors[s].volume
+            if number:
+                when = times[s][number - 1]
+                x, C, log = plain.correct(*plain.predict(x, C, when - now), z[s][number - 1], sensors[s].covariance)
+                weight, now = weight * P * math.exp(log) / density, when
+            else:
+                weight *= 1 - P
+        ways.append((weight, *plain.predict(x, C, 2.0 - now)))
+    total = sum(w for w, _, _ in ways)
+    odds = p * total / (1 - p)
+    track = next(one for one in tracker.tracks if one.track_id == 1)
+    middle = sum(w * x for w, x, _ in ways) / total
+    spread = sum(w * (C + np.outer(x - middle, x - middle)) for w, x, C in ways) / total
+    assert track.existence == pytest.approx(odds / (1 + odds), rel=1e-6)
+    np.testing.assert_allclose(track.mean, middle, rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(track.covariance, spread, rtol=1e-2, atol=1e-2)
+
+
 def test_models_are_merged_each_by_itself():
     rng = np.random.default_rng(2)
     means, weights = rng.normal(0, 5, (3, 2, 4)), rng.dirichlet([1, 1], 3)

@@ -11,7 +11,7 @@ from assoc.tracking import TRACKERS, IdentityParameters, LatePlots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
 
-KINDS = ["multi-sensor", "mht", "nearest-neighbour"]
+KINDS = ["multi-sensor", "mht", "nearest-neighbour", "joint-probabilistic"]
 
 
 @pytest.fixture(scope="module")

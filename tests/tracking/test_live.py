@@ -159,7 +159,7 @@ def partition(tracks):
     return [number.setdefault(one, len(number) - 1) for one in tracks]
 
 
-@pytest.mark.parametrize("name", ["mht", "nearest-neighbour"])
+@pytest.mark.parametrize("name", ["mht", "nearest-neighbour", "joint-probabilistic"])
 def test_identities_give_the_tracks_of_the_recording(name):
     recording = crossing(2, begin=1.0)
     number = np.floor(recording.times / TURN)

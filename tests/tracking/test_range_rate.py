@@ -1,6 +1,7 @@
 """Range rates: smaller errors of the velocity in all trackers, and crossing targets that keep their tracks."""
 
 import numpy as np
+import pytest
 
 from assoc import simulation
 from assoc.sensors import Radar3D
@@ -67,7 +68,8 @@ def kept(doppler, seed, name):
     return wrong / max(total, 1)
 
 
-@sample("name", ["nearest-neighbour", "mht", "multi-sensor"], every=3)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["nearest-neighbour", "mht", "multi-sensor"])
 def test_crossing_targets_keep_their_tracks(name):
     plain, doppler = (np.mean([kept(on, seed, name) for seed in range(6)]) for on in (False, True))
     assert doppler < 0.03 and doppler <= plain

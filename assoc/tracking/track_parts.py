@@ -1,0 +1,145 @@
+"""Tracks within a scan whose measurements have times of their own: several parts each, merged at the scan's end.
+
+A sensor may see a track before the sensor that was taken in before it, so that a track cannot be merged and predicted
+on between the sensors. Each part of a track has measurements of its own, one of each sensor or none, and is filtered
+through them in the order of their times (`assoc.costs.tracks.own_times`). It has a share: how probable it is that just
+these are the track's, given that the target is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan, score_costs
+from assoc.costs.tracks.scores import ScoreTerms
+from assoc.filters.merging import merged
+
+_LEAST_SHARE = 1e-5
+"""Parts with a smaller share of their track are dropped."""
+
+
+class ScoredPairs(NamedTuple):
+    """K pairs of a track and a measurement of one sensor."""
+
+    track: Array
+    """Row of the track, (K,)."""
+    measurement: Array
+    """From 0, (K,)."""
+    gain: Array
+    """What the measurement adds to the track's score, (K,)."""
+
+
+class GrownParts(NamedTuple):
+    """Parts with one more measurement, and the pairs of a track and a measurement that they make."""
+
+    parent: Array
+    """Row of the part before, (N,)."""
+    rows: Array
+    """Measurements, (N, S)."""
+    gain: Array
+    """What the measurement adds to the part's score, (N,)."""
+    pair: Array
+    """Pair of each, (N,)."""
+    pairs: ScoredPairs
+    """Gains are by the density averaged over the track's parts."""
+
+
+class TrackParts(NamedTuple):
+    """P parts of T tracks, those of before the scan first, then those that begin in it."""
+
+    owner: Array
+    """Track of each, (P,)."""
+    anchor: Array
+    """The track, or the measurement that began it, as `TimedScan` counts them, (P,)."""
+    track: Array
+    """Row of the track, -1 if it begins in this scan, (P,)."""
+    rows: Array
+    """1-based measurement of each sensor, 0 for none, int32 (P, S)."""
+    share: Array
+    """(P,); those of one track sum to 1."""
+    score: Array
+    """What the scan has added to the score of a track with these measurements, (P,)."""
+
+    @staticmethod
+    def of_tracks(count: int, sensors: int) -> TrackParts:
+        """Tracks before their first measurement of the scan, one part each."""
+        row = np.arange(count)
+        return TrackParts(row, row, row, np.zeros((count, sensors), dtype=np.int32), np.ones(count), np.zeros(count))
+
+    def grown(self, timed: TimedScan, s: int, done: Sequence[int], terms: ScoreTerms, past: Array) -> GrownParts:
+        """All parts with all measurements of sensor s in their gates.
+
+        Parameters
+        ----------
+        timed : TimedScan
+        s : int
+        done : sequence of int
+            Sensors taken in before.
+        terms : ScoreTerms
+        past : bool array (A, S)
+            Which sensors looked at each anchor, of those taken in and this one.
+        """
+        found = timed.grown(s, done, self.anchor, self.track, self.rows)
+        score = -score_costs(timed, found.followed, found.rows, terms, past[self.anchor[found.parent]])
+        gain = score - self.score[found.parent]
+        count = len(timed.times[s])
+        keys, pair = np.unique(self.owner[found.parent] * max(count, 1) + found.measurement, return_inverse=True)
+        mean = np.full(len(keys), -np.inf)
+        np.logaddexp.at(mean, pair, np.log(self.share[found.parent]) + gain)
+        track, measurement = np.divmod(keys, max(count, 1))
+        return GrownParts(found.parent, found.rows, gain, pair, ScoredPairs(track, measurement, mean))
+
+    def after(self, grown: GrownParts, of_pair: Array, of_miss: Array, missed: Array) -> TrackParts:
+        """Parts after a sensor's measurements.
+
+        Parameters
+        ----------
+        grown : GrownParts
+        of_pair, of_miss : arrays (K,), (T,)
+            Probabilities of each pair, and of no measurement, given that the target is there.
+        missed : array (T,)
+            What a miss adds to the score.
+        """
+        parent = grown.parent
+        within = self.share[parent] * np.exp(grown.gain - grown.pairs.gain[grown.pair])
+        share = np.concatenate([self.share * of_miss[self.owner], within * of_pair[grown.pair]])
+        score = np.concatenate([self.score + missed[self.owner], self.score[parent] + grown.gain])
+        rows = np.concatenate([self.rows, grown.rows])
+        whose = np.concatenate([np.arange(len(self.owner)), parent])
+        most = np.zeros(len(missed))
+        np.maximum.at(most, self.owner[whose], share)
+        kept = np.flatnonzero(share >= np.minimum(_LEAST_SHARE, most[self.owner[whose]]))
+        whose, share = whose[kept], share[kept]
+        owner = self.owner[whose]
+        share = share / np.bincount(owner, share, len(missed))[owner]
+        return TrackParts(owner, self.anchor[whose], self.track[whose], rows[kept], share, score[kept])
+
+    def begun(self, count: int, anchor: Array, s: int, measurement: Array, score: Array) -> TrackParts:
+        """These parts of `count` tracks, and new tracks of measurements (from 0) of sensor s."""
+        new = len(anchor)
+        rows = np.zeros((new, self.rows.shape[1]), dtype=np.int32)
+        rows[:, s] = measurement + 1
+        added = TrackParts(count + np.arange(new), anchor, np.full(new, -1), rows, np.ones(new), score)
+        return TrackParts(*(np.concatenate(both) for both in zip(self, added, strict=True)))
+
+    def merged(self, timed: TimedScan, count: int) -> tuple[Any, Array, Array]:
+        """Merge the parts of each of `count` tracks.
+
+        Returns
+        -------
+        states
+            At the scan's end.
+        last, first : arrays (count,)
+            Times of the last and the first measurement of its likeliest part with any, NaN if there is none.
+        """
+        followed = timed.follow(self.track, self.rows)
+        states = merged(timed.at_end(followed, self.track), self.owner, self.share, count)
+        order = np.argsort(self.share, kind="stable")
+        order = order[self.rows[order].any(axis=1)]
+        last, first = np.full((2, count), np.nan)
+        last[self.owner[order]], first[self.owner[order]] = followed.when[order], followed.first[order]
+        return states, last, first

@@ -1,0 +1,157 @@
+"""What the metaheuristics share: the search of components, dives, neighbourhoods, the simplex method."""
+
+from __future__ import annotations
+
+from tests.mutations.faults.fault import Fault
+
+_COLONY = "assoc/solvers/aco/max_min.py"
+_BREEDING = "assoc/solvers/genetic/population.py"
+_TABU = "assoc/solvers/tabu/moves.py"
+_SEARCH = "assoc/packing/components/search.py"
+_TEAM = "assoc/packing/components/team.py"
+_DIVER = "assoc/packing/neighbourhoods/diving.py"
+_COMPONENT = "assoc/packing/components/component.py"
+_LARGE = "assoc/packing/neighbourhoods/large.py"
+_SIMPLEX = "assoc/packing/simplex/dual.py"
+
+_OF_COLONY = "tests/solvers/test_aco_max_min.py"
+_OF_GENETIC = "tests/solvers/test_genetic.py"
+_OF_LARGE = "tests/packing/test_large.py"
+_OF_DIVES = "tests/packing/test_diving.py"
+_OF_SEARCH = "tests/packing/test_search_components.py"
+
+FAULTS = (
+    Fault(
+        "patience has no end",
+        _SEARCH,
+        "component.stalled >= limits.patience or component.iterations",
+        "component.iterations",
+        _OF_SEARCH,
+    ),
+    Fault("iterations have no end", _SEARCH, " or component.iterations >= limits.iterations\n", "\n", _OF_SEARCH),
+    Fault(
+        "small components are bounded only after their search",
+        _SEARCH,
+        "component.proven = bound_of_component(component, run)",
+        "pass",
+        _OF_SEARCH,
+    ),
+    Fault("the best cover is not refined", _TEAM, "        component.refine(run, self._clusters)\n", "", _OF_SEARCH),
+    Fault(
+        "workers refine one and the same cover",
+        _TEAM,
+        "best = None if component.best is None else component.best.copy()",
+        "best = component.best",
+        _OF_SEARCH,
+    ),
+    Fault("workers do not exchange", _TEAM, "own.offer(whole.best, whole.weight)", "pass", _OF_SEARCH),
+    Fault("what other workers find is lost", _TEAM, "whole.offer(own.best, own.weight)", "pass", _OF_SEARCH),
+    Fault("workers draw the same numbers", _TEAM, "Run(rng, time_limit", "Run(0, time_limit", _OF_SEARCH),
+    Fault(
+        "a colony learns nothing from others",
+        _COLONY,
+        "self.recent, self.least = component.best.copy(), component.weight",
+        "pass",
+        _OF_COLONY,
+    ),
+    Fault(
+        "a population learns nothing from others",
+        _BREEDING,
+        "            self._admit(component, component.best.copy(), component.weight)\n",
+        "            pass\n",
+        _OF_GENETIC,
+    ),
+    Fault("divers ignore the pheromone", _DIVER, "trail[at.origin[open_columns]] * at", "at", _OF_DIVES),
+    Fault(
+        "divers ignore the linear program",
+        _DIVER,
+        "at.relaxed.primal[open_columns] ** strictness",
+        "1.0",
+        _OF_DIVES,
+    ),
+    Fault("divers fix nothing", _DIVER, "            self._slack[r] = False\n", "", _OF_DIVES),
+    Fault(
+        "a diver takes any price",
+        _DIVER,
+        "relaxed.bound + _AIM * (cutoff - relaxed.bound)",
+        "cutoff",
+        _OF_DIVES,
+    ),
+    Fault("a diver never goes back", _DIVER, "self._columns, self._slack = columns, slack\n", "return\n", _OF_DIVES),
+    Fault(
+        "a diver never aims at less",
+        _DIVER,
+        "self._aim = min(before.bound + 2.0 * room, self._cutoff)",
+        "break",
+        _OF_DIVES,
+    ),
+    Fault(
+        "a smaller program forgets what was fixed",
+        _DIVER,
+        "[*self._chosen, *self.origin[fixed].tolist()]",
+        "[*self._chosen]",
+        _OF_DIVES,
+    ),
+    Fault(
+        "tabu search does not dive",
+        _TABU,
+        "        if component.dives:\n            self.dives += 1",
+        "        if False:\n            self.dives += 1",
+        _OF_DIVES,
+    ),
+    Fault(
+        "breeding does not dive",
+        _BREEDING,
+        "        if component.dives:\n            self.dives += 1",
+        "        if False:\n            self.dives += 1",
+        _OF_DIVES,
+    ),
+    Fault(
+        "what a diver fixed is not excluded", _DIVER, "row_ptr[r + 1]]] = False", "row_ptr[r + 1]]] = True", _OF_DIVES
+    ),
+    Fault("no ant dives", _COLONY, "p.divers if component.dives else 0", "0", _OF_DIVES),
+    Fault(
+        "a cover that is worse is kept",
+        _COMPONENT,
+        "if weight < self.weight - self.tolerance and self",
+        "if self",
+        _OF_SEARCH,
+    ),
+    Fault(
+        "an incomplete cover is kept",
+        _COMPONENT,
+        "self.tolerance and self.is_complete(owner):",
+        "self.tolerance:",
+        _OF_SEARCH,
+    ),
+    Fault("refinement none refines", _COMPONENT, 'or self.refinement == "none":', "or False:", _OF_SEARCH),
+    Fault(
+        "refinement local is full",
+        _COMPONENT,
+        'move.on_new(clusters if self.refinement == "full" else 0)',
+        "move.on_new(clusters)",
+        _OF_SEARCH,
+    ),
+    Fault("refinement none inserts", _COMPONENT, 'return self.refinement != "none"', "return True", _OF_SEARCH),
+    Fault(
+        "what a large neighbourhood finds is lost",
+        _LARGE,
+        "                own_all(packing.cols, smaller.origin[part.origin[search.columns]], owner)\n",
+        "",
+        _OF_LARGE,
+    ),
+    Fault(
+        "large neighbourhoods have no columns beyond the bound",
+        _LARGE,
+        "limit = max(weight - priced.bound, 0.0) + priced.tolerance",
+        "limit = priced.tolerance",
+        _OF_LARGE,
+    ),
+    Fault(
+        "the simplex method moves its multipliers the other way",
+        _SIMPLEX,
+        "basis.duals[r] += sign * step * basis.row[r]",
+        "basis.duals[r] -= sign * step * basis.row[r]",
+        _OF_DIVES,
+    ),
+)
