@@ -122,6 +122,11 @@ class JointProbabilisticTracker(NursingTracker):
         ended = np.sort(batch.track_id[gone & batch.confirmed])
         return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
 
+    def _detected(self, step: Step) -> Array:
+        ids = self._batch.track_id[:, None]
+        shares = [(ids == one.track_id) @ one.probability for one in self.probabilities]
+        return np.minimum(np.stack(shares, axis=1), 1.0)
+
     def _at_once(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
         """Take in a scan of one instant: tracks, each measurement's track, and probabilities of each sensor."""
         time, batch = scan.time, self._predicted(self._batch, self._elapsed(scan.time))

@@ -18,8 +18,9 @@ Deletion = Literal["time", "count", "score"]
 HISTORY = 62
 """Scans whose detections are remembered, one a bit."""
 
-# a track is given up once a true one would be silent for so long with this probability, and not before these scans
-_OVERLOOKED = 1e-4
+OVERLOOKED = 1e-4
+"""A track is given up once a target that is there would be missed for so long with this probability."""
+# and not before so many scans
 _LEAST_SCANS = 3.0
 
 
@@ -106,7 +107,7 @@ class LifeCycle:
             return self.deletion_time
         if pace == 0:
             return math.inf
-        return max(_LEAST_SCANS, math.log(_OVERLOOKED) / float(miss.sum())) * pace
+        return max(_LEAST_SCANS, math.log(OVERLOOKED) / float(miss.sum())) * pace
 
     def deletes(
         self, confirmed: Array, score: Array, best: Array, silent: Array, missed: Array, patience: float

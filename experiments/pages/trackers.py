@@ -140,16 +140,19 @@ def comparison() -> str:
 
 
 def benchmark() -> str:
-    """Ours and Stone Soup's on the same detections."""
+    """Ours and those of other packages on the same detections."""
     r = Results("trackers.benchmark")
     pairs = {
         "mfa": ("mht", "MFA, `mht`"),
         "gnn": ("nearest", "GNN, GNN"),
         "jpda": ("joint", "JPDA, `joint-probabilistic`"),
+        "lmb": ("joint", "LMB, `joint-probabilistic`"),
     }
     rows = []
     for label in labels(r, ", mfa: mean GOSPA"):
         for peer, (own, words) in pairs.items():
+            if f"{label}, {peer}: mean GOSPA" not in r:
+                continue
             done = r.starting(f"{label}, {peer}: scans done, of ")[0]
             cells = (
                 number(r[f"{label}, {own}: CPU time of a scan"].ours),

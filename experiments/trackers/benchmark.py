@@ -1,4 +1,4 @@
-"""Our trackers compared with Stone Soup's on the same detections.
+"""Our trackers compared with Stone Soup's, and with a labelled multi-Bernoulli filter, on the same detections.
 
     python -m experiments.trackers.benchmark [--quick] [--seed N] [--budget S] [--json FILE] [--figure FILE]
                                              [--publish]
@@ -6,9 +6,9 @@
 Stone Soup's multi-frame assignment (MFA), its global nearest neighbour (GNN) and its JPDA (by loopy belief propagation)
 are given the targets at time 0, and so are ours: a square of targets in nearly straight flight, two clutter densities,
 the same window of 3 scans, the same gates of 0.999. Stone Soup neither starts nor ends tracks; ours do, which may cost
-them accuracy. GOSPA has a cutoff of 50 m; times are CPU times of a scan, the median, all in one process. Stone Soup's
-trackers stop when their time is over (--budget, 30 s of CPU for a setting): then both are compared on the scans that
-were done.
+them accuracy. Where the package multisensor-lmb-filters-rs is installed (it needs Python 3.12), its LMB filter is a
+peer, too. GOSPA has a cutoff of 50 m; times are CPU times of a scan, the median, all in one process. Peers stop when
+their time is over (--budget, 30 s of CPU for a setting): then both are compared on the scans that were done.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from assoc.metrics import gospa
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import Claim
 from experiments.common.command import make_parser, run
+from experiments.trackers import labelled
 from experiments.trackers.judging import GOAL
 from experiments.trackers.plane import DETECTION, Plane, simulate
 from experiments.trackers.running import in_plane
@@ -33,10 +34,10 @@ CUTOFF = 50.0
 """Of GOSPA (order 2), metres."""
 TARGETS, CLUTTER = (3, 30), (0.2, 2.0)
 SCANS, SEEDS, BUDGET = 20, {3: 10, 30: 3}, 30.0
-"""The budget is that of one of Stone Soup's trackers for all seeds of a setting, CPU seconds."""
+"""The budget is that of one peer for all seeds of a setting, CPU seconds."""
 TIMES_FASTER = 50.0
-PEERS = {"mfa": "mht", "gnn": "nearest", "jpda": "joint"}
-"""Stone Soup's tracker, and ours of the same kind."""
+PEERS = {"mfa": "mht", "gnn": "nearest", "jpda": "joint", **({"lmb": "joint"} if labelled.AVAILABLE else {})}
+"""A peer, and ours of the same kind."""
 ROUNDING = 1e-6
 """Metres of mean GOSPA that are no difference."""
 
@@ -78,6 +79,8 @@ def against_peers(
             "gnn": stone_soup.nearest(plane, GATE),
             "jpda": stone_soup.probabilistic(plane, GATE),
         }
+        if labelled.AVAILABLE:
+            runs["lmb"] = labelled.labelled(plane)
         for name, one in runs.items():
             found[name].append(judged(one, plane, share))
     label = f"{targets} targets, clutter {clutter:g} a target"
@@ -145,8 +148,9 @@ NAMES = {
     "mfa": "Stone Soup, MFA",
     "gnn": "Stone Soup, GNN",
     "jpda": "Stone Soup, JPDA",
+    **({"lmb": "multisensor-lmb-filters-rs"} if labelled.AVAILABLE else {}),
 }
-COLOURS = ("#1f77b4", "#7fb3d5", "#17becf", "#d62728", "#e8a0a0", "#ff7f0e")
+COLOURS = ("#1f77b4", "#7fb3d5", "#17becf", "#d62728", "#e8a0a0", "#ff7f0e", "#9467bd")
 
 
 def draw(figure: Any, found: dict[tuple[int, float], dict[str, list[Result]]]) -> None:
@@ -154,8 +158,8 @@ def draw(figure: Any, found: dict[tuple[int, float], dict[str, list[Result]]]) -
     labels = [f"{targets} / {clutter:g}" for targets, clutter in found]
     upper, lower = figure.subplots(2, 1, sharex=True)
     x = np.arange(len(labels))
-    for i, (name, colour) in enumerate(zip(NAMES, COLOURS, strict=True)):
-        place = x + 0.14 * (i - 2.5)
+    for i, (name, colour) in enumerate(zip(NAMES, COLOURS, strict=False)):
+        place = x + 0.13 * (i - 0.5 * (len(NAMES) - 1))
         times = [1e3 * _median(one[name]) for one in found.values()]
         upper.bar(place, times, 0.12, color=colour, label=NAMES[name])
         per_target = [_mean(one[name]) / np.sqrt(targets) for (targets, _), one in found.items()]
@@ -171,7 +175,7 @@ def draw(figure: Any, found: dict[tuple[int, float], dict[str, list[Result]]]) -
         axes.spines[["top", "right"]].set_visible(False)
 
 
-NAME, TITLE = "trackers.benchmark", "Our trackers compared with Stone Soup's"
+NAME, TITLE = "trackers.benchmark", "Our trackers compared with those of other packages"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
@@ -179,7 +183,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     parser = make_parser(NAME, TITLE)
     parser.add_argument(
         "--budget", type=float, default=BUDGET, metavar="S",
-        help=f"CPU seconds of each of Stone Soup's trackers for a setting (default {BUDGET:g})",
+        help=f"CPU seconds of each peer for a setting (default {BUDGET:g})",
     )  # fmt: skip
     chosen = parser.parse_args(arguments)
     if not chosen.budget > 0:

@@ -18,6 +18,7 @@ from experiments.trackers import (
     close_scenes,
     comparison,
     judging,
+    labelled,
     live,
     plane,
     warm_starts,
@@ -58,6 +59,15 @@ def test_stone_soup_and_ours_on_the_same_detections():
     np.testing.assert_allclose(results["joint"].gospa, results["jpda"].gospa, atol=4.0)
     ratio, (difference, interval), scans = benchmark._paired([results["mht"]] * 2, [results["mfa"]] * 2)
     assert ratio > 0 and scans == 8 and interval is not None and interval[0] <= difference <= interval[1]
+
+
+def test_the_labelled_filter_on_the_same_detections():
+    pytest.importorskip(labelled.PACKAGE)
+    one = plane.simulate(3, 0.2, 4, 1)
+    theirs = benchmark.judged(labelled.labelled(one), one, 60.0)
+    ours = benchmark.judged(in_plane(JointProbabilisticTracker, one), one, 60.0)
+    assert len(theirs.gospa) == 4 and (theirs.seconds > 0).all()
+    np.testing.assert_allclose(theirs.gospa, ours.gospa, atol=4.0)
 
 
 def test_a_peer_stops_when_its_time_is_over():

@@ -7,7 +7,11 @@ import pytest
 
 from assoc import simulation
 from assoc.errors import InvalidInputError
+from assoc.filters import Gaussian
+from assoc.scene import Scan
 from assoc.tracking import TRACKERS, LatePlots
+from assoc.tracking.ghosts import Unseen
+from assoc.tracking.track import Step
 from tests.sizes import sample
 
 NURSING = ["multi-sensor", "static", "nearest-neighbour", "joint-probabilistic"]
@@ -125,6 +129,70 @@ def test_late_bearings_are_put_in_their_place():
         )
         assert step.late == len(stamps) and set(step.assigned[2][step.confirmed[2]].tolist()) <= before
     assert {track.track_id for track in late.tracks if track.reported} == before and len(before) == 3
+
+
+def test_ghosts_are_what_a_sensor_does_not_see():
+    """Counted anew by hand: rows of misses of three sensors with P_D 0.9, 0.9 and 0.5."""
+    miss = np.log([0.1, 0.1, 0.5])
+    none, watch = Unseen.none(3), Unseen.none(3)
+    everyone = np.ones((2, 3), dtype=np.bool_)
+    rng = np.random.default_rng(3)
+    rows = {7: np.zeros(3), 4: np.zeros(3)}
+    for _ in range(60):
+        detected = rng.random((2, 3)) < [[0.5, 0.9, 0.1], [0.9, 0.9, 0.5]]
+        watch = watch.after(np.array([7, 4]), detected.astype(float), everyone)
+        for track, own in zip((7, 4), detected, strict=True):
+            rows[track] = np.where(own, 0, rows[track] + 1)
+        expected = [track for track in (4, 7) if (np.array([0.1, 0.1, 0.5]) ** rows[track] < 1e-4).any()]
+        assert watch.ghosts(miss).tolist() == expected
+        np.testing.assert_array_equal(watch.misses, [rows[4], rows[7]])
+    # four misses of a sensor with P_D 0.9 are still likely enough, a fifth is not; who cannot see has missed nothing
+    for looked, ghosts in ((everyone, [4, 7]), (~everyone, [])):
+        watch = none
+        for k in range(5):
+            assert not len(watch.ghosts(miss)), k
+            watch = watch.after(np.array([4, 7]), np.array([[0.0, 1.0, 1.0]] * 2), looked)
+        assert watch.ghosts(miss).tolist() == ghosts
+    # what is a track's by half ends a row by half, and who is gone is forgotten
+    half = watch.after(np.array([7]), np.array([[0.5, 1.0, 1.0]]), everyone[:1])
+    assert half.ids.tolist() == [7] and half.misses.tolist() == [[0.5, 0.0, 0.0]]
+
+
+# static fuses each scan by itself, and so never feeds it
+@sample("name", [name for name in NURSING if name != "static"], every=2)
+def test_a_ghost_that_a_sensor_never_sees_ends(name):
+    """A track is set where bearings of two targets cross: two sensors feed it for ever, the third never does."""
+    scene = bearings(0, 2)
+    targets = np.array([[40e3, 70e3, 5e3], [60e3, 70e3, 5e3]])
+    # in line with the first target for the sensor at (0, 0), with the second for that at (100, 0) km
+    ghost = np.array([[50e3, 87.5e3, 5e3, 0.0, 0.0, 0.0]])
+    rng = np.random.default_rng(0)
+    tracker = TRACKERS[name].for_scene(scene)
+    tracker.begin(-10.0, Gaussian(ghost, np.diag([400.0, 700.0, 3e3, 20.0, 20.0, 20.0]) ** 2))
+    fed, ended = [], []
+    for k in range(12):
+        z = [sensor.measure(targets) + rng.normal(0.0, 2e-3, (2, 1)) for sensor in scene.sensors]
+        step = tracker.step(10.0 * k, z)
+        fed.append([1 in one for one in step.assigned])
+        ended += step.ended.tolist()
+    # four looks of the sensor that does not see it: 0.05 ** 4 is below 1e-4; in the last the bearings are free again
+    assert fed[:3] == [[True, False, True]] * 3 and not np.any(fed[3:]) and ended == [1]
+    assert found(tracker, targets) == (2, 0)
+
+
+def test_partners_of_a_ghost_are_those_that_swapped():
+    """Track 67 has a bearing of either target, 58 the other one of the first; 47 has its own three."""
+    scene = bearings(0, 2)
+    targets = np.array([[40e3, 70e3, 5e3], [60e3, 50e3, 5e3], [25e3, 30e3, 5e3]])
+    tracker = TRACKERS["nearest-neighbour"].for_scene(scene)
+    scan = Scan(0, 0.0, tuple(sensor.measure(targets) for sensor in scene.sensors))
+    ids = (np.array([58, 67, 47]), np.array([67, 58, 47]), np.array([0, 58, 47]))
+    step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
+    assert tracker._partners(scan, step, np.array([67])).tolist() == [58, 67]
+    # where nothing is swapped there is no partner
+    ids = (np.array([0, 58, 47]), np.array([67, 58, 47]), np.array([67, 58, 47]))
+    step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
+    assert tracker._partners(scan, step, np.array([67])).tolist() == []
 
 
 def test_sensors_that_start_tracks_have_no_nursery():
