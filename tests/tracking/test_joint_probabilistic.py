@@ -9,7 +9,7 @@ import pytest
 from assoc import InvalidInputError, filters
 from assoc.filters import Gaussian
 from assoc.filters.merging import merged
-from assoc.tracking import JointProbabilisticTracker
+from assoc.tracking import Initiation, JointProbabilisticTracker
 from tests.tracking import plain
 
 SCORE = 1.5
@@ -144,12 +144,14 @@ def test_sensors_are_taken_in_in_the_order_of_their_times(seed):
     mean, cov = np.array([500.0, 500, 250, 20, -10, 5]), np.diag([60.0] * 3 + [20.0] * 3)
     motion = filters.ConstantVelocity(plain.Q_SIGMA, kind="continuous")
     tracker = JointProbabilisticTracker(
-        sensors, filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12
-    )
+        sensors, filters.KalmanFilter(motion), region=plain.REGION, gate_probability=1 - 1e-12,
+        initiation=Initiation(birth_rate=1e-9),
+    )  # fmt: skip
     tracker.begin(0.0, Gaussian(mean[None], cov[None]), score=SCORE)
-    p = 1 / (1 + math.exp(-float(tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence[0])))
+    before = float(tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence[0])
+    p = 1 / (1 + math.exp(-before))
     times = [np.array([1.6, 1.7]), np.array([0.4, 0.7])]
-    # far enough off to be doubted, and near enough to start no track of their own
+    # near enough to be doubted; as good as no new targets, which would contend for the second sensor's plots
     z = [mean[:3] + t[:, None] * mean[3:] + rng.normal(0, 10, (2, 3)) for t in times]
     tracker.step(2.0, z, times)
     ways = []
@@ -170,6 +172,7 @@ def test_sensors_are_taken_in_in_the_order_of_their_times(seed):
     middle = sum(w * x for w, x, _ in ways) / total
     spread = sum(w * (C + np.outer(x - middle, x - middle)) for w, x, C in ways) / total
     assert track.existence == pytest.approx(odds / (1 + odds), rel=1e-6)
+    assert track.score == pytest.approx(SCORE + math.log(odds) - before, abs=1e-4)
     np.testing.assert_allclose(track.mean, middle, rtol=1e-4, atol=1e-3)
     np.testing.assert_allclose(track.covariance, spread, rtol=1e-2, atol=1e-2)
 
