@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from assoc._types import Array
+from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
 from assoc.tracking.births.joint_starts import angles_alone
@@ -29,7 +30,7 @@ from assoc.tracking.track_batch import TrackBatch
 from assoc.tracking.tracker import Tracker
 
 _GROWN = 5
-"""Scans since a track began after which it is taken over."""
+"""Scans since a track began after which it is taken over: confirmation takes two or three, decisions three more."""
 _FIELDS = "nursery."
 """What the names of the nursery's arrays begin with."""
 
@@ -108,7 +109,11 @@ class NursingTracker(Tracker):
 
         By this scan alone, they hold bearings that belong together with those of a ghost, and bearings that do not.
         """
-        found = self._crossings(scan, [np.ones(len(one), dtype=np.bool_) for one in step.assigned])
+        try:
+            found = self._crossings(scan, [np.ones(len(one), dtype=np.bool_) for one in step.assigned])
+        except LimitExceededError:
+            # too many crossings to tell: the ghosts end, and so does the swap
+            return ghosts[:0]
         if found is None:
             return ghosts[:0]
         several = found[0]

@@ -48,12 +48,15 @@ def test_a_clock_that_is_asked_for_counts(scene, monkeypatch):
     options = [
         {}, {"time_limit": 7.0}, {"solver_parameters": {"nodes": 3}}, {"solver": "greedy"}
     ]  # fmt: skip
+    limits = []
     for one in options:
+        seen.clear()
         tracker = MultiSensorTracker.for_scene(scene, **one)
         tracker.step(0.0, scene.scan(0).measurements)
-    limits = [(one["time_limit"], one.get("nodes"), one.get("patience")) for one in seen]
-    assert limits[0][0] is None and limits[0][1] >= 10 and limits[0][2] == 0
-    assert limits[1:] == [(7.0, None, None), (None, 3, 0), (None, None, None)]
+        limits.append([(call["time_limit"], call.get("nodes"), call.get("patience")) for call in seen])
+    # the tracker itself asks, and its nursery of tracks
+    assert all(clock is None and nodes >= 10 and patience == 0 for clock, nodes, patience in limits[0])
+    assert [set(calls) for calls in limits[1:]] == [{(7.0, None, None)}, {(None, 3, 0)}, {(None, None, None)}]
 
 
 def test_the_work_is_less_for_large_problems(monkeypatch):

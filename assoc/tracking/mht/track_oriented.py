@@ -300,9 +300,17 @@ class TrackOrientedMHT(Tracker):
         return np.unique(lost) if len(lost) else lost
 
     def hand_over(self, age: int) -> TrackBatch:
-        """Give away the confirmed tracks that began at least so many scans ago, as the best hypothesis knows them.
+        """Give away confirmed tracks, as the best hypothesis knows them; branches that contradict them go, too.
 
-        Branches that contradict them go, too.
+        Parameters
+        ----------
+        age : int
+            Scans since a track began after which it is given away.
+
+        Returns
+        -------
+        TrackBatch
+            The tracks, at the time of the last scan; this tracker knows them no more.
         """
         grown = self._chosen & self._batch.confirmed & (self._born <= self._scan - age)
         given, taken = self._batch[grown], self._history[grown]
