@@ -23,6 +23,7 @@ from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
 from assoc.costs.residuals import normal
+from assoc.costs.starts import bearing_starts, height_start, mean_start, singular_start
 from assoc.costs.symmetric import inverse, solve
 from assoc.sensors.codes import BEARING, RADAR2D
 from assoc.sensors.kernels.records import Six
@@ -32,10 +33,8 @@ _WEAK = 1.0
 _MAX_STEPS = 100
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
 _POOR_FIT = 10.0
-# chi-square above which a tuple with a range-azimuth radar is fitted from another height, too
+# chi-square above which a tuple is fitted from elsewhere, too
 _DOUBTFUL = 3.0
-# in half heights: ranges above this bend too little for that, where there are no others to be near
-_FAR = 2.0
 # how far beyond the region's heights such a fit may end, in half heights: mirror images lie farther
 _HEIGHT_SLACK = 1.1
 
@@ -93,69 +92,6 @@ def _descend(
                 break
             damping = max(10.0 * damping, 1e-3)
     return chi, x, y, z, (a0, a1, a2, a3, a4, a5)
-
-
-@njit
-def _start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) -> tuple[float, float, float]:
-    """Where to begin: the mean of the converted measurements, weighted by their information."""
-    b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
-    last = members[0]
-    for n in members:
-        s = scan.owner[n]
-        if sensors.code[s] == BEARING or (full and not sensors.full[s]):
-            continue
-        i, c = scan.information[n], scan.centre[n]
-        a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
-        b0 += i[0] * c[0] + i[1] * c[1] + i[2] * c[2]
-        b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
-        b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
-        last = n
-    ok, x, y, z = solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
-    if not ok:
-        return scan.centre[last, 0], scan.centre[last, 1], scan.centre[last, 2]
-    return x, y, z
-
-
-@njit
-def _at_height(sensors: SensorArrays, scan: ScanArrays, n: int, z: float) -> tuple[float, float, float]:
-    """Where a range and azimuth are at a height; as high or low as the range allows."""
-    s = scan.owner[n]
-    far, azimuth = scan.z[n, 0], scan.z[n, 1]
-    up = min(max(z - sensors.place[s, 2], -far), far)
-    ground = math.sqrt(far * far - up * up)
-    return (
-        sensors.place[s, 0] + ground * math.cos(azimuth),
-        sensors.place[s, 1] + ground * math.sin(azimuth),
-        sensors.place[s, 2] + up,
-    )
-
-
-@njit
-def _bearing_starts(
-    sensors: SensorArrays, scan: ScanArrays, members: Array
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Two places to begin with bearings: where the lines cross, and ahead along the mean bearing."""
-    n00 = n01 = n11 = c0 = c1 = u = v = px = py = 0.0
-    count = len(members)
-    for n in members:
-        s = scan.owner[n]
-        cos, sin = math.cos(scan.z[n, 0]), math.sin(scan.z[n, 0])
-        x, y = sensors.place[s, 0], sensors.place[s, 1]
-        n00, n01, n11 = n00 + sin * sin, n01 - sin * cos, n11 + cos * cos
-        c0, c1 = c0 + sin * (sin * x - cos * y), c1 - cos * (sin * x - cos * y)
-        u, v, px, py = u + cos, v + sin, px + x / count, py + y / count
-    m = sensors.middle
-    ahead = (m[0], m[1], m[2])
-    size = math.hypot(u, v)
-    if size > 1e-3:
-        # from between the sensors as far as the region's middle lies
-        far = (u * (m[0] - px) + v * (m[1] - py)) / size
-        far = max(far, 0.3 * math.hypot(sensors.half[0], sensors.half[1]))
-        ahead = (px + far * u / size, py + far * v / size, m[2])
-    det = n00 * n11 - n01 * n01
-    if det > 1e-9 * count * count:
-        return ((n11 * c0 - n01 * c1) / det, (n00 * c1 - n01 * c0) / det, m[2]), ahead
-    return ahead, (m[0], m[1], m[2])
 
 
 @njit
@@ -256,7 +192,8 @@ def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[fl
 
     Ranges near a radar that measures no elevation bend so much that the fit may end in a local minimum, hundreds of
     chi-square above the best. A fit that is not good starts again where such a radar sees its measurement at its own
-    height or at the bottom of the region, whichever explains all measurements better.
+    height or at the bottom of the region, whichever explains all measurements better; and beside a zenith or a bearing
+    sensor, where azimuths jump.
     """
     # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
     full_ones = tall_ones = located_ones = slant_ones = 0
@@ -269,31 +206,28 @@ def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[fl
     full, flat = full_ones > 0, tall_ones == 0
     at = ahead = (0.0, 0.0, 0.0)
     if located_ones == 0:
-        at, ahead = _bearing_starts(sensors, scan, members)
+        at, ahead = bearing_starts(sensors, scan, members)
     else:
-        at = _start(sensors, scan, members, full)
+        at = mean_start(sensors, scan, members, full)
     best = _from(sensors, scan, members, at, full, flat)
     if located_ones == 0 and not best[0] <= _POOR_FIT:
         other = _from(sensors, scan, members, ahead, full, flat)
         if other[0] < best[0] or not math.isfinite(best[0]):
             best = other
-    if slant_ones == 0 or len(members) == 1 or best[0] <= _DOUBTFUL:
+    if len(members) == 1 or located_ones == 0 or best[0] <= _DOUBTFUL:
         return best
-    least = math.inf
-    for n in members:
-        s = scan.owner[n]
-        far = slant_ones == len(members) and scan.z[n, 0] > _FAR * sensors.half[2]
-        if sensors.code[s] != RADAR2D or far:
-            continue
-        for height in (sensors.place[s, 2], sensors.middle[2] - sensors.half[2]):
-            there = _at_height(sensors, scan, n, height)
-            chi = normal(sensors, scan, members, there[0], there[1], there[2])[0]
-            if chi < least:
-                least, at = chi, there
-    if least < math.inf:
-        other = _from(sensors, scan, members, at, full, flat)
-        if other[0] < best[0] and abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]:
-            return other
+    if slant_ones > 0:
+        chi, x, y, z = height_start(sensors, scan, members, slant_ones == len(members))
+        if chi < math.inf:
+            other = _from(sensors, scan, members, (x, y, z), full, flat)
+            if other[0] < best[0] and abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]:
+                best = other
+    # a descent from there is worth its time only where the start is already better
+    chi, x, y, z = singular_start(sensors, scan, members, at)
+    if chi < best[0]:
+        other = _from(sensors, scan, members, (x, y, z), full, flat)
+        if other[0] < best[0] and (full or abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]):
+            best = other
     return best
 
 

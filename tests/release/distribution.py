@@ -27,6 +27,7 @@ from tests.reliability.cold_cache import without_times
 _FOLDERS = ("assoc", "docs", "experiments", "tests")
 _FILES = ("Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "README.md", "LICENSE")
 _BUILD = ("pyproject.toml", "hatch_build.py")
+_DESCRIBED = ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")
 _ADDED = ("PKG-INFO", ".gitignore")
 """What the build adds to a source distribution."""
 _PROGRAMS = ("assoc.simulate", "assoc.solve", "assoc.track", "assoc.sweep")
@@ -113,7 +114,7 @@ def check_wheel(path: Path, kernels: list[str] | None = None) -> None:
     """Check that a wheel holds the package, what describes it, and its kernels, no more; and that it is small."""
     about = f"{'-'.join(path.name.split('-')[:2])}.dist-info"
     files = {name for name in tracked() if name.startswith("assoc/")}
-    described = {f"{about}/{one}" for one in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")}
+    described = {f"{about}/{one}" for one in _DESCRIBED}
     check_members(path, files | described | {*(kernels or [])})
     if path.stat().st_size > _LARGEST_WHEEL:
         raise WrongError(f"{path.name}: {path.stat().st_size} bytes, expected {_LARGEST_WHEEL} at the most")
