@@ -28,7 +28,8 @@ def shown(
     )
     os.close(side)
     seen = _read(main)
-    assert process.wait(60) == 0
+    status = process.wait(60)
+    assert status == 0
     return seen
 
 
@@ -40,7 +41,8 @@ def shown_until(text: str, then: Callable[[], object], words: Sequence[object], 
     process = subprocess.Popen(command, stdout=side, stderr=side, env=environment, **options)
     os.close(side)
     seen = _read(main, text, then)
-    assert process.wait(60) == 0, seen
+    status = process.wait(60)
+    assert status == 0, seen
     return seen
 
 
@@ -52,7 +54,9 @@ def shown_at(widths: Sequence[int], words: Sequence[object], *, status: int = 0,
         f"for width in {[*widths]}:\n"
         "    os.environ['COLUMNS'] = str(width)\n"
         "    print('=' * 9, width, flush=True)\n"
-        f"    assert main({rest!r}) == {status}"
+        f"    code = main({rest!r})\n"
+        f"    if code != {status}:\n"
+        "        raise SystemExit(f'exit code {code}')"
     )
     main, side = os.openpty()
     command = [sys.executable, "-c", code]

@@ -32,7 +32,7 @@ _SCENES = {
     "uav": ("dubins-uav",),
 }
 _SOLVERS = ("greedy", "exact", "aco", "genetic", "tabu", "lagrangian")
-# with all trackers and filters the wheel would be larger than 5 MB
+# some: with all trackers and filters the wheel would be larger still
 _TRACKERS = ("multi-sensor", "static", "mht", "nearest-neighbour")
 _FILTERS = ("imm-cv", "ekf", "imm")
 
