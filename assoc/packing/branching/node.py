@@ -16,7 +16,7 @@ from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
 from assoc.packing.packing import PackingArrays
 from assoc.packing.simplex.basis import Basis, new_basis, refactor
-from assoc.packing.simplex.dual import Effort, most_exchanges, restart, solve_dual
+from assoc.packing.simplex.dual import Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import (
     Allowed,
     Program,
@@ -88,21 +88,22 @@ def drop(work: Work, num: int, bound: float, cut: float) -> int:
 
     Leaves the reduced costs of those in ``key``.
     """
-    node, duals = work.node, work.duals
+    program, duals, key = work.program, work.duals, work.key
+    active, columns, slack = work.node.active, work.node.columns, work.node.slack
     kept = 0
     for a in range(num):
-        j = node.active[a]
-        reduced = reduced_cost(work.program, duals, j)
+        j = active[a]
+        reduced = reduced_cost(program, duals, j)
         # a column at the cut itself stays
         if bound + reduced <= cut:
-            node.active[kept] = j
-            work.key[kept] = reduced
+            active[kept] = j
+            key[kept] = reduced
             kept += 1
         else:
-            node.columns[j] = False
-    for r in range(node.slack.size):
-        if node.slack[r] and bound - duals[r] > cut:
-            node.slack[r] = False
+            columns[j] = False
+    for r in range(slack.size):
+        if slack[r] and bound - duals[r] > cut:
+            slack[r] = False
     return kept
 
 
@@ -129,7 +130,6 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
 def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
     """Solve the linear program of the node at work; how that ended, and a bound that holds."""
     allowed = allowed_at(work, num)
-    restart(work.program, allowed, work.basis)
     status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, most_exchanges(work.program), deadline))
     work.duals[:] = work.basis.duals
     make_feasible(work.program, allowed, work.duals)

@@ -23,14 +23,15 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.simplex.basis import Basis, copy_basis, new_basis
-from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, restart, solve_dual
+from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, bound_of
 from assoc.packing.simplex.program import Allowed, Program, certified, make_feasible
+from assoc.packing.simplex.trial import Trial, begin_trials, new_trial, try_dual
 
 # pairs tried at a node at the most, and in a row without a better one; steps of the simplex method for each side
 _CANDIDATES = 16
 _IN_VAIN = 5
-_EXCHANGES = 50
+_EXCHANGES = 25
 # trials of a pair after which what they gained is believed
 _RELIABLE = 2
 # an LP value this near to a whole number is one
@@ -50,7 +51,7 @@ class Trials(NamedTuple):
         Mean gain of the bound for each unit of the LP's values that a side forbids; side 0: apart, 1: together.
     pairs, values : int32 array, shape (K, 2), float array, shape (K,)
         The pairs in doubt, the most doubtful first, and their mass.
-    basis : Basis
+    trial : Trial
         Of the side that is tried.
     side : Allowed
         What that side allows; its ``active`` is room.
@@ -63,7 +64,7 @@ class Trials(NamedTuple):
     tried: NDArray[np.uint8]
     pairs: NDArray[np.int32]
     values: Floats
-    basis: Basis
+    trial: Trial
     side: Allowed
     duals: Floats
 
@@ -75,7 +76,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
     rows = num_rows
     return Trials(
         np.zeros((rows, rows)), np.zeros((2, rows, rows), np.float32), np.zeros((2, rows, rows), np.uint8),
-        np.zeros((_CANDIDATES, 2), np.int32), np.zeros(_CANDIDATES), new_basis(program),
+        np.zeros((_CANDIDATES, 2), np.int32), np.zeros(_CANDIDATES), new_trial(program, _EXCHANGES),
         Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(size, np.bool_)), np.empty(size),
     )  # fmt: skip
 
@@ -93,17 +94,18 @@ def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
 @njit
 def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
     """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
-    side.columns[:] = False
-    side.slack[:] = allowed.slack
+    active, columns, slack = side.active, side.columns, side.slack
+    columns[:] = False
+    slack[:] = allowed.slack
     one, two = pair
     if joined:
-        side.slack[one] = False
-        side.slack[two] = False
+        slack[one] = False
+        slack[two] = False
     count = 0
     for j in allowed.active:
         if not is_dropped(cols, j, one, two, joined):
-            side.active[count] = j
-            side.columns[j] = True
+            active[count] = j
+            columns[j] = True
             count += 1
     return count
 
@@ -157,20 +159,15 @@ def _try(
 ) -> Any:
     """Try one side of a pair; how it ended, and the bound that the multipliers give (to rounding)."""
     pair, joined = which
-    copy_basis(basis, trials.basis)
     count = answer(cols, allowed, pair, joined, trials.side)
     side = Allowed(trials.side.active[:count], trials.side.columns, trials.side.slack)
-    restart(program, side, trials.basis)
-    status, _ = solve_dual(program, side, trials.basis, effort)
+    status = try_dual(program, side, basis, trials.trial, effort)
     if status == CUT or status == INFEASIBLE:
         # to be believed it must hold
-        trials.duals[:] = trials.basis.duals
+        trials.duals[:] = trials.trial.basis.duals
         make_feasible(program, side, trials.duals)
         return status, certified(program, side, trials.duals)
-    bound = 0.0
-    for r in range(program.sides.size):
-        bound += program.sides[r] * trials.basis.duals[r]
-    return status, bound
+    return status, bound_of(program, trials.trial.basis)
 
 
 @njit
@@ -184,10 +181,9 @@ def decide(
     int, int
         The place of the pair, and `NEITHER` (branch), or `TOGETHER` or `APART`: the only side with anything better.
     """
-    bound = 0.0
-    for r in range(program.sides.size):
-        bound += program.sides[r] * basis.duals[r]
+    bound = bound_of(program, basis)
     gap = effort.cutoff - bound
+    begin_trials(program, allowed, basis, trials.trial)
     pick, best, in_vain = 0, -1.0, 0
     gains = np.empty(2)
     trial = Effort(effort.cutoff, _EXCHANGES, effort.deadline)
@@ -290,6 +286,7 @@ def part_certain(
 
     -1: of no pair there is a question, as all that has one row of it has the other one too.
     """
+    begin_trials(program, allowed, basis, trials.trial)
     pick, best = -1, -np.inf
     trial = Effort(effort.cutoff, _EXCHANGES, effort.deadline)
     for i in range(count):

@@ -12,7 +12,7 @@ from assoc._types import Floats
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import Basis, begin_from_duals, new_basis, refactor
 from assoc.packing.simplex.cuts import odd_sets, with_cuts
-from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, restart, solve_dual
+from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Allowed, Program, all_allowed, make_feasible, program_of, weight_limit
 
 # rounds of cuts at the most; of them in a row that may gain less than this share of the gap; cuts for each row
@@ -114,13 +114,12 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
 
 
 def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], duals: Floats) -> Basis:
-    """The basis of these variables, its anchors with these costs, fit for the dual simplex method."""
+    """The basis of these variables, its anchors with these costs."""
     basis = new_basis(program)
     basis.variable[:] = variable
     basis.duals[:] = duals
     basis.anchors[:] = duals
     refactor(program, allowed, basis)
-    restart(program, allowed, basis)
     return basis
 
 

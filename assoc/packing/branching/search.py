@@ -41,11 +41,17 @@ from assoc.packing.simplex.program import Allowed
 
 
 class Limits(NamedTuple):
-    """How much better a solution must be, how many nodes are searched, and when time is over (clock.py)."""
+    """How much better a solution must be, the weight below which it is looked for, how many nodes are searched, and
+    when time is over (clock.py)."""
 
     tolerance: float
+    aim: float
     nodes: int
     deadline: float
+
+
+import os
+_FIRST, _GROWTH, _LAST = float(os.environ.get('FIRST', 0.125)), float(os.environ.get('GROWTH', 2.0)), float(os.environ.get('LAST', 0.7))
 
 
 class BranchAndBound:
@@ -79,6 +85,7 @@ class BranchAndBound:
         memory_allows: Callable[[float], bool] = memory_allows,
         *,
         cuts: bool = False,
+        floor: float = -np.inf,
     ) -> None:
         wait_for_kernels()
         self._packing = packing
@@ -92,11 +99,13 @@ class BranchAndBound:
         self._root = plain_root(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
+        # this pass looks for solutions below the aim; those before have shown that none is below the floor
+        self._aim, self._floor = np.inf, floor
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to search: the incumbent is optimal to within the tolerance, or memory is short."""
-        return self._open.count == 0
+        return self._open.count == 0 and (self._aim >= self.weight - self.tolerance or self._open.given_up < np.inf)
 
     @property
     def out_of_memory(self) -> bool:
@@ -109,7 +118,7 @@ class BranchAndBound:
         # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
         whole = self.tolerance < self._packing.granularity
         proved = self.weight if whole else self.weight - self.tolerance
-        return min(proved, self._open.least_bound)
+        return min(proved, max(self._floor, min(self._aim, self._open.least_bound)))
 
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
@@ -117,7 +126,7 @@ class BranchAndBound:
         while not self.done and self.nodes < target and not is_over(self.deadline):
             if self._work is None and not self._begin():
                 return
-            limits = Limits(self.tolerance, target - self.nodes, self.deadline)
+            limits = Limits(self.tolerance, self._aim, target - self.nodes, self.deadline)
             self._open.count, self.weight, count, done = _search(
                 self._work, self._open.arrays, self._open.count, self.weight, limits
             )
@@ -126,7 +135,10 @@ class BranchAndBound:
                 assert self._work is not None
                 self.columns = self._work.found[:count].copy()
             if not self.done and self.nodes < target and not is_over(self.deadline):
-                self._open.grow(self._memory_allows)
+                if self._open.count:
+                    self._open.grow(self._memory_allows)
+                else:
+                    self._next_pass()
 
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
@@ -137,20 +149,35 @@ class BranchAndBound:
         root = self._root
         if self._cuts:
             root = root_with_cuts(self._packing, root.duals, self.weight - self.tolerance, self.deadline)
+            self._root = root
             self._open = OpenNodes(root)
+            self._set_aim()
         self._work = new_work(self._packing.arrays, root.program, root.slack)
         return True
+
+    def _next_pass(self) -> None:
+        """Begin anew at the root, with an aim that is farther off."""
+        self._floor = max(self._floor, self._aim)
+        self._open = OpenNodes(self._root)
+        self._set_aim()
+
+    def _set_aim(self) -> None:
+        """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""
+        root = float(self._root.program.sides @ self._root.duals)
+        gap = self.weight - root
+        share = max(_FIRST, _GROWTH * (self._floor - root) / gap) if gap < np.inf else np.inf
+        self._aim = root + share * gap if share < _LAST else np.inf
 
 
 @njit
 def _greedy(work: Work, allowed: Allowed) -> Any:
     """Take columns by ``key`` while they fit; the weight (inf when a duty is left) and their number."""
-    cols, weights, trial = work.cols, work.weights, work.trial
+    cols, weights, trial, active, slack = work.cols, work.weights, work.trial, allowed.active, allowed.slack
     covered = np.zeros(trial.size, np.bool_)
     weight = 0.0
     count = 0
-    for a in np.argsort(work.key[: allowed.active.size], kind="mergesort"):
-        j = allowed.active[a]
+    for a in np.argsort(work.key[: active.size], kind="mergesort"):
+        j = active[a]
         free = True
         duty = False
         for s in range(cols.shape[1]):
@@ -159,7 +186,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
                 if covered[r]:
                     free = False
                     break
-                duty = duty or not allowed.slack[r]
+                duty = duty or not slack[r]
         if free and (weights[j] < 0.0 or duty):
             weight += weights[j]
             trial[count] = j
@@ -168,7 +195,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
                 if cols[j, s] >= 0:
                     covered[cols[j, s]] = True
     for r in range(covered.size):
-        if not allowed.slack[r] and not covered[r]:
+        if not slack[r] and not covered[r]:
             return np.inf, count
     return weight, count
 
@@ -176,14 +203,14 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
 @njit
 def _by_values(work: Work, allowed: Allowed) -> bool:
     """Lower the keys by the LP's values, so that these decide first; whether all of them are whole numbers."""
-    basis = work.basis
+    in_basis, values, active, key = work.basis.place, work.basis.values, allowed.active, work.key
     whole = True
-    for a in range(allowed.active.size):
-        place = basis.place[allowed.active[a]]
+    for a in range(active.size):
+        place = in_basis[active[a]]
         if place >= 0:
-            value = basis.values[place]
+            value = values[place]
             whole = whole and not WHOLE < value < 1.0 - WHOLE
-            work.key[a] -= value * work.limit
+            key[a] -= value * work.limit
     return whole
 
 
@@ -193,7 +220,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
 
     Stops early with nodes open when there is no room left for two children, or time is over.
     """
-    tolerance, node_limit, deadline = limits
+    tolerance, aim, node_limit, deadline = limits
     cols, program, basis, trials = work.cols, work.program, work.basis, work.trials
     count_found = -1
     nodes = 0
@@ -204,7 +231,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
         if not has_room(stack, top):
             break
         lower = stack.bound[top]
-        if lower >= incumbent - tolerance:
+        if lower >= min(incumbent - tolerance, aim):
             num_open = top
             continue
         num = open_node(work, stack, top, at_work)
@@ -213,7 +240,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
         closed = False
         late = False
         while True:
-            cut = min(incumbent - tolerance, work.limit)
+            cut = min(incumbent - tolerance, aim, work.limit)
             # a little more than the cut, for what rounding takes off the bound
             status, bound = relax(work, num, cut + 0.1 * tolerance, deadline)
             if status == STOPPED and is_over(deadline):
@@ -231,10 +258,10 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
                 incumbent = weight
                 count_found = count
                 work.found[:count] = work.trial[:count]
-                if lower >= incumbent - tolerance:
+                cut = min(cut, incumbent - tolerance)
+                if lower >= cut:
                     closed = True
                     break
-                cut = incumbent - tolerance
                 num = drop(work, num, bound, cut)
                 allowed = allowed_at(work, num)
             in_doubt = 0

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.simplex.program import Allowed, Program, reduced_cost
+from assoc.packing.simplex.pricing import Pricing, new_pricing
+from assoc.packing.simplex.program import Allowed, Program
 
 # a pivot smaller than this is none
 SMALL_PIVOT = 1e-7
@@ -41,14 +42,14 @@ class Basis(NamedTuple):
         Squared length of each row of the inverse (of each column here): weights of the steepest edge.
     values : float array, shape (m,)
         Values of the variables in the basis.
-    duals, reduced : float arrays, shapes (m,) and (n,)
-        Multipliers, and the reduced costs of the columns that are allowed.
+    duals : float array, shape (m,)
+        Multipliers.
     anchors : float array, shape (m,)
         Costs of the anchors.
     row, column, sums : float arrays, shape (m,)
         Room for a row and a column of the tableau, and for the norms.
-    steps : float array, shape (n,)
-        Room for the entries of a row of the tableau, column by column.
+    pricing : Pricing
+        The columns that are allowed, and their reduced costs.
     age : int64 array, shape (1,)
         Exchanges since everything was computed anew.
     """
@@ -60,23 +61,28 @@ class Basis(NamedTuple):
     norms: Floats
     values: Floats
     duals: Floats
-    reduced: Floats
     anchors: Floats
     row: Floats
     column: Floats
     sums: Floats
-    steps: Floats
+    pricing: Pricing
     age: NDArray[np.int64]
 
 
 @njit
 def new_basis(program: Program) -> Basis:
     """Room for a basis."""
+    return basis_without(program, program.sides.size)
+
+
+@njit
+def basis_without(program: Program, columns: int) -> Basis:
+    """Room for a basis of whose inverse there are so many columns alone."""
     num, size = program.weights.size, program.sides.size
     return Basis(
-        np.zeros(size, np.int32), np.full(num, -1, np.int32), np.full(size, -1, np.int32), np.zeros((size, size)),
-        np.empty(size), np.empty(size), np.empty(size), np.empty(num), np.zeros(size),
-        np.empty(size), np.empty(size), np.empty(size), np.empty(num), np.zeros(1, np.int64),
+        np.zeros(size, np.int32), np.full(num, -1, np.int32), np.full(size, -1, np.int32), np.zeros((columns, size)),
+        np.empty(size), np.empty(size), np.empty(size), np.zeros(size),
+        np.empty(size), np.empty(size), np.empty(size), new_pricing(program), np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -90,7 +96,6 @@ def copy_basis(source: Basis, target: Basis) -> None:
     target.norms[:] = source.norms
     target.values[:] = source.values
     target.duals[:] = source.duals
-    target.reduced[:] = source.reduced
     target.anchors[:] = source.anchors
     target.age[:] = source.age
 
@@ -114,40 +119,23 @@ def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: B
     basis.norms[:] = 1.0
     basis.values[:] = program.sides
     basis.duals[:] = duals
-    price(program, allowed, basis)
-
-
-@njit
-def price(program: Program, allowed: Allowed, basis: Basis) -> float:
-    """Compute the reduced costs of the allowed columns anew; the least of them and of the slacks."""
-    least = 0.0
-    for j in allowed.active:
-        if basis.place[j] >= 0:
-            basis.reduced[j] = 0.0
-        else:
-            value = reduced_cost(program, basis.duals, j)
-            basis.reduced[j] = value
-            least = min(least, value)
-    for r in range(basis.duals.size):
-        if allowed.slack[r]:
-            least = min(least, -basis.duals[r])
-    return least
 
 
 @njit
 def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
     """Coordinates of column j in the basis."""
+    inverse, rows = basis.inverse, program.rows
     column[:] = 0.0
     for k in range(program.start[j], program.start[j + 1]):
-        r = program.rows[k]
+        r = rows[k]
         for i in range(column.size):
-            column[i] += basis.inverse[r, i]
+            column[i] += inverse[r, i]
 
 
 @njit
 def exchange(basis: Basis, p: int, column: Floats) -> None:
     """Let the variable of these coordinates take place p: the inverse, the norms, the values."""
-    inverse, row, sums, norms = basis.inverse, basis.row, basis.sums, basis.norms
+    inverse, row, sums, norms, values = basis.inverse, basis.row, basis.sums, basis.norms, basis.values
     size = column.size
     pivot = column[p]
     sums[:] = 0.0
@@ -161,7 +149,7 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
                 inverse[r, i] -= f * column[i]
             inverse[r, p] = f
     own = norms[p]
-    step = basis.values[p] / pivot
+    step = values[p] / pivot
     for i in range(size):
         if column[i] != 0.0:
             ratio = column[i] / pivot
@@ -174,9 +162,9 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
                 norms[i] = 0.0
                 for r in range(size):
                     norms[i] += inverse[r, i] * inverse[r, i]
-            basis.values[i] -= step * column[i]
+            values[i] -= step * column[i]
     norms[p] = max(own / (pivot * pivot), 1e-4)
-    basis.values[p] = step
+    values[p] = step
     basis.age[0] += 1
 
 

@@ -209,4 +209,4 @@ def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
         for r in range(num_rows):
             size += sets[c, r]
         sides[num_rows + c] = (size - 1) // 2
-    return Program(weights, start, rows, sides)
+    return Program(weights, start, rows, sides, num_sensors)

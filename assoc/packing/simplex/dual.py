@@ -26,10 +26,10 @@ from assoc.packing.simplex.basis import (
     coordinates,
     enter,
     exchange,
-    price,
     refactor,
     residual,
 )
+from assoc.packing.simplex.pricing import list_columns, price, sum_rows
 from assoc.packing.simplex.program import Allowed, Program, make_feasible
 
 # how a search ends: at the optimum, at the cutoff, without any solution, or before
@@ -64,23 +64,43 @@ def most_exchanges(program: Program) -> int:
 
 
 @njit
-def _leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
+def cost_tolerance(program: Program, allowed: Allowed) -> float:
+    """Reduced costs this far below 0 are 0."""
+    scale = 0.0
+    for j in allowed.active:
+        scale = max(scale, abs(program.weights[j]))
+    return _COST * max(scale, 1e-300)
+
+
+@njit
+def bound_of(program: Program, basis: Basis) -> float:
+    """The bound of the multipliers, as they are."""
+    sides, duals = program.sides, basis.duals
+    bound = 0.0
+    for r in range(sides.size):
+        bound += sides[r] * duals[r]
+    return bound
+
+
+@njit
+def leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
     """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
     num, size = program.weights.size, program.sides.size
+    values, variable, norms, columns, slack = basis.values, basis.variable, basis.norms, allowed.columns, allowed.slack
     best = -1.0
     place = -1
     for i in range(size):
-        value = basis.values[i]
+        value = values[i]
         if -_VALUE <= value <= _VALUE:
             continue
         if value > 0.0:
-            code = basis.variable[i]
+            code = variable[i]
             if code < num:
-                if allowed.columns[code]:
+                if columns[code]:
                     continue
-            elif code < num + size and allowed.slack[code - num]:
+            elif code < num + size and slack[code - num]:
                 continue
-        score = value * value / basis.norms[i]
+        score = value * value / norms[i]
         # whatever rounding made of the norms, what is outside its limits must be found
         if not score <= best:
             best = score
@@ -89,87 +109,84 @@ def _leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
 
 
 @njit
-def _entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
+def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
     """The variable that first limits the step of the multipliers, and the step; -1: none does.
 
-    Fills ``steps`` with the row of the tableau, by the allowed columns.
+    Fills ``entries`` with the row of the tableau, of the listed columns.
     """
-    row, steps, reduced, place = basis.row, basis.steps, basis.reduced, basis.place
-    start, rows, active = program.start, program.rows, allowed.active
+    row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
+    entries, reduced, count = pricing.entries, pricing.reduced, pricing.count[0]
+    entries[:count] = 0.0
+    sum_rows(row, pricing, entries)
     least = np.inf
-    for a in range(active.size):
-        j = active[a]
-        value = 0.0
-        for k in range(start[j], start[j + 1]):
-            value += row[rows[k]]
-        value *= sign
-        steps[a] = value
-        if value > _ENTRY and place[j] < 0 and reduced[j] + tolerance < least * value:
-            least = max(reduced[j] + tolerance, 0.0) / value
+    for a in range(count):
+        value = sign * entries[a]
+        entries[a] = value
+        if value > _ENTRY and reduced[a] + tolerance < least * value:
+            least = max(reduced[a] + tolerance, 0.0) / value
     for r in range(row.size):
         value = sign * row[r]
-        if value > _ENTRY and allowed.slack[r] and basis.slack_place[r] < 0:
-            least = min(least, max(tolerance - basis.duals[r], 0.0) / value)
+        if value > _ENTRY and slack[r] and in_basis[r] < 0:
+            least = min(least, max(tolerance - duals[r], 0.0) / value)
     chosen = -1
     if least == np.inf:
         return chosen, 0.0
-    largest = 0.0
+    largest = _ENTRY
     step = 0.0
-    for a in range(active.size):
-        value = steps[a]
-        if value > largest and value > _ENTRY:
-            j = active[a]
-            if place[j] < 0 and reduced[j] <= least * value:
-                largest = value
-                chosen = j
-                step = max(reduced[j], 0.0) / value
+    for a in range(count):
+        value = entries[a]
+        if value > largest and reduced[a] <= least * value:
+            largest = value
+            chosen = a
+    if chosen >= 0:
+        step = max(reduced[chosen], 0.0) / largest
+        chosen = pricing.column[chosen]
     for r in range(row.size):
         value = sign * row[r]
-        if value > largest and value > _ENTRY and allowed.slack[r] and basis.slack_place[r] < 0:
-            if -basis.duals[r] <= least * value:
-                largest = value
-                chosen = program.weights.size + r
-                step = max(-basis.duals[r], 0.0) / value
+        if value > largest and slack[r] and in_basis[r] < 0 and -duals[r] <= least * value:
+            largest = value
+            chosen = program.weights.size + r
+            step = max(-duals[r], 0.0) / value
     return chosen, step
 
 
 @njit
-def _step(program: Program, allowed: Allowed, basis: Basis, p: int, sign: float, step: float) -> None:
+def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: float, step: float) -> None:
     """Move the multipliers along the row of place p, and the reduced costs with them."""
-    for a in range(allowed.active.size):
-        basis.reduced[allowed.active[a]] -= step * basis.steps[a]
-    for r in range(basis.row.size):
-        basis.duals[r] += sign * step * basis.row[r]
+    pricing, row, duals = basis.pricing, basis.row, basis.duals
+    reduced, entries = pricing.reduced, pricing.entries
+    for a in range(pricing.count[0]):
+        reduced[a] -= step * entries[a]
+    for r in range(row.size):
+        duals[r] += sign * step * row[r]
     code = basis.variable[p]
-    if code < program.weights.size:
-        basis.reduced[code] = -sign * step
+    if code < program.weights.size and allowed.columns[code]:
+        reduced[pricing.position[code]] = -sign * step
 
 
 @njit
 def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort) -> Any:
-    """Make a basis optimal whose multipliers are feasible; how it ended, and the exchanges made.
+    """Make a basis optimal; how it ended, and the exchanges made.
 
-    At the end ``duals`` give the bound, whatever the end (program.py: ``certified``). Without a solution they are moved
-    until their bound is the cutoff.
+    Its multipliers should be feasible for what is allowed now; where they are not, the search begins from others that
+    are. At the end ``duals`` give the bound, whatever the end (program.py: ``certified``). Without a solution they are
+    moved until their bound is the cutoff.
     """
     num = program.weights.size
-    scale = 0.0
-    for j in allowed.active:
-        scale = max(scale, abs(program.weights[j]))
-    tolerance = _COST * max(scale, 1e-300)
+    tolerance = cost_tolerance(program, allowed)
+    list_columns(program, allowed, basis.pricing)
+    _make_fit(program, allowed, basis, 1e3 * tolerance)
     done = 0
-    age = basis.age
+    age, row = basis.age, basis.row
     while True:
         if done % _LOOK == 0 and is_over(effort.deadline):
             return STOPPED, done
         if age[0] >= _FRESH or (age[0] > 0 and age[0] % _LOOK == 0 and not residual(program, basis) <= _RESIDUAL):
             _renew(program, allowed, basis, tolerance)
-        bound = 0.0
-        for r in range(program.sides.size):
-            bound += program.sides[r] * basis.duals[r]
+        bound = bound_of(program, basis)
         if bound >= effort.cutoff:
             return CUT, done
-        p = _leaving(program, allowed, basis)
+        p = leaving(program, allowed, basis)
         if p < 0:
             if age[0] > 0 and not residual(program, basis) <= _RESIDUAL:
                 _renew(program, allowed, basis, tolerance)
@@ -178,15 +195,14 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         if done >= effort.exchanges:
             return STOPPED, done
         sign = 1.0 if basis.values[p] > 0.0 else -1.0
-        for r in range(basis.row.size):
-            basis.row[r] = basis.inverse[r, p]
-        chosen, step = _entering(program, allowed, basis, sign, tolerance)
+        row[:] = basis.inverse[:, p]
+        chosen, step = entering(program, allowed, basis, sign, tolerance)
         if chosen < 0:
             if age[0] > 0:
                 _renew(program, allowed, basis, tolerance)
                 continue
             # the multipliers can rise for ever; as far as they are asked for is enough
-            _step(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
+            step_along(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
             return INFEASIBLE, done
         if chosen < num:
             coordinates(program, basis, chosen, basis.column)
@@ -195,9 +211,9 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         if abs(basis.column[p]) < SMALL_PIVOT and age[0] > 0:
             _renew(program, allowed, basis, tolerance)
             continue
-        _step(program, allowed, basis, p, sign, step)
+        step_along(program, allowed, basis, p, sign, step)
         if chosen < num:
-            basis.reduced[chosen] = 0.0
+            basis.pricing.reduced[basis.pricing.position[chosen]] = np.inf
         exchange(basis, p, basis.column)
         enter(program, basis, p, chosen)
         done += 1
@@ -205,21 +221,20 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
 
 @njit
 def _renew(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
-    """Compute everything anew; where the multipliers are then not feasible, begin from feasible ones."""
+    """Compute everything anew."""
     refactor(program, allowed, basis)
-    if price(program, allowed, basis) < -1e3 * tolerance:
-        duals = basis.duals.copy()
-        make_feasible(program, allowed, duals)
-        begin_from_duals(program, allowed, duals, basis)
+    _make_fit(program, allowed, basis, 1e3 * tolerance)
 
 
 @njit
-def restart(program: Program, allowed: Allowed, basis: Basis) -> None:
-    """Make a basis fit for `solve_dual` after ``allowed`` has changed: its multipliers must be feasible."""
-    scale = 0.0
-    for j in allowed.active:
-        scale = max(scale, abs(program.weights[j]))
-    if price(program, allowed, basis) < -1e-9 * max(scale, 1e-300):
+def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
+    """Compute the reduced costs; where the multipliers are not feasible, begin from others."""
+    least = price(program, basis.duals, basis.place, basis.pricing)
+    for r in range(basis.duals.size):
+        if allowed.slack[r]:
+            least = min(least, -basis.duals[r])
+    if least < -tolerance:
         duals = basis.duals.copy()
         make_feasible(program, allowed, duals)
         begin_from_duals(program, allowed, duals, basis)
+        price(program, basis.duals, basis.place, basis.pricing)

@@ -6,7 +6,7 @@
     program.solve(columns=relaxed.reduced <= gap)            # warm: a few exchanges from the basis at hand
     program.back()                                           # where the mark is
 
-Kernels that search on their own take the same steps: `begin_from_duals`, `restart`, `solve_dual`, `certified`.
+Kernels that search on their own take the same steps: `begin_from_duals`, `solve_dual`, `certified`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.packing import Packing
-from assoc.packing.simplex.basis import Basis, begin_from_duals, copy_basis, new_basis, price, primal_values
-from assoc.packing.simplex.dual import INFEASIBLE, Effort, restart, solve_dual
+from assoc.packing.simplex.basis import Basis, begin_from_duals, copy_basis, new_basis, primal_values
+from assoc.packing.simplex.dual import INFEASIBLE, Effort, solve_dual
 from assoc.packing.simplex.program import (
     Allowed,
     all_reduced_costs,
     certified,
+    least_reduced,
     make_feasible,
     program_of,
     weight_limit,
@@ -124,7 +125,6 @@ class LinearProgram:
             start = np.zeros(packing.num_rows) if duals is None else duals.copy()
             status, done = self._from_duals(allowed, start, effort)
         else:
-            restart(program, allowed, basis)
             status, done = solve_dual(program, allowed, basis, effort)
         self._begun = True
         found = basis.duals.copy()
@@ -168,7 +168,7 @@ class LinearProgram:
             status, more = solve_dual(program, near, basis, effort)
             done += more
             # the bound of the few is not yet that of all
-            if near is allowed or price(program, allowed, basis) >= -tolerance or more >= effort.exchanges:
+            if near is allowed or least_reduced(program, allowed, basis.duals) >= -tolerance or more >= effort.exchanges:
                 break
             effort = effort._replace(exchanges=effort.exchanges - more)
             few *= _MORE

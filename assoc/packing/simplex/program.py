@@ -31,12 +31,15 @@ class Program(NamedTuple):
         Rows of the columns, one after the other.
     sides : float array, shape (m,)
         Right-hand sides b, whole numbers.
+    width : int
+        Rows of measurements that a column has at the most; they come first, then those of cuts.
     """
 
     weights: Floats
     start: NDArray[np.int64]
     rows: NDArray[np.int32]
     sides: Floats
+    width: int
 
 
 class Allowed(NamedTuple):
@@ -71,15 +74,16 @@ def program_of(packing: PackingArrays) -> Program:
                 rows[place] = cols[j, s]
                 place += 1
         start[j + 1] = place
-    return Program(packing.weights, start, rows, np.ones(packing.slack.size))
+    return Program(packing.weights, start, rows, np.ones(packing.slack.size), num_sensors)
 
 
 @njit
 def reduced_cost(program: Program, duals: Floats, j: int) -> float:
     """Weight of column j less the multipliers of its rows."""
+    start, rows = program.start, program.rows
     value = program.weights[j]
-    for k in range(program.start[j], program.start[j + 1]):
-        value -= duals[program.rows[k]]
+    for k in range(start[j], start[j + 1]):
+        value -= duals[rows[k]]
     return value
 
 
@@ -93,15 +97,28 @@ def all_reduced_costs(program: Program, duals: Floats) -> Floats:
 
 
 @njit
+def least_reduced(program: Program, allowed: Allowed, duals: Floats) -> float:
+    """The least reduced cost of the allowed columns and slack; 0 if none is negative."""
+    least = 0.0
+    for j in allowed.active:
+        least = min(least, reduced_cost(program, duals, j))
+    for r in range(duals.size):
+        if allowed.slack[r]:
+            least = min(least, -duals[r])
+    return least
+
+
+@njit
 def make_feasible(program: Program, allowed: Allowed, duals: Floats) -> None:
     """Lower multipliers until no allowed column has a negative reduced cost, each by what it lacks."""
+    slack, start, rows = allowed.slack, program.start, program.rows
     for r in range(duals.size):
-        if allowed.slack[r] and duals[r] > 0.0:
+        if slack[r] and duals[r] > 0.0:
             duals[r] = 0.0
     for j in allowed.active:
         lack = reduced_cost(program, duals, j)
         if lack < 0.0:
-            duals[program.rows[program.start[j]]] += lack
+            duals[rows[start[j]]] += lack
 
 
 @njit
@@ -111,20 +128,21 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
     What reduced costs lack to zero is charged for as many columns as a solution can have, and what rounding can have
     lost in the sum is taken off.
     """
+    sides, slack, weights, start, rows = program.sides, allowed.slack, program.weights, program.start, program.rows
     total = 0.0
     size = 0.0
     most = 0.0
     for r in range(duals.size):
-        u = min(duals[r], 0.0) if allowed.slack[r] else duals[r]
-        total += program.sides[r] * u
-        size += program.sides[r] * abs(u)
-        most += program.sides[r]
+        u = min(duals[r], 0.0) if slack[r] else duals[r]
+        total += sides[r] * u
+        size += sides[r] * abs(u)
+        most += sides[r]
     least = 0.0
     for j in allowed.active:
-        value = program.weights[j]
-        for k in range(program.start[j], program.start[j + 1]):
-            r = program.rows[k]
-            value -= min(duals[r], 0.0) if allowed.slack[r] else duals[r]
+        value = weights[j]
+        for k in range(start[j], start[j + 1]):
+            r = rows[k]
+            value -= min(duals[r], 0.0) if slack[r] else duals[r]
         least = min(least, value)
     return total + least * most - 1e-15 * size
 

@@ -38,6 +38,8 @@ _HARD = 500
 @dataclass(slots=True)
 class _Task:
     component: Component
+    # what the search of a larger one has proved before this was split off
+    floor: float = -np.inf
     search: BranchAndBound | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
@@ -48,7 +50,9 @@ class _Task:
         component = self.component
         if component.closed and component.packing.granularity:
             return component.weight
-        bound = component.bound if self.search is None else max(component.bound, self.search.lower_bound)
+        bound = max(component.bound, self.floor)
+        if self.search is not None:
+            bound = max(bound, self.search.lower_bound)
         return min(bound, component.weight)
 
     def take_over(self) -> bool:
@@ -59,6 +63,11 @@ class _Task:
         component.weight = search.weight
         component.best = Cover.of(component.packing, search.columns).owner
         return True
+
+    def parts(self, components: list[Component]) -> list[_Task]:
+        """Tasks for what the component fell apart into; together with the covers of the others none is below the bound."""
+        whole = self.component.weight
+        return [_Task(one, self.bound - (whole - one.weight)) for one in components]
 
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
@@ -96,7 +105,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         component = task.component
         if not component.closed and not run.should_stop() and nodes < node_limit:
             if task.search is None:
-                task.search = _branching(component, run)
+                task.search = _branching(component, run, floor=task.floor)
                 component.stalled = 0
             before, bound_before = task.search.nodes, task.bound
             # some ten milliseconds of work between two looks at the clock
@@ -114,7 +123,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 # a better incumbent rules columns out, and what falls apart is searched component by component:
                 # in one search the nodes of independent components multiply
                 smaller = split_component(component) if better else None
-                tasks.extend([task] if smaller is None else [_Task(one) for one in smaller])
+                tasks.extend([task] if smaller is None else task.parts(smaller))
                 risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
                 if better or risen or run.is_silent():
                     _record(run, nodes, weight, bound, tasks)
@@ -137,7 +146,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branching(component: Component, run: Run, cuts: bool = True) -> BranchAndBound:
+def _branching(component: Component, run: Run, cuts: bool = True, floor: float = -np.inf) -> BranchAndBound:
     return BranchAndBound(
         component.packing,
         component.duals,
@@ -146,6 +155,7 @@ def _branching(component: Component, run: Run, cuts: bool = True) -> BranchAndBo
         run.deadline(),
         run.memory_allows,
         cuts=cuts,
+        floor=floor,
     )
 
 

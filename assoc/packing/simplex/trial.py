@@ -1,0 +1,201 @@
+"""Some steps of the dual simplex method from a basis that stays as it is: what a branch would bring.
+
+The inverse is not changed. What the exchanges have made of it is kept as their *etas* (the product form of the
+inverse): after k of them a row or a column of the tableau takes k sums more, which for a few dozen of exchanges is far
+less than changing the inverse each time. The weights of the leaving variables are those of Devex here, as those of the
+steepest edge would need the whole inverse.
+
+References
+----------
+G. B. Dantzig, W. Orchard-Hays, "The product form for the inverse in the simplex method", Mathematical Tables and Other
+Aids to Computation 8 (1954), 64-67.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import njit
+from assoc._types import Floats
+from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, enter
+from assoc.packing.simplex.dual import (
+    CUT,
+    INFEASIBLE,
+    OPTIMAL,
+    STOPPED,
+    Effort,
+    bound_of,
+    cost_tolerance,
+    entering,
+    leaving,
+    step_along,
+)
+from assoc.packing.simplex.pricing import list_columns, price
+from assoc.packing.simplex.program import Allowed, Program
+
+# the least weight of a leaving variable
+_LEAST = 1e-4
+
+
+class Trial(NamedTuple):
+    """A basis at some exchanges from another one; ``K`` of them at the most.
+
+    Attributes
+    ----------
+    basis : Basis
+        All of it but the inverse, which has no elements here.
+    reduced : float array, shape (n,)
+        Reduced costs at the other basis, by position.
+    rows : float array, shape (m, m)
+        The other basis's inverse by rows: that one has it by columns.
+    etas : float array, shape (K, m)
+        Of each exchange what it does to the coordinates of a vector: minus the entering column's over the pivot, and 1
+        over the pivot in its place.
+    pivots : int32 array, shape (K,)
+        The place of each exchange.
+    factors, shares : float array, shape (m,), int32 array, shape (K + 1,)
+        Room: which rows of the other basis's inverse add up to one of this one's, and how much of each (else 0).
+    """
+
+    basis: Basis
+    reduced: Floats
+    rows: NDArray[np.float64]
+    etas: NDArray[np.float64]
+    pivots: NDArray[np.int32]
+    factors: Floats
+    shares: NDArray[np.int32]
+
+
+@njit
+def new_trial(program: Program, exchanges: int) -> Trial:
+    """Room for a trial of so many exchanges."""
+    size = program.sides.size
+    return Trial(
+        basis_without(program, 0), np.empty(program.weights.size), np.zeros((size, size)), np.zeros((exchanges, size)), np.zeros(exchanges, np.int32), np.zeros(size),
+        np.zeros(exchanges + 1, np.int32),
+    )  # fmt: skip
+
+
+@njit
+def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) -> None:
+    """Note the basis from which trials are to start, and what it allows."""
+    pricing = trial.basis.pricing
+    list_columns(program, allowed, pricing)
+    price(program, base.duals, base.place, pricing)
+    trial.reduced[: allowed.active.size] = pricing.reduced[: allowed.active.size]
+    trial.rows[:] = base.inverse.T
+
+
+@njit
+def _tableau_row(trial: Trial, done: int, p: int) -> None:
+    """Fill ``row`` with that of place p in the inverse, after the exchanges done."""
+    factors, shares, row = trial.factors, trial.shares, trial.basis.row
+    etas, rows, pivots = trial.etas, trial.rows, trial.pivots
+    factors[p] = 1.0
+    shares[0] = p
+    count = 1
+    for k in range(done - 1, -1, -1):
+        total = 0.0
+        for i in range(count):
+            total += factors[shares[i]] * etas[k, shares[i]]
+        place = pivots[k]
+        factors[place] = total
+        known = False
+        for i in range(count):
+            known = known or shares[i] == place
+        if not known:
+            shares[count] = place
+            count += 1
+    row[:] = 0.0
+    for i in range(count):
+        place, share = shares[i], factors[shares[i]]
+        for r in range(row.size):
+            row[r] += share * rows[place, r]
+        factors[place] = 0.0
+
+
+@njit
+def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, variable: int) -> None:
+    """Fill ``column`` with the coordinates of a variable in the basis, after the exchanges done."""
+    num, column, etas, pivots = program.weights.size, trial.basis.column, trial.etas, trial.pivots
+    if variable < num:
+        coordinates(program, base, variable, column)
+    else:
+        column[:] = base.inverse[variable - num]
+    for k in range(done):
+        place = pivots[k]
+        share = column[place]
+        if share != 0.0:
+            column[place] = 0.0
+            for i in range(column.size):
+                column[i] += share * etas[k, i]
+
+
+@njit
+def _exchange(trial: Trial, done: int, p: int) -> None:
+    """Let the variable of ``column`` take place p: the eta, the weights, the values."""
+    basis, etas = trial.basis, trial.etas
+    column, values, norms = basis.column, basis.values, basis.norms
+    pivot = column[p]
+    own = norms[p]
+    step = values[p] / pivot
+    for i in range(column.size):
+        ratio = column[i] / pivot
+        etas[done, i] = -ratio
+        if ratio != 0.0:
+            values[i] -= step * column[i]
+            norms[i] = max(norms[i], ratio * ratio * own)
+    etas[done, p] = 1.0 / pivot
+    trial.pivots[done] = p
+    values[p] = step
+    norms[p] = max(own / (pivot * pivot), _LEAST)
+
+
+@njit
+def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effort: Effort) -> int:
+    """Take some steps from the optimal basis that was noted, after ``allowed`` has become less; how that ended.
+
+    Steps are at most as many as the trial has room for, and those of ``effort``. At the end the multipliers give the
+    bound that was reached (to rounding, so that they are to be made feasible).
+    """
+    basis, num = trial.basis, program.weights.size
+    basis.variable[:] = base.variable
+    basis.place[:] = base.place
+    basis.slack_place[:] = base.slack_place
+    basis.norms[:] = base.norms
+    basis.values[:] = base.values
+    basis.duals[:] = base.duals
+    pricing, columns, at_first = basis.pricing, allowed.columns, trial.reduced
+    reduced, column = pricing.reduced, pricing.column
+    for a in range(pricing.count[0]):
+        reduced[a] = at_first[a] if columns[column[a]] else np.inf
+    tolerance = cost_tolerance(program, allowed)
+    done = 0
+    while True:
+        bound = bound_of(program, basis)
+        if bound >= effort.cutoff:
+            return CUT
+        p = leaving(program, allowed, basis)
+        if p < 0:
+            return OPTIMAL
+        if done >= min(effort.exchanges, trial.pivots.size):
+            return STOPPED
+        sign = 1.0 if basis.values[p] > 0.0 else -1.0
+        _tableau_row(trial, done, p)
+        chosen, step = entering(program, allowed, basis, sign, tolerance)
+        if chosen < 0:
+            # the multipliers can rise for ever; as far as they are asked for is enough
+            step_along(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
+            return INFEASIBLE
+        _tableau_column(program, base, trial, done, chosen)
+        if abs(basis.column[p]) < SMALL_PIVOT:
+            return STOPPED
+        step_along(program, allowed, basis, p, sign, step)
+        if chosen < num:
+            reduced[pricing.position[chosen]] = np.inf
+        _exchange(trial, done, p)
+        enter(program, basis, p, chosen)
+        done += 1
