@@ -234,7 +234,7 @@ def test_a_certificate_holds_for_any_multipliers():
 def test_a_row_with_a_side_and_a_coefficient_of_two():
     """Columns a, b over the rows 0 (side 1) and 1 (side 3, b twice): min -2a - 3b is at a = 0, b = 1."""
     program = Program(
-        np.array([-2.0, -3.0]), np.array([0, 2, 5]), np.array([0, 1, 0, 1, 1], dtype=np.int32), np.array([1.0, 1.0])
+        np.array([-2.0, -3.0]), np.array([0, 2, 5]), np.array([0, 1, 0, 1, 1], dtype=np.int32), np.array([1.0, 1.0]), 1
     )
     allowed = all_allowed(program, np.ones(2, dtype=bool))
     basis = new_basis(program)

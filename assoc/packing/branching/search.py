@@ -5,6 +5,11 @@ its parent's basis by the dual simplex method (packing/simplex); its bound is co
 that it holds whatever rounding did there. Columns and slack whose reduced cost exceeds the gap are dropped. Branching
 (pairs.py) asks of two measurements of different sensors whether they have the same source: *together* drops the
 columns with only one of them, *apart* those with both.
+
+A search that is meant to go to the end makes several *passes*. Each looks for solutions below an *aim*, near the root's
+bound at first, as if it were the incumbent's weight: few columns are left and few nodes, whatever the incumbent. Where
+there is none, that is proved, and the next aim is farther off. What a pass finds is better than anything left, and what
+the passes before the last one cost is little, as trees grow fast with the gap.
 """
 
 from __future__ import annotations
@@ -39,19 +44,25 @@ from assoc.packing.run import memory_allows
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
 from assoc.packing.simplex.program import Allowed
 
+# the first aim and the last one, as shares of the way from the root's bound to the incumbent, and how they grow
+_FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
+
 
 class Limits(NamedTuple):
-    """How much better a solution must be, the weight below which it is looked for, how many nodes are searched, and
-    when time is over (clock.py)."""
+    """How much better than the incumbent and lighter than what a solution must be, and where the search stops.
+
+    Attributes
+    ----------
+    tolerance, aim : float
+    nodes : int
+    deadline : float
+        By the kernels' clock (clock.py).
+    """
 
     tolerance: float
     aim: float
     nodes: int
     deadline: float
-
-
-import os
-_FIRST, _GROWTH, _LAST = float(os.environ.get('FIRST', 0.125)), float(os.environ.get('GROWTH', 2.0)), float(os.environ.get('LAST', 0.7))
 
 
 class BranchAndBound:
@@ -71,8 +82,10 @@ class BranchAndBound:
         When time is over, by the kernels' clock (clock.py): the node at work stays open.
     memory_allows : callable, optional
         Whether the search may take so many bytes more (`Run.memory_allows`).
-    cuts : bool
-        Whether the root is made tighter by cuts first: for searches that are meant to go to the end.
+    to_the_end : bool
+        Whether the search is meant to go to the end: then its root is made tighter by cuts, and it makes passes.
+    floor : float
+        It is known that no solution weighs less; a search to the end aims beyond that at once.
     """
 
     def __init__(
@@ -84,7 +97,7 @@ class BranchAndBound:
         deadline: float = np.inf,
         memory_allows: Callable[[float], bool] = memory_allows,
         *,
-        cuts: bool = False,
+        to_the_end: bool = False,
         floor: float = -np.inf,
     ) -> None:
         wait_for_kernels()
@@ -95,7 +108,7 @@ class BranchAndBound:
         self.columns: NDArray[np.int32] | None = None
         self.nodes = 0
         self._memory_allows = memory_allows
-        self._cuts = cuts
+        self._to_the_end = to_the_end
         self._root = plain_root(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
@@ -143,11 +156,11 @@ class BranchAndBound:
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
         rows, columns = self._packing.num_rows, self._packing.num_columns
-        if not self._memory_allows(work_memory(MOST_ROWS * rows if self._cuts else rows, columns)):
+        if not self._memory_allows(work_memory(MOST_ROWS * rows if self._to_the_end else rows, columns)):
             self._open.give_up()
             return False
         root = self._root
-        if self._cuts:
+        if self._to_the_end:
             root = root_with_cuts(self._packing, root.duals, self.weight - self.tolerance, self.deadline)
             self._root = root
             self._open = OpenNodes(root)
@@ -165,8 +178,9 @@ class BranchAndBound:
         """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""
         root = float(self._root.program.sides @ self._root.duals)
         gap = self.weight - root
-        share = max(_FIRST, _GROWTH * (self._floor - root) / gap) if gap < np.inf else np.inf
-        self._aim = root + share * gap if share < _LAST else np.inf
+        aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
+        # without an incumbent there is nothing to go by
+        self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf
 
 
 @njit

@@ -32,7 +32,7 @@ def bound_of_component(component: Component, run: Run) -> float:
         component.tolerance,
         run.deadline(),
         run.memory_allows,
-        cuts=True,
+        to_the_end=True,
     )
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(50)

@@ -115,7 +115,7 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     Fills ``entries`` with the row of the tableau, of the listed columns.
     """
     row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
-    entries, reduced, count = pricing.entries, pricing.reduced, pricing.count[0]
+    entries, reduced, count = pricing.entries, pricing.reduced, pricing.listed[0]
     entries[:count] = 0.0
     sum_rows(row, pricing, entries)
     least = np.inf
@@ -155,7 +155,7 @@ def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: f
     """Move the multipliers along the row of place p, and the reduced costs with them."""
     pricing, row, duals = basis.pricing, basis.row, basis.duals
     reduced, entries = pricing.reduced, pricing.entries
-    for a in range(pricing.count[0]):
+    for a in range(pricing.listed[0]):
         reduced[a] -= step * entries[a]
     for r in range(row.size):
         duals[r] += sign * step * row[r]

@@ -167,8 +167,10 @@ class LinearProgram:
             begin_from_duals(program, near, duals, basis)
             status, more = solve_dual(program, near, basis, effort)
             done += more
+            if near is allowed or more >= effort.exchanges:
+                break
             # the bound of the few is not yet that of all
-            if near is allowed or least_reduced(program, allowed, basis.duals) >= -tolerance or more >= effort.exchanges:
+            if least_reduced(program, allowed, basis.duals) >= -tolerance:
                 break
             effort = effort._replace(exchanges=effort.exchanges - more)
             few *= _MORE

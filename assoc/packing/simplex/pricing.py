@@ -18,7 +18,7 @@ from assoc.packing.simplex.program import Allowed, Program
 
 
 class Pricing(NamedTuple):
-    """Room for ``n`` columns, of which ``count[0]`` are listed.
+    """Room for ``n`` columns, of which ``listed[0]`` are listed.
 
     Attributes
     ----------
@@ -29,14 +29,15 @@ class Pricing(NamedTuple):
     codes : uint32 array, shape (width, n)
         Rows of the columns, by position; the number of rows, m, where a column has fewer.
     extra_position, extra_row : uint32 arrays
-        Further rows: those of cuts; ``count[1]`` of them.
+        Further rows: those of cuts; ``listed[1]`` of them.
     reduced : float array, shape (n,)
         Reduced costs by position; ``inf``: not to be chosen.
     entries : float array, shape (n,)
         A row of the tableau, by position.
     terms : float array, shape (m + 1,)
         Room for what is summed up, row by row; the last is 0.
-    count : int64 array, shape (2,)
+    listed : int64 array, shape (2,)
+        How many columns and how many further rows are listed.
     """
 
     column: NDArray[np.int32]
@@ -47,7 +48,7 @@ class Pricing(NamedTuple):
     reduced: Floats
     entries: Floats
     terms: Floats
-    count: NDArray[np.int64]
+    listed: NDArray[np.int64]
 
 
 @njit
@@ -88,27 +89,27 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
             extra_row[extra] = rows[place]
             extra += 1
             place += 1
-    pricing.count[0] = active.size
-    pricing.count[1] = extra
+    pricing.listed[0] = active.size
+    pricing.listed[1] = extra
 
 
 @njit
 def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
     """Add to ``sums``, by position, the terms of the rows of each column."""
     pricing.terms[: terms.size] = terms
-    padded, codes, count = pricing.terms, pricing.codes, pricing.count[0]
+    padded, codes, count = pricing.terms, pricing.codes, pricing.listed[0]
     for s in range(codes.shape[0]):
         for a in range(count):
             sums[a] += padded[codes[s, a]]
     position, row = pricing.extra_position, pricing.extra_row
-    for e in range(pricing.count[1]):
+    for e in range(pricing.listed[1]):
         sums[position[e]] += padded[row[e]]
 
 
 @njit
 def price(program: Program, duals: Floats, place: NDArray[np.int32], pricing: Pricing) -> float:
     """Compute the reduced costs of the listed columns; the least of those that are not in the basis."""
-    reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.count[0]
+    reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]
     reduced[:count] = 0.0
     sum_rows(duals, pricing, reduced)
     least = 0.0

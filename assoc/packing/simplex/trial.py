@@ -74,8 +74,8 @@ def new_trial(program: Program, exchanges: int) -> Trial:
     """Room for a trial of so many exchanges."""
     size = program.sides.size
     return Trial(
-        basis_without(program, 0), np.empty(program.weights.size), np.zeros((size, size)), np.zeros((exchanges, size)), np.zeros(exchanges, np.int32), np.zeros(size),
-        np.zeros(exchanges + 1, np.int32),
+        basis_without(program, 0), np.empty(program.weights.size), np.empty((size, size)),
+        np.zeros((exchanges, size)), np.zeros(exchanges, np.int32), np.zeros(size), np.zeros(exchanges + 1, np.int32),
     )  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effo
     basis.duals[:] = base.duals
     pricing, columns, at_first = basis.pricing, allowed.columns, trial.reduced
     reduced, column = pricing.reduced, pricing.column
-    for a in range(pricing.count[0]):
+    for a in range(pricing.listed[0]):
         reduced[a] = at_first[a] if columns[column[a]] else np.inf
     tolerance = cost_tolerance(program, allowed)
     done = 0

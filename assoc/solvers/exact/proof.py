@@ -65,9 +65,13 @@ class _Task:
         return True
 
     def parts(self, components: list[Component]) -> list[_Task]:
-        """Tasks for what the component fell apart into; together with the covers of the others none is below the bound."""
+        """Tasks for what the component fell apart into, each with what the bound says of it.
+
+        A cover of one with the best covers of the others is a cover of the whole, and weighs no less than the bound.
+        """
         whole = self.component.weight
-        return [_Task(one, self.bound - (whole - one.weight)) for one in components]
+        rounding = 1e-12 * sum(abs(one.weight) for one in components) + 1e-12 * abs(whole)
+        return [_Task(one, self.bound - (whole - one.weight) - rounding) for one in components]
 
 
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
@@ -146,7 +150,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
 
-def _branching(component: Component, run: Run, cuts: bool = True, floor: float = -np.inf) -> BranchAndBound:
+def _branching(component: Component, run: Run, *, to_the_end: bool = True, floor: float = -np.inf) -> BranchAndBound:
     return BranchAndBound(
         component.packing,
         component.duals,
@@ -154,7 +158,7 @@ def _branching(component: Component, run: Run, cuts: bool = True, floor: float =
         component.tolerance,
         run.deadline(),
         run.memory_allows,
-        cuts=cuts,
+        to_the_end=to_the_end,
         floor=floor,
     )
 
@@ -164,7 +168,7 @@ def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
     task = _Task(component)
     if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
         return task
-    task.search = _branching(component, run, cuts=False)
+    task.search = _branching(component, run, to_the_end=False)
     task.search.run(nodes)
     task.take_over()
     return task
