@@ -300,21 +300,3 @@ def _covered(core, j):
     slack = core.slack.copy()
     slack[core.cols[j][core.cols[j] >= 0]] = False
     return slack
-
-
-def test_a_dive_goes_on_where_too_much_was_left(priced, monkeypatch):
-    """A search that does not end and finds nothing is followed by one of fewer rows, until one ends or finds."""
-    nothing, something = np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32)
-    for answers in ([(nothing, False), (nothing, True)], [(nothing, False), (something, False)], [(something, False)]):
-        left = iter(answers)
-        rows = []
-        monkeypatch.setattr(
-            _Descent, "completed", lambda self, *_, left=left, rows=rows: rows.append(self.open_rows) or next(left)
-        )
-        diver = Diver(priced, np.inf)
-        diver.share = 0.6
-        diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), np.inf, np.inf)
-        assert len(rows) == len(answers) and rows == sorted(rows, reverse=True)
-        assert len(rows) == 1 or rows[1] < rows[0]
-        # only the first search says how much may be left
-        assert diver.share == pytest.approx(0.6 - diving._SHRINK)

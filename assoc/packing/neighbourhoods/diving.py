@@ -24,7 +24,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.clock import is_over
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.search import BranchAndBound
@@ -47,8 +46,6 @@ _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
 # nodes of one such search
 _NODES = 8
-# share of the open rows that is left when a dive goes on after a search that found nothing in time
-_DEEPER = 0.7
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
 
@@ -103,24 +100,7 @@ class Diver:
         """
         self._program.back()
         at = _Descent(self._core, self._program, self._root, cutoff)
-        self._descend(at, self.share * self._core.num_rows, trail, strictness, rng, deadline)
-        found, done = at.completed(self._tolerance, deadline)
-        self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
-        while not (done or found.size or is_over(deadline)):
-            # too much was left: the dive goes on from here
-            before = at.open_rows
-            self._descend(at, _DEEPER * before, trail, strictness, rng, deadline)
-            if at.open_rows == before:
-                break
-            found, done = at.completed(self._tolerance, deadline)
-        owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
-        own_all(self._packing.cols, self._core.origin[np.concatenate([at.fixed, found])], owner)
-        return owner
-
-    def _descend(
-        self, at: _Descent, left: float, trail: Floats, strictness: float, rng: np.random.Generator, deadline: float
-    ) -> None:
-        """Fix columns until so many rows are left, nothing is fractional, or nothing below the cutoff could follow."""
+        left = self.share * self._core.num_rows
         while at.open_rows > left and at.relaxed.status == OPTIMAL:
             columns = at.open_columns()
             chances = trail[self._core.origin[columns]] * at.relaxed.primal[columns] ** strictness
@@ -128,6 +108,11 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
+        found, done = at.completed(self._tolerance, deadline)
+        self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
+        owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
+        own_all(self._packing.cols, self._core.origin[np.concatenate([at.fixed, found])], owner)
+        return owner
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -85,13 +85,6 @@ FAULTS = (
         "        return True\n",
         _OF_DIVES,
     ),
-    Fault(
-        "a dive whose search found nothing ends",
-        _DIVER,
-        "while not (done or",
-        "while not (True or",
-        _OF_DIVES,
-    ),
     Fault("dives end at once", _DIVER, "while at.open_rows > left and", "while False and", _OF_DIVES),
     Fault(
         "a diver draws what is likely, always", _DIVER, "rng.gumbel(size=np.count_nonzero(likely))", "0.0", _OF_DIVES
