@@ -39,9 +39,9 @@ _LEAST, _MOST = 30, 900
 _CORE = 40
 # of the rows that are still to be covered by choices: those covered before the program is solved again
 _BATCH = 0.3
-# rows that are left to branch and bound at first; shares of all rows at the least and at the most (all would be an
-# exact solver), and how they change
-_START = 100
+# shares of the rows that are left to branch and bound: at first (but so many rows), at the least and at the most (all
+# would be an exact solver), and how they change
+_START, _ROWS = 0.35, 40
 _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
 # nodes of one such search
@@ -71,7 +71,7 @@ class Diver:
         self._program = LinearProgram(self._core)
         self._root = self._program.solve(duals=priced.duals[self._core.row_origin], deadline=deadline)
         self._program.mark()
-        self.share = min(max(_START / self._core.num_rows, _LOWEST), _HIGHEST)
+        self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     @staticmethod
     def pays(packing: Packing) -> bool:
