@@ -198,7 +198,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
     count_found = -1
     nodes = 0
     # the node whose basis is at work; not a literal -1: numba would compile what it is given to for that, too
-    at_work = np.int64(-1)
+    at_work: Any = np.int64(-1)
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
         if not has_room(stack, top):
