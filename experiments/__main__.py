@@ -161,7 +161,7 @@ EXPERIMENTS = (
     Experiment(
         "cold_start",
         "what a user waits for after an installation: make bench-cold",
-        "docs/start.md (first-call); with --publish experiments/results/cold_start.json",
+        "docs/start.md (first-call), once published with --publish",
     ),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),
