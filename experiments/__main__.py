@@ -158,7 +158,11 @@ EXPERIMENTS = (
         "time of a parameter study besides its solves",
         "docs/sweeps.md (overhead); with --publish experiments/results/sweep_overhead.json",
     ),
-    Experiment("cold_start", "what a user waits for after an installation", "nothing in the pages: make bench-cold"),
+    Experiment(
+        "cold_start",
+        "what a user waits for after an installation: make bench-cold",
+        "docs/start.md (first-call), once published with --publish",
+    ),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),
 )

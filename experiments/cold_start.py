@@ -1,17 +1,19 @@
 """How long a user waits after an installation: commands with an empty folder of compiled kernels, each several times.
 
-    python -m experiments.cold_start [--wheel PYTHON] [--runs N] [--json FILE] [--publish]        (make bench-cold)
+    python -m experiments.cold_start [--wheel FILE] [--runs N] [--json FILE] [--publish]        (make bench-cold)
 
-Each run starts from an empty cache of its own, as a fresh clone does, and is followed by a second one with the cache
-that the first left. ``--wheel`` names the Python of an environment where a wheel with compiled kernels is installed
-(``make dist``): the same commands there, with an empty cache. Commands run at a terminal, where a row is printed as
-each scan is finished. Wall seconds say what a user feels on two idle cores; processor seconds are of the command and
-the processes that it started.
+Each run starts from an empty cache of its own, as a fresh clone does, and is followed by a second, warm one with the
+cache that the first left. ``--wheel`` names a wheel, such as one with compiled kernels (``make dist``): it is installed
+with its dependencies into an empty environment (this needs a network, or an index that pip knows; nothing comes from
+pip's cache), each package is weighed, and the same commands run there. Commands run at a terminal, where a row is
+printed as each scan is finished. Wall seconds say what a user feels on two idle cores; processor seconds are of the
+command and the processes that it started.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import pty
 import re
@@ -45,6 +47,18 @@ FIRST = 5.0
 # the row of scan 0, without the colours
 _ROW = re.compile(rb"[\r\n]\s*0\s+\d")
 _COLOURS = re.compile(rb"\x1b\[[0-9;?]*[a-zA-Z]")
+
+
+# bytes of each installed package, what came with the environment left out
+_WEIGH = """
+import json
+from importlib import metadata
+sizes = {}
+for one in metadata.distributions():
+    files = [one.locate_file(name) for name in one.files or ()]
+    sizes[f"{one.name} {one.version}"] = sum(path.stat().st_size for path in files if path.is_file())
+print(json.dumps({name: size for name, size in sizes.items() if name.split()[0] not in ("pip", "setuptools")}))
+"""
 
 
 class Seconds(NamedTuple):
@@ -99,19 +113,48 @@ def runs_of(python: str, words: list[str], folder: Path, runs: int) -> dict[str,
     return found
 
 
-def experiment(runs: int, wheel: str | None) -> list[Claim]:
+def installation(wheel: Path, folder: Path) -> tuple[str, list[Claim]]:
+    """Install a wheel into an empty environment: its Python, how long that took, and what each package weighs.
+
+    Raises
+    ------
+    RuntimeError
+        It cannot be installed.
+    """
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    python = str(folder / "bin" / "python")
+    started = time.perf_counter()
+    command = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-cache-dir", str(wheel)]
+    if subprocess.run(command, check=False).returncode:
+        raise RuntimeError(f"{wheel} cannot be installed")
+    seconds = time.perf_counter() - started
+    weighed = subprocess.run([python, "-c", _WEIGH], check=True, capture_output=True, text=True).stdout
+    sizes = sorted(json.loads(weighed).items(), key=lambda item: -item[1])
+    claims = [Claim("pip install, wall", "s", ours=seconds), Claim("wheel", "MB", ours=wheel.stat().st_size / 1e6)]
+    claims += [Claim("installed, all", "MB", ours=sum(size for _, size in sizes) / 1e6)]
+    claims += [Claim(f"installed, {name}", "MB", ours=size / 1e6) for name, size in sizes]
+    for claim in claims:
+        print(f"{claim.quantity:38s} {claim.ours:8.1f} {claim.unit}", flush=True)
+    return python, claims
+
+
+def experiment(runs: int, wheel: Path | None) -> list[Claim]:
     """Measure all commands; prints a row for each."""
     claims = []
-    print(f"{'median seconds of ' + str(runs):38s} {'wall':>8} {'cpu':>8} {'first scan':>12}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        installed = None
+        if wheel is not None:
+            installed, claims = installation(wheel, folder / "env")
+        print(f"{'median seconds of ' + str(runs):38s} {'wall':>8} {'cpu':>8} {'first scan':>12}")
         simulate("three-radar", seed=0).save(folder / "easy.npz")
         simulate("bearing-only", seed=0, targets=20, scans=1).save(folder / "hard.npz")
         for label, words in COMMANDS.items():
             clone = runs_of(sys.executable, words, folder, runs)
             ways = {"fresh clone": clone["cold"], "again": clone["warm"]}
-            if wheel is not None:
-                ways["wheel"] = runs_of(wheel, words, folder, runs)["cold"]
+            if installed is not None:
+                shipped = runs_of(installed, words, folder, runs)
+                ways |= {"wheel": shipped["cold"], "wheel, again": shipped["warm"]}
             print(label)
             for way, measured in ways.items():
                 goals = (GOALS[label], None, FIRST) if way == "fresh clone" else (None, None, None)
@@ -141,13 +184,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m experiments.cold_start", description="What a user waits for after an installation."
     )
-    parser.add_argument("--wheel", metavar="PYTHON", help="Python of an environment with an installed wheel")
+    parser.add_argument("--wheel", type=Path, metavar="FILE", help="a wheel: installed, weighed, and measured as well")
     parser.add_argument("--runs", type=int, default=3, metavar="N", help="runs of each command (default 3)")
     parser.add_argument("--json", metavar="FILE", help="write the seconds here")
     parser.add_argument("--publish", action="store_true", help="write the result file that the pages are made from")
     chosen = parser.parse_args(arguments)
     if chosen.runs < 1:
         parser.error("--runs must be at least 1")
+    if chosen.wheel is not None and not (chosen.wheel.suffix == ".whl" and chosen.wheel.is_file()):
+        parser.error(f"--wheel: {chosen.wheel} is no wheel, expected a file that ends with .whl")
     claims = experiment(chosen.runs, chosen.wheel)
     for path in (chosen.json, str(result_file("cold_start")) if chosen.publish else None):
         if path:

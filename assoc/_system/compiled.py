@@ -29,7 +29,8 @@ from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+# nobody calls kernels as functions of C: what would let them is left out
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 _CACHES: Any = caching.CacheImpl
 _CONFIG: Any = numba.config
@@ -101,7 +102,7 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
 def njit(
     function: Callable[..., Any], *, small: int = SMALL, stand_in: Callable[..., Any] | None = None
 ) -> Any:
-    """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True`` and ``error_model="numpy"``.
+    """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True``.
 
     Until it is compiled, calls with arrays of at most ``small`` elements together are interpreted (interpreted.py), by
     ``stand_in`` where that is given.

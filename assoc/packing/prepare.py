@@ -69,8 +69,10 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     else:
         rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
         slack = np.repeat(sizes > sizes.min(), sizes)
-        arrays = assembled(rows, problem.costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
-        whole = _whole_numbers(problem.costs)
+        # the problem's are read-only: numba would compile kernels for those, too
+        costs = problem.costs.copy()
+        arrays = assembled(rows, costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
+        whole = _whole_numbers(costs)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
     packing = Packing(*(*arrays, 1.0 if whole else 0.0))
     prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)

@@ -209,7 +209,7 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
                 for t in range(s + 1, cols.shape[1]):
                     if cols[j, s] >= 0 and cols[j, t] >= 0 and (allowed.slack[cols[j, s]] or allowed.slack[cols[j, t]]):
                         one, two = int(cols[j, s]), int(cols[j, t])
-    return (np.int32(one), np.int32(two)), NEITHER, True
+    return (one, two), NEITHER, True
 
 
 @search_njit
@@ -220,8 +220,8 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
     """
     deadline = wanted.deadline
     nodes = 0
-    # the node whose basis is at work
-    at_work = -1
+    # the node whose basis is at work; not a literal -1: numba would compile what it is given to for that, too
+    at_work: Any = np.int64(-1)
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
         if not has_room(stack, top) or is_over(deadline):

@@ -20,6 +20,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "papers.md": {name.replace("_", "-"): make for name, make in coverage.TABLES.items()},
     "filters.md": measured.FILTERS,
     "recordings.md": measured.RECORDINGS,
+    "start.md": measured.START,
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
     "ant_colony.md": metaheuristics.ANT_COLONY,

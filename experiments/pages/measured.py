@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.common.claims import Claim
-from experiments.common.results import Results, number, table
+from experiments.common.results import Results, number, result_file, table
 
 SCENARIOS = tuple("CDEFGH")
 
@@ -148,6 +148,24 @@ def overhead() -> str:
     return table(["ms", *parts], rows)
 
 
+def first_call() -> str:
+    """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
+    if not result_file("cold_start").exists():
+        return "`make bench-cold` measures the seconds on your machine."
+    r = Results("cold_start")
+    labels = [c.quantity.removesuffix(": fresh clone, wall") for c in r.claims if c.quantity.endswith("clone, wall")]
+    rows = []
+    for label in labels:
+        cells = []
+        for way in ("fresh clone", "wheel", "again"):
+            first = f"{label}: {way}, first scan, wall"
+            cells.append(" / ".join(_judged(r[q], 2) for q in (first, f"{label}: {way}, wall") if q in r))
+        goal = r[f"{label}: fresh clone, wall"].band
+        assert goal is not None
+        rows.append([label, *cells, number(r[f"{label}: fresh clone, cpu"].ours, 2), f"{goal[1]:g}"])
+    return table(["first scan / all, s", "fresh clone", "wheel", "again", "clone, CPU time", "goal, clone"], rows)
+
+
 def traffic() -> str:
     """CT, MT and IT by grouping, clock and tracker."""
     r = Results("papers.clustering_time_window")
@@ -263,5 +281,6 @@ FILTERS = {
 }
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
+START = {"first-call": first_call}
 CONCEPTS = {"prior": prior}
 TRACKING = {"warm-starts": warm_starts}

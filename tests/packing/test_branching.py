@@ -244,9 +244,10 @@ def test_first_solution_is_one_or_there_is_none():
 def test_search_for_a_first_solution_ends(monkeypatch):
     """Without dummies even a first solution is hard to find: heuristics do not search for ever, and say so."""
     rng = np.random.default_rng(1)
-    planted = np.stack([rng.permutation(15) + 1 for _ in range(4)], axis=1)
-    tuples = np.unique(np.vstack([planted, rng.integers(1, 16, (120, 4))]), axis=0)
-    problem = AssignmentProblem(tuples, rng.random(len(tuples)), [15] * 4, dummy=False)
+    planted = np.stack([rng.permutation(14) + 1 for _ in range(4)], axis=1)
+    # so many that dives in the linear program end without a solution, too
+    tuples = np.unique(np.vstack([planted, rng.integers(1, 15, (160, 4))]), axis=0)
+    problem = AssignmentProblem(tuples, rng.random(len(tuples)), [14] * 4, dummy=False)
     assert assign(problem, "genetic", iterations=5).cost > 0.0
     monkeypatch.setattr("assoc.packing.branching.feasibility._NODES", 0)
     with pytest.raises(InfeasibleError, match="no complete solution was found in 0 nodes; solver exact"):

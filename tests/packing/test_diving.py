@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.sparse import coo_matrix
 
 import assoc
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
 from assoc.packing.run import Run
-from assoc.packing.simplex.dual import OPTIMAL
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.simulation import simulate
 from assoc.solvers.aco.max_min import Colony
@@ -46,6 +47,8 @@ def test_dives_are_near_the_bound(priced):
     assert Diver.pays(priced.packing)
     left = [dive(priced, seed)[1] - priced.bound for seed in range(8)]
     assert min(left) >= -1e-9
+    # what is left to branch and bound at first is most of so small a component
+    assert Diver(priced, np.inf).share * priced.packing.num_rows >= 39.0
     rng = np.random.default_rng(0)
     greedy = [priced.weight_of(priced.random_cover(8.0, rng)) - priced.bound for _ in range(20)]
     assert np.median(left) < 0.5 * np.median(greedy)
@@ -75,7 +78,7 @@ def test_what_is_drawn_is_fixed(priced, monkeypatch):
     assert counts == sorted({*counts}), "each step fixes more rows"
 
 
-def test_pheromone_and_values_decide(priced):
+def test_pheromone_and_values_decide(priced, monkeypatch):
     """The first draw has the probabilities of the docstring: counted over many dives."""
     diver = Diver(priced, np.inf)
     core, primal = diver._core, diver._root.primal
@@ -86,18 +89,23 @@ def test_pheromone_and_values_decide(priced):
     expected = trail[core.origin[open_columns]] * primal[open_columns] ** 2.0
     expected /= expected.sum()
     drawn = []
-
-    class Watched:
-        """Notes the first draw and ends the dive."""
-
-        def choice(self, values, p):
-            drawn.append((values, p))
-            raise StopIteration
-
-    with pytest.raises(StopIteration):
-        diver.dive(trail, 2.0, Watched(), np.inf, np.inf)
-    np.testing.assert_array_equal(drawn[0][0], open_columns)
-    np.testing.assert_allclose(drawn[0][1], expected, rtol=1e-12)
+    monkeypatch.setattr(_Descent, "fix", lambda self, columns, rows, deadline: bool(drawn.append(columns)))
+    monkeypatch.setattr(_Descent, "completed", lambda self, *_: (np.zeros(0, dtype=np.int32), True))
+    rng, dives = np.random.default_rng(4), 4000
+    for _ in range(dives):
+        diver.dive(trail, 2.0, rng, np.inf, np.inf)
+    # every column once, the likely ones early
+    assert all(sorted(columns.tolist()) == open_columns.tolist() for columns in drawn[:50])
+    first = np.array([columns[0] for columns in drawn])
+    share = np.array([(first == j).mean() for j in open_columns])
+    assert (np.abs(share - expected) <= 5.0 * np.sqrt(expected / dives) + 1e-3).all()
+    # and the second draw is one among those left
+    likely = int(open_columns[np.argmax(expected)])
+    second = np.array([columns[1] for columns in drawn if columns[0] == likely])
+    chance = np.where(open_columns == likely, 0.0, expected)
+    chance /= chance.sum()
+    among = np.array([(second == j).mean() for j in open_columns])
+    assert (np.abs(among - chance) <= 5.0 * np.sqrt(chance / second.size) + 2e-3).all()
 
 
 def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
@@ -105,6 +113,7 @@ def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
     steps = []
     for cutoff in (np.inf, priced.bound + 1e-6):
         diver = Diver(priced, np.inf)
+        diver.share = diving._LOWEST
         solve, count = diver._program.solve, []
         monkeypatch.setattr(
             diver._program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
@@ -167,48 +176,120 @@ def test_others_dive_once_an_iteration(searcher, monkeypatch):
     assert called == [before + 1, before + 2]
 
 
-def test_what_costs_too_much_is_excluded(priced):
-    """A column whose fixing lifts the bound beyond the aim goes, and all else is as it was."""
-    excluded = 0
-    for share in (1e-3, 0.1):
-        diver = Diver(priced, np.inf)
-        root, core = diver._root, diver._core
-        at = _Descent(core, diver._program, root, root.bound + 10.0 * share)
-        assert at._aim == pytest.approx(root.bound + 4.0 * share)
-        for j in at.open_columns()[:4]:
-            alone = LinearProgram(core).solve(columns=_fixed(core, j), slack=_covered(core, j)).bound
-            at = _Descent(core, diver._program, root, root.bound + 10.0 * share)
-            diver._program.back()
-            at.step(int(j), np.inf)
-            if alone > at._aim + 1e-9:
-                assert not at._columns[j] and not at._fixed[j]
-                assert (at._slack == core.slack).all() and at._open_rows == core.num_rows
-                # the aim is as low as it may be
-                without = LinearProgram(core).solve(columns=np.arange(core.num_columns) != j).bound
-                assert at.relaxed.status == OPTIMAL and at.relaxed.bound == pytest.approx(without, abs=1e-7)
-                assert without <= at._aim + 1e-9
-                excluded += 1
-            else:
-                assert at._fixed[j] and at.relaxed.bound == pytest.approx(alone, abs=1e-7)
-                assert at._open_rows == core.num_rows - (core.cols[j] >= 0).sum()
-    assert excluded > 2
-
-
-def test_an_aim_that_nothing_meets_is_raised(priced):
-    """By doubling, up to the cutoff, beyond which the dive has nothing to find."""
+def test_columns_are_fixed_in_their_order(priced):
+    """Those that fit, until they cover enough rows; the program is then that of what is left."""
     diver = Diver(priced, np.inf)
-    root = diver._root
-    j = int(np.argmax(np.where(root.primal < 0.99, root.primal, 0.0)))
-    for cutoff, found in ((root.bound + 50.0, True), (root.bound - 1e-6, False)):
+    root, core = diver._root, diver._core
+    drawn = np.random.default_rng(0).permutation(_Descent(core, diver._program, root, np.inf).open_columns())
+    for rows in (0.0, 5.0, 100.0):
         diver._program.back()
-        at = _Descent(diver._core, diver._program, root, cutoff)
-        at._aim = root.bound - 1e-3
-        at.step(j, np.inf)
-        assert (at.relaxed.status == OPTIMAL) is found
-        assert at._aim <= cutoff and (found or at._aim == cutoff)
+        at = _Descent(core, diver._program, root, np.inf)
+        assert at.fix(drawn, rows, np.inf)
+        covered, fixed = set(), []
+        for j in drawn:
+            own = set(core.cols[j][core.cols[j] >= 0].tolist())
+            if not covered & own and (not fixed or len(covered) < rows):
+                covered |= own
+                fixed.append(int(j))
+        assert at._fixed == fixed and at.open_rows == core.num_rows - len(covered)
+        columns = np.logical_and.reduce([_left(core, j) for j in fixed])
+        np.testing.assert_array_equal(at._columns, columns)
+        slack = core.slack & ~np.isin(np.arange(core.num_rows), list(covered))
+        assert at.relaxed.bound == pytest.approx(
+            LinearProgram(core).solve(columns=columns, slack=slack).bound, abs=1e-7
+        )
 
 
-def _fixed(core, j):
+def test_what_leaves_nothing_better_is_not_fixed(priced):
+    """Then all is as it was before."""
+    diver = Diver(priced, np.inf)
+    root, core = diver._root, diver._core
+    fixed = refused = 0
+    for j in _Descent(core, diver._program, root, np.inf).open_columns()[:12]:
+        diver._program.back()
+        alone = LinearProgram(core).solve(columns=_left(core, j), slack=_covered(core, j)).bound
+        for cutoff in (alone + 1.0, alone - 1e-6):
+            # no cover below the cutoff has columns of larger reduced cost: they go, too
+            light = root.reduced <= cutoff - root.bound
+            least = LinearProgram(core).solve(columns=_left(core, j) & light, slack=_covered(core, j)).bound
+            diver._program.back()
+            at = _Descent(core, diver._program, root, cutoff)
+            assert at.fix(np.array([j]), 1.0, np.inf) is (least < cutoff)
+            if least < cutoff:
+                assert at._fixed == [j] and at.relaxed.bound == pytest.approx(least, abs=1e-7)
+                fixed += 1
+            else:
+                assert at._columns.all() and not at._fixed and at.open_rows == core.num_rows and at.relaxed is root
+                refused += 1
+    assert refused > 2 and fixed > 2
+
+
+def test_the_rest_is_covered_as_well_as_can_be(priced, monkeypatch):
+    """Beside what is fixed: the optimum by scipy's MILP; and nothing where that is not below the cutoff."""
+    monkeypatch.setattr(diving, "_NODES", 10_000)
+    diver = Diver(priced, np.inf)
+    core = diver._core
+    for cutoff in (np.inf, -1.0):
+        diver._program.back()
+        at = _Descent(core, diver._program, diver._root, np.inf)
+        assert at.fix(at.open_columns()[::3], 15.0, np.inf)
+        fixed = list(at._fixed)
+        columns = np.logical_and.reduce([_left(core, j) for j in fixed])
+        best = _milp(core, columns, fixed)
+        at._cutoff = min(cutoff, best - 1e-6) if cutoff < 0.0 else cutoff
+        found, done = at.completed(1e-9, np.inf)
+        assert done and at.fixed.tolist() == fixed
+        if cutoff < 0.0:
+            assert not found.size
+        else:
+            chosen = [*fixed, *found.tolist()]
+            # no row twice
+            cover_of(core, chosen)
+            assert core.weights[chosen].sum() == pytest.approx(best, abs=1e-7)
+
+
+def _milp(core, columns, fixed):
+    """Least weight of a cover of these columns, some of them fixed."""
+    rows, places = [], []
+    for j in range(core.num_columns):
+        for r in core.cols[j][core.cols[j] >= 0]:
+            rows.append(r)
+            places.append(j)
+    matrix = coo_matrix((np.ones(len(rows)), (rows, places)), shape=(core.num_rows, core.num_columns))
+    lower = np.zeros(core.num_columns)
+    lower[fixed] = 1.0
+    found = milp(
+        core.weights,
+        integrality=np.ones(core.num_columns),
+        bounds=Bounds(lower, columns.astype(float)),
+        constraints=LinearConstraint(matrix, np.where(core.slack, 0.0, 1.0), 1.0),
+    )
+    return float(found.fun)
+
+
+def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, monkeypatch):
+    diver = Diver(priced, np.inf)
+    trail, rng = np.ones(priced.packing.num_columns), np.random.default_rng(0)
+    open_rows = []
+    for done, limit in ((True, diving._HIGHEST), (False, diving._LOWEST)):
+        monkeypatch.setattr(
+            _Descent,
+            "completed",
+            lambda self, *_, done=done: (open_rows.append(self.open_rows), (np.zeros(1, dtype=np.int32), done))[1],
+        )
+        diver.share = 0.5
+        shares = [0.5]
+        for _ in range(60):
+            diver.dive(trail, 4.0, rng, np.inf, np.inf)
+            shares.append(diver.share)
+        assert (np.diff(shares) >= 0.0).all() if done else (np.diff(shares) <= 0.0).all()
+        assert shares[-1] == limit
+    # and it is what is left open
+    assert max(open_rows) > 0.8 * diver._core.num_rows
+    assert np.mean(open_rows[-20:]) < np.mean(open_rows[40:60]) - 5.0
+
+
+def _left(core, j):
     """Columns that are left when one is fixed."""
     rows = set(core.cols[j][core.cols[j] >= 0].tolist())
     return np.array([k == j or not rows & set(core.cols[k].tolist()) for k in range(core.num_columns)])
@@ -219,22 +300,3 @@ def _covered(core, j):
     slack = core.slack.copy()
     slack[core.cols[j][core.cols[j] >= 0]] = False
     return slack
-
-
-def test_the_smaller_program_is_the_rest_of_the_larger(priced):
-    """The same bound and the same covers, less what was fixed."""
-    diver = Diver(priced, np.inf)
-    diver._program.back()
-    at = _Descent(diver._core, diver._program, diver._root, np.inf)
-    assert not at.may_shrink
-    at.step(int(at.open_columns()[0]), np.inf)
-    assert at.relaxed.status == OPTIMAL
-    smaller = at.shrunk(np.inf)
-    fixed = diver._core.origin[at._fixed]
-    assert smaller._packing.num_rows <= at._open_rows < diver._core.num_rows
-    weight = priced.packing.weights[fixed].sum()
-    assert smaller.relaxed.bound + weight == pytest.approx(at.relaxed.bound, abs=1e-6)
-    assert not np.isin(smaller.origin, fixed).any()
-    np.testing.assert_array_equal(smaller._packing.weights, priced.packing.weights[smaller.origin])
-    owner = smaller.cover(priced.packing)
-    assert set(fixed.tolist()) <= {*columns_of(owner)}

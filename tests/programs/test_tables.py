@@ -73,15 +73,20 @@ def test_solve_shows_twenty_scans(run, tmp_path, width):
 
 
 @pytest.fixture(scope="module")
-def places(run, tmp_path_factory):
-    """Folder with scenes, a study and what a track needs."""
+def places(tmp_path_factory):
+    """Folder with scenes."""
     folder = tmp_path_factory.mktemp("places")
     simulate("three-radar", 1, scans=23).save(folder / "s.npz")
     simulate("crowd", 1, scans=1, targets=40).save(folder / "a-crowd-of-forty.npz")
-    grid = ["--grid", "alpha=1,1.5,2", "rho=0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.9"]
-    done = run("assoc.sweep", "s.npz", "--solver", "aco", *grid, "--scans", "0:2", "-o", "study", cwd=folder)
-    assert done.returncode == 0, done.stderr
     return folder
+
+
+@pytest.fixture(scope="module")
+def study(run, places):
+    """A study in that folder."""
+    grid = ["--grid", "alpha=1,1.5,2", "rho=0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.9"]
+    done = run("assoc.sweep", "s.npz", "--solver", "aco", *grid, "--scans", "0:2", "-o", "study", cwd=places)
+    assert done.returncode == 0, done.stderr
 
 
 PROGRAMS = {
@@ -95,8 +100,10 @@ PROGRAMS = {
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
 @sample("name", PROGRAMS, every=6)
-def test_every_program_fits_every_terminal(run, places, name):
+def test_every_program_fits_every_terminal(run, places, name, request):
     """No line is longer than the terminal, and every number that a pipe gets is there, or dropped as a whole."""
+    if name == "study":
+        request.getfixturevalue("study")
     piped = run(*PROGRAMS[name], cwd=places)
     words = {word for line in piped.stdout.splitlines() for word in line.split()}
     for width, text in shown_at(WIDTHS, PROGRAMS[name], cwd=places).items():
@@ -113,6 +120,7 @@ def test_every_program_fits_every_terminal(run, places, name):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
+@pytest.mark.usefixtures("study")
 def test_a_study_shows_twenty_settings_and_once_what_is_the_same(run, places):
     piped = run("assoc.sweep", "--summary", "study", cwd=places).stdout
     assert len([line for line in piped.splitlines() if line.strip().startswith("aco ")]) == 24

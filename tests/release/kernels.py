@@ -32,9 +32,9 @@ _SCENES = {
     "uav": ("dubins-uav",),
 }
 _SOLVERS = ("greedy", "exact", "aco", "genetic", "tabu", "lagrangian")
-# some: with all trackers and filters the wheel would be larger still
-_TRACKERS = ("multi-sensor", "static", "mht", "nearest-neighbour")
-_FILTERS = ("imm-cv", "ekf", "imm")
+_TRACKERS = ("multi-sensor", "static", "mht", "mht-hypothesis", "nearest-neighbour", "joint-probabilistic")
+_FILTERS = ("imm-cv", "ekf", "modified-ekf", "ukf", "imm")
+_PLOT_FILTERS = ("ekf", "ukf")
 
 
 def usual_road() -> Iterator[tuple[str, ...]]:
@@ -53,8 +53,10 @@ def usual_road() -> Iterator[tuple[str, ...]]:
             yield ("track", f"{name}.npz", "--tracker", tracker, "-o", f"{name}-{tracker}.csv")
     for choice in _FILTERS:
         yield ("track", "radars.npz", "--filter", choice, "-o", f"{choice}.csv")
-    yield ("track", "plots.csv", "--filter", "ekf", "-o", "plots-ekf.csv")
-    yield ("track", "plots.csv", "--tracker", "nearest-neighbour", "-o", "plots-nearest-neighbour.csv")
+    for choice in _PLOT_FILTERS:
+        yield ("track", "plots.csv", "--filter", choice, "-o", f"plots-{choice}.csv")
+    for tracker in ("nearest-neighbour", "mht-hypothesis"):
+        yield ("track", "plots.csv", "--tracker", tracker, "-o", f"plots-{tracker}.csv")
     yield ("sweep", "radars.npz", "--solver", "aco", "exact", "--grid", "aco.ants=2,3", "--scans", "0:2", "-o", "study")
 
 
@@ -119,9 +121,29 @@ def pack(cache: Path, names: list[str], folder: Path) -> None:
             (target / index.name).write_bytes(content)
             for name in kept.values():
                 library, *about, _, reload_init, environments = pickle.loads((place / name).read_bytes())
+                mangled, kind, (machine_code, bitcode) = library
+                library = mangled, kind, (machine_code, _without_names(bitcode))
                 # the text with types, which only numba's inspect_types shows, is longer than the code
                 parts = (library, *about, "", reload_init, environments)
                 (target / name).write_bytes(serialize.dumps(parts))
+
+
+def _without_names(bitcode: bytes) -> bytes:
+    """Return a module of LLVM's without the names of local values, which are more than half of it.
+
+    Beside the machine code, numba keeps what it takes to compile a kernel into another one that calls it.
+    """
+    from llvmlite import binding
+
+    module = binding.parse_bitcode(bitcode)
+    for function in module.functions:
+        for argument in function.arguments:
+            argument.name = ""
+        for block in function.blocks:
+            block.name = ""
+            for instruction in block.instructions:
+                instruction.name = ""
+    return bytes(module.as_bitcode())
 
 
 def _road(cache: Path) -> tuple[int, list[str]]:

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from llvmlite.binding import get_host_cpu_features
+from llvmlite.binding import get_host_cpu_features, parse_bitcode
 
 from assoc._system.shipped import NEEDED
 from tests.release.kernels import PROCESSOR, pack
@@ -103,6 +103,31 @@ def test_the_same_bytes_as_compiled_here(made, tmp_path, what):
     compiled, answer = solved(Path("nowhere"), tmp_path, what)
     assert compiled
     assert answer == made(what)[1]
+
+
+@pytest.mark.slow
+def test_a_kernel_that_is_compiled_here_takes_in_shipped_ones(made, tmp_path):
+    folder, answer = made("both")
+    for path in folder.rglob("*.nb?"):
+        if not path.name.startswith("matching.match"):
+            copy = tmp_path / "kernels" / path.relative_to(folder)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
+    compiled, found = solved(tmp_path / "kernels", tmp_path / "cache", "both")
+    own = {path.name.split("-")[0] for path in (tmp_path / "cache").rglob("*.nbc")}
+    assert compiled and own and all(name.startswith("matching.match") for name in own)
+    assert found == answer
+
+
+@pytest.mark.slow
+def test_numbas_second_copy_has_no_names_of_local_values(made):
+    files = [*made("both")[0].rglob("*.nbc")]
+    assert files
+    for path in files:
+        (_, _, (_, bitcode)), *_ = pickle.loads(path.read_bytes())
+        functions = [one for one in parse_bitcode(bitcode).functions if not one.is_declaration]
+        values = [value for one in functions for block in one.blocks for value in (block, *block.instructions)]
+        assert values and not any(value.name for value in values)
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def step(tracker):
 
 
 @few_or_all("count", 10, 40)
-@pytest.mark.parametrize("name", sorted(TRACKERS))
+@sample("name", sorted(TRACKERS), every=3)
 def test_spoiled_files(name, count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     kind = TRACKERS[name]

@@ -12,6 +12,7 @@ from assoc.filters import ConstantVelocity, KalmanFilter
 from assoc.tracking import HypothesisOrientedMHT, Initiation, LifeCycle
 from assoc.tracking.mht.children import FALSE, NEW, Meanings, Parents, best_children
 from assoc.tracking.mht.clusters import cluster, merged, parts, without
+from tests.sizes import few_or_all
 from tests.tracking import plain
 
 GATE = 0.99
@@ -155,10 +156,11 @@ def test_nothing_is_dropped_below_the_best():
     np.testing.assert_array_equal(own.probabilities, other.probabilities)
 
 
+@few_or_all("problems", 20, 60)
 @pytest.mark.parametrize("drop", [3.0, 1e6, math.inf])
-def test_the_best_children_of_several_parents(drop):
+def test_the_best_children_of_several_parents(drop, problems):
     rng = np.random.default_rng(5)
-    for _ in range(60):
+    for _ in range(problems):
         parents, tracks, count = (int(n) for n in rng.integers([1, 0, 1], [6, 5, 5]))
         near = rng.random((count, tracks)) < 0.6
         track = np.nonzero(near)[1]

@@ -90,7 +90,7 @@ def taken(done, aircraft):
     return done.tracks[done.recording.sources[rows] == aircraft]
 
 
-@few_or_all("seeds", 3, 10)
+@few_or_all("seeds", 2, 10)
 @pytest.mark.parametrize("address", [False, True], ids=["codes", "addresses"])
 @sample("name", NAMES, every=3)
 def test_codes_keep_crossing_aircraft_apart(name, address, seeds):
@@ -122,7 +122,7 @@ def test_a_code_that_is_changed_in_flight_does_not_break_a_track():
     assert len(np.unique(tracks)) == 1 and tracks[0] > 0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sample("name", NAMES, every=3)
 def test_identities_without_codes_change_nothing(name):
     recording = crossing(2)
     bare = Recording(recording.times, recording.ranges, recording.azimuths, sources=recording.sources)
@@ -130,7 +130,7 @@ def test_identities_without_codes_change_nothing(name):
     np.testing.assert_array_equal(with_model.tracks, without.tracks)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@sample("name", NAMES, every=3)
 def test_a_restored_tracker_knows_the_codes(name, tmp_path):
     recording = crossing(1)
     windows = clustering_time_window(recording, TURN)

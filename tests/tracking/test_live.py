@@ -16,6 +16,7 @@ from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.plots.plot_tracks import track_plots
+from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
 
 TURNS = [4.0, 5.0, 5.5]
@@ -159,7 +160,7 @@ def partition(tracks):
     return [number.setdefault(one, len(number) - 1) for one in tracks]
 
 
-@pytest.mark.parametrize("name", ["mht", "nearest-neighbour", "joint-probabilistic"])
+@sample("name", ["mht", "nearest-neighbour", "joint-probabilistic"], every=3)
 def test_identities_give_the_tracks_of_the_recording(name):
     recording = crossing(2, begin=1.0)
     number = np.floor(recording.times / TURN)

@@ -68,7 +68,7 @@ def test_ids_and_decisions_go_on_when_tracks_are_taken_over(name):
     assert all(track.hits >= 8 for track in tracker.tracks if track.confirmed)
 
 
-@pytest.mark.parametrize("name", NURSING)
+@sample("name", NURSING, every=2)
 def test_a_saved_nursery_goes_on_alike(name, tmp_path):
     scene = bearings(1002, 9)
     for stop in (2, 7):

@@ -49,7 +49,7 @@ class Trials(NamedTuple):
         Room: how much the columns with both rows add up to; 0 between calls.
     gain, tried : float32 array, shape (2, R, R), and uint8 array of the same shape
         Mean gain of the bound for each unit of the LP's values that a side forbids; side 0: apart, 1: together.
-    pairs, values : int32 array, shape (K, 2), float array, shape (K,)
+    pairs, values : int64 array, shape (K, 2), float array, shape (K,)
         The pairs in doubt, the most doubtful first, and their mass.
     trial : Trial
         Of the side that is tried.
@@ -62,7 +62,7 @@ class Trials(NamedTuple):
     mass: NDArray[np.float64]
     gain: NDArray[np.float32]
     tried: NDArray[np.uint8]
-    pairs: NDArray[np.int32]
+    pairs: NDArray[np.int64]
     values: Floats
     trial: Trial
     side: Allowed
@@ -76,7 +76,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
     rows = num_rows
     return Trials(
         np.zeros((rows, rows)), np.zeros((2, rows, rows), np.float32), np.zeros((2, rows, rows), np.uint8),
-        np.zeros((_CANDIDATES, 2), np.int32), np.zeros(_CANDIDATES), new_trial(program, _EXCHANGES),
+        np.zeros((_CANDIDATES, 2), np.int64), np.zeros(_CANDIDATES), new_trial(program, _EXCHANGES),
         Allowed(np.empty(num, np.int32), np.zeros(num, np.bool_), np.zeros(size, np.bool_)), np.empty(size),
     )  # fmt: skip
 

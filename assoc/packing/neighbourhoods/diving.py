@@ -1,16 +1,17 @@
-"""Dives: covers built in the linear program, one column after the other, each fixed before the next is drawn.
+"""Dives: covers begun in the linear program, column by column, and ended by a short branch and bound.
 
-The linear program is solved for the columns of small reduced cost. A diver draws one of its fractional columns j with a
-probability proportional to
+The linear program is solved for the columns of small reduced cost. A diver draws some of its fractional columns, each
+column j with a probability proportional to
 
     tau_j^alpha x_j^beta
 
-where x_j, the visibility, is how much of it the program takes; the column is fixed, what shares a row with it goes, and
+where x_j, the visibility, is how much of it the program takes; they are fixed, what shares a row with them goes, and
 the dual simplex method goes on from where it was, some exchanges each time. So each choice knows what the choices
-before it cost, and what is left can still bring. A choice that lifts the bound beyond an aim between the bound and the
-best cover is taken back, and its column excluded; where neither way meets the aim, it is raised. The dive ends when
-nothing is fractional, or when its bound says that nothing better than the best cover can follow; what is then open is
-left to insertion.
+before it cost, and what is left can still bring. The first choices cost next to nothing, and many are made at a time.
+The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
+the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
+cover, and branch and bound (branching/search.py) covers what is left. The share grows while these searches end early,
+and shrinks when they do not end at all.
 
 References
 ----------
@@ -25,7 +26,8 @@ from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
-from assoc.packing.neighbourhoods.cover import own
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED
@@ -35,12 +37,15 @@ from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
 _LEAST, _MOST = 30, 900
 # columns of the program for each row, those of least reduced cost
 _CORE = 40
-# of the way from the bound to the best cover: the increase with which a dive is content at first
-_AIM = 0.4
-# open rows, as a share of a program's, at which a smaller one takes its place
-_SHRINK = 0.75
-# the mark of a step, beside that of the root
-_STEP = 1
+# of the rows that are still to be covered by choices: those covered before the program is solved again
+_BATCH = 0.3
+# shares of the rows that are left to branch and bound: at first (but so many rows), at the least and at the most (all
+# would be an exact solver), and how they change
+_START, _ROWS = 0.35, 40
+_LOWEST, _HIGHEST = 0.2, 0.9
+_GROW, _SHRINK = 0.03, 0.02
+# nodes of one such search
+_NODES = 8
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
 
@@ -62,18 +67,19 @@ class Diver:
         limit = np.partition(priced.reduced, count)[count]
         # rows that must be covered keep a column each: what the program leaves out insertion may bring back
         self._core: Packing = packing.restrict(priced.reduced <= limit)
-        self._packing, self._rows = packing, packing.num_rows
+        self._packing, self._tolerance = packing, priced.tolerance
         self._program = LinearProgram(self._core)
         self._root = self._program.solve(duals=priced.duals[self._core.row_origin], deadline=deadline)
         self._program.mark()
+        self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     @staticmethod
     def pays(packing: Packing) -> bool:
         """Whether a component has a size for dives, and there is memory for its program."""
         if not _LEAST <= packing.num_rows <= _MOST:
             return False
-        # with the marks of the root and of a step, and smaller programs
-        return memory_allows(5.0 * LinearProgram.memory(packing.num_columns, packing.num_rows))
+        # with the mark of the root
+        return memory_allows(2.0 * LinearProgram.memory(packing.num_columns, packing.num_rows))
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
@@ -88,29 +94,37 @@ class Diver:
             beta: the larger, the more the program's values decide.
         rng : Generator
         cutoff : float
-            The dive ends when nothing below this can follow.
+            Covers of this weight or more are not looked for.
         deadline : float
             When time is over (clock.py).
         """
         self._program.back()
         at = _Descent(self._core, self._program, self._root, cutoff)
-        # each column fixed is whole from then on: a dive has at most as many of them as rows
-        for _ in range(2 * self._rows):
-            if at.relaxed.status != OPTIMAL:
+        left = self.share * self._core.num_rows
+        while at.open_rows > left and at.relaxed.status == OPTIMAL:
+            columns = at.open_columns()
+            chances = trail[self._core.origin[columns]] * at.relaxed.primal[columns] ** strictness
+            if not chances.any():
                 break
-            open_columns = at.open_columns()
-            if not open_columns.size:
+            if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-            if at.may_shrink:
-                at = at.shrunk(deadline)
-                continue
-            chances = trail[at.origin[open_columns]] * at.relaxed.primal[open_columns] ** strictness
-            at.step(int(rng.choice(open_columns, p=chances / chances.sum())), deadline)
-        return at.cover(self._packing)
+        found, done = at.completed(self._tolerance, deadline)
+        self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
+        owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
+        own_all(self._packing.cols, self._core.origin[np.concatenate([at.fixed, found])], owner)
+        return owner
+
+
+def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Columns in the order in which they are drawn, one after the other, by their chances."""
+    likely = chances > 0.0
+    # the largest of Gumbel numbers added to the logarithms is a draw by the chances, the next one is of those left
+    keys = np.log(chances[likely]) + rng.gumbel(size=np.count_nonzero(likely))
+    return columns[likely][np.argsort(-keys, kind="stable")]
 
 
 class _Descent:
-    """A dive on its way: a packing of what is still open, its program, and what has been fixed.
+    """A dive on its way: the program, and what has been fixed.
 
     Parameters
     ----------
@@ -125,87 +139,71 @@ class _Descent:
     def __init__(self, packing: Packing, program: LinearProgram, relaxed: Relaxation, cutoff: float) -> None:
         self._packing, self._program, self._cutoff = packing, program, cutoff
         self.relaxed = relaxed
-        # columns in the numbering of the whole component
-        self.origin: NDArray[np.int32] = packing.origin
+        self._fixed: list[int] = []
+        # columns that may still be taken, and those that are fixed
         self._columns = np.ones(packing.num_columns, dtype=np.bool_)
-        self._slack = packing.slack.copy()
-        self._fixed = np.zeros(packing.num_columns, dtype=np.bool_)
-        self._open_rows = packing.num_rows
-        # columns of the whole component that were fixed before the packing became smaller
-        self._chosen: list[int] = []
-        # a bound beyond this is too much; nothing to aim at where no cover is known
-        self._aim = cutoff if cutoff == np.inf else relaxed.bound + _AIM * (cutoff - relaxed.bound)
+        self._covered = np.zeros(packing.num_rows, dtype=np.bool_)
+
+    @property
+    def open_rows(self) -> int:
+        """Rows that no fixed column covers."""
+        return int(np.count_nonzero(~self._covered))
 
     def open_columns(self) -> NDArray[np.int64]:
         """Columns of which the program takes a part."""
         primal = self.relaxed.primal
         return np.flatnonzero((primal > _WHOLE) & (primal < 1.0 - _WHOLE) & self._columns)
 
-    def step(self, j: int, deadline: float) -> None:
-        """Fix column j; or exclude it, where the program says that fixing it costs too much."""
-        packing, program = self._packing, self._program
-        # what nothing lighter can use goes for good
-        self._columns &= self._fixed | (self.relaxed.reduced <= self._cutoff - self.relaxed.bound)
-        columns, slack, before = self._columns.copy(), self._slack.copy(), self.relaxed
-        program.mark(_STEP)
-        rows = packing.cols[j][packing.cols[j] >= 0]
-        for r in rows:
-            self._columns[packing.row_cols[packing.row_ptr[r] : packing.row_ptr[r + 1]]] = False
-            self._slack[r] = False
-        self._columns[j] = self._fixed[j] = True
-        self._solve(deadline)
-        if self.relaxed.status in (OPTIMAL, STOPPED):
-            self._open_rows -= rows.size
-            return
-        self._columns, self._slack = columns, slack
-        self._fixed[j] = self._columns[j] = False
-        while True:
-            program.back(_STEP)
-            self._solve(deadline)
-            if self.relaxed.status in (OPTIMAL, STOPPED) or self._aim >= self._cutoff:
-                break
-            # nor is there anything without it: be content with less
-            room = max(self._aim - before.bound, 1e-3 * (self._cutoff - before.bound))
-            self._aim = min(before.bound + 2.0 * room, self._cutoff)
+    def fix(self, drawn: NDArray[np.int64], rows: float, deadline: float) -> bool:
+        """Fix columns in their order, those that fit, until they cover so many rows (one at the least).
 
-    def _solve(self, deadline: float) -> None:
-        self.relaxed = self._program.solve(
-            columns=self._columns, slack=self._slack, cutoff=self._aim, deadline=deadline
-        )
+        Where nothing below the cutoff is left then, nothing is fixed; whether it was.
+        """
+        packing = self._packing
+        before = self._columns.copy(), self._covered.copy(), len(self._fixed), self.relaxed
+        # what nothing lighter can use goes for good
+        self._columns &= self.relaxed.reduced <= self._cutoff - self.relaxed.bound
+        self._columns[self._fixed] = True
+        more = 0
+        for j in drawn:
+            own_rows = packing.cols[j][packing.cols[j] >= 0]
+            if self._covered[own_rows].any():
+                continue
+            for r in own_rows:
+                self._columns[packing.row_cols[packing.row_ptr[r] : packing.row_ptr[r + 1]]] = False
+            self._covered[own_rows] = True
+            self._columns[j] = True
+            self._fixed.append(int(j))
+            more += own_rows.size
+            if more >= rows:
+                break
+        slack = packing.slack & ~self._covered
+        self.relaxed = self._program.solve(columns=self._columns, slack=slack, cutoff=self._cutoff, deadline=deadline)
+        if self.relaxed.status in (OPTIMAL, STOPPED):
+            return True
+        self._columns, self._covered, count, self.relaxed = before
+        del self._fixed[count:]
+        return False
 
     @property
-    def may_shrink(self) -> bool:
-        """Whether a program of the open rows alone is worth its beginning."""
-        return self._packing.num_rows >= _LEAST and self._open_rows <= _SHRINK * self._packing.num_rows
+    def fixed(self) -> NDArray[np.int64]:
+        """Columns that are fixed."""
+        return np.array(self._fixed, dtype=np.int64)
 
-    def shrunk(self, deadline: float) -> _Descent:
-        """Return the same dive on the open rows alone: the inverse is dense, and steps then take a part of the time."""
+    def completed(self, tolerance: float, deadline: float) -> tuple[NDArray[np.int32], bool]:
+        """Search columns for what is open, with which the cover is lighter than the cutoff (none: nothing was found).
+
+        And whether the search came to its end.
+        """
         packing, relaxed = self._packing, self.relaxed
-        fixed = np.flatnonzero(self._fixed)
-        weight = float(packing.weights[fixed].sum())
-        open_rows = np.ones(packing.num_rows, dtype=np.bool_)
-        for j in fixed:
-            open_rows[packing.cols[j][packing.cols[j] >= 0]] = False
-        keep = np.flatnonzero(self._columns & ~self._fixed).astype(np.int32)
-        smaller = assemble(
-            packing.cols[keep], packing.weights[keep], packing.slack | ~open_rows, keep, packing.granularity
-        )
-        cutoff, aim = self._cutoff - weight, self._aim - weight
-        program = LinearProgram(smaller)
-        solved = program.solve(duals=relaxed.duals[smaller.row_origin], cutoff=aim, deadline=deadline)
-        after = _Descent(smaller, program, solved, cutoff)
-        after._aim = aim
-        after._chosen = [*self._chosen, *self.origin[fixed].tolist()]
-        after.origin = self.origin[smaller.origin]
-        return after
-
-    def cover(self, whole: Packing) -> NDArray[np.int32]:
-        """Return the owners of the rows of the component: what is fixed, and what the program takes mostly."""
-        owner = np.full(whole.num_rows, -1, dtype=np.int32)
-        order = np.argsort(-self.relaxed.primal, kind="stable")
-        likely = self.origin[order[self.relaxed.primal[order] > 0.5]]
-        for j in [*self._chosen, *self.origin[self._fixed].tolist(), *likely.tolist()]:
-            rows = whole.cols[j][whole.cols[j] >= 0]
-            if (owner[rows] < 0).all():
-                own(whole.cols, j, owner)
-        return owner
+        keep = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
+        keep[self._fixed] = False
+        inside = np.flatnonzero(keep).astype(np.int32)
+        # rows that are covered already may stay as they are
+        slack = packing.slack | self._covered
+        rest = assemble(packing.cols[inside], packing.weights[inside], slack, inside, packing.granularity)
+        cutoff = self._cutoff - float(packing.weights[self._fixed].sum())
+        search = BranchAndBound(rest, relaxed.duals[rest.row_origin], cutoff, tolerance, deadline)
+        search.run(_NODES)
+        columns = np.zeros(0, dtype=np.int32) if search.columns is None else rest.origin[search.columns]
+        return columns, search.done

@@ -82,24 +82,21 @@ class Breeding:
             members.append(component.best.copy())
             fitness.append(component.weight)
         while len(members) < self.parameters.population:
-            # random greedy solutions, strict and loose ones by turns
-            if component.dives:
-                # beside covers from the linear program the others are there to be different, not to be good
-                owner = self._differing(component, len(members), rng)
-                weight = component.weight_of(owner)
-                component.offer(owner, weight)
+            number, dives = len(members), component.dives
+            if dives and number < _DIVES:
+                owner = component.dive(number, rng)
+                weight = component.settle(owner, rng, self.parameters.clusters)
             else:
-                owner = component.random_cover(2.0 ** (len(members) % 10), rng)
-                weight = component.settle(owner, rng, 0)
+                # random greedy solutions, strict and loose ones by turns
+                owner = component.random_cover(2.0 ** (number % 10), rng)
+                # beside covers from the linear program they are there to be different, not to be good
+                weight = component.weight_of(owner) if dives else component.settle(owner, rng, 0)
+                component.offer(owner, weight)
             members.append(owner)
             fitness.append(weight if component.is_complete(owner) else np.inf)
             if component.closed or component.late:
                 break
         self.members, self.fitness = np.array(members, dtype=np.int32), np.array(fitness)
-
-    def _differing(self, component: Component, number: int, rng: np.random.Generator) -> NDArray[np.int32]:
-        """Return a cover of a new population: the first ones from the linear program."""
-        return component.dive(number, rng) if number < _DIVES else component.random_cover(2.0 ** (number % 10), rng)
 
     def _parent(self, rng: np.random.Generator) -> int:
         drawn = rng.integers(0, self.fitness.size, size=self.parameters.tournament)
