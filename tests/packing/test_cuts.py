@@ -6,6 +6,7 @@ from scipy.optimize import linprog
 
 from assoc.costs import build_problem
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.branching import search as branch_and_bound
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
@@ -143,22 +144,29 @@ def test_bounds_of_passes_hold_and_rise():
                 search.run(1)
                 bounds.append(search.lower_bound)
             assert search.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
-            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9 and bounds[0] >= floor
-            risen += len(np.unique(bounds)) > 3
+            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9 and bounds[0] >= min(floor, best) - 1e-6
+            risen += len(np.unique(bounds)) > 2
     assert risen > 2
 
 
-def test_passes_need_no_good_incumbent():
+def test_passes_need_no_good_incumbent(monkeypatch):
     """A search to the end from a poor incumbent does little more than one from the optimum."""
-    packing, duals, bound = ghosts(20, 14)
 
-    def searched(incumbent, passes=True):
-        search = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=passes)
+    def searched(incumbent):
+        search = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
         while not search.done:
             search.run(1000)
         return search
 
-    poor, alone = searched(0.99 * bound), searched(0.99 * bound, passes=False)
-    good = searched(poor.weight + 1e-6)
-    assert good.weight == pytest.approx(poor.weight, abs=1e-9) and alone.weight == pytest.approx(poor.weight, abs=1e-9)
-    assert poor.nodes < 2 * good.nodes and poor.nodes < 0.7 * alone.nodes
+    nodes = np.zeros(3)
+    for seed in (4, 5, 6):
+        packing, duals, bound = ghosts(30, seed)
+        poor = searched(0.99 * bound)
+        good = searched(poor.weight + 1e-6)
+        with monkeypatch.context() as patch:
+            patch.setattr(branch_and_bound, "_LAST", 0.0)
+            alone = searched(0.99 * bound)
+        for other in (good, alone):
+            assert other.weight == pytest.approx(poor.weight, abs=1e-8)
+        nodes += [poor.nodes, good.nodes, alone.nodes]
+    assert nodes[0] < 2.0 * nodes[1] and nodes[0] < 0.5 * nodes[2]
