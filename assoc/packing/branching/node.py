@@ -67,7 +67,7 @@ class Work(NamedTuple):
 
 
 def work_memory(rows: float, columns: int) -> float:
-    """Bytes that `new_work` takes: two inverses, and what is known of pairs."""
+    """Bytes that `new_work` takes: an inverse by columns and by rows, and what is known of pairs."""
     return 34.0 * rows * rows + 100.0 * columns
 
 

@@ -13,6 +13,11 @@ _DIVER = "assoc/packing/neighbourhoods/diving.py"
 _COMPONENT = "assoc/packing/components/component.py"
 _LARGE = "assoc/packing/neighbourhoods/large.py"
 _SIMPLEX = "assoc/packing/simplex/dual.py"
+_PRICING = "assoc/packing/simplex/pricing.py"
+_TRIAL = "assoc/packing/simplex/trial.py"
+_SEARCH = "assoc/packing/branching/search.py"
+_OF_TRIALS = "tests/packing/test_trial.py"
+_OF_PASSES = "tests/packing/test_cuts.py"
 
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
@@ -154,8 +159,36 @@ FAULTS = (
     Fault(
         "the simplex method moves its multipliers the other way",
         _SIMPLEX,
-        "basis.duals[r] += sign * step * basis.row[r]",
-        "basis.duals[r] -= sign * step * basis.row[r]",
+        "duals[r] += sign * step * row[r]",
+        "duals[r] -= sign * step * row[r]",
         _OF_DIVES,
+    ),
+    Fault(
+        "columns are priced by the rows of one sensor less",
+        _PRICING,
+        "for s in range(codes.shape[0]):",
+        "for s in range(codes.shape[0] - 1):",
+        _OF_TRIALS,
+    ),
+    Fault(
+        "trials forget their first exchange",
+        _TRIAL,
+        "for k in range(done - 1, -1, -1):",
+        "for k in range(done - 1, 0, -1):",
+        _OF_TRIALS,
+    ),
+    Fault(
+        "branch and bound makes no passes",
+        _SEARCH,
+        "self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf",
+        "self._aim = np.inf",
+        _OF_PASSES,
+    ),
+    Fault(
+        "a pass proves more than its aim",
+        _SEARCH,
+        "self._floor = max(self._floor, self._aim)",
+        "self._floor = self.weight",
+        _OF_PASSES,
     ),
 )
