@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from assoc.costs import build_problem
-from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import search as branch_and_bound
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
@@ -14,9 +13,9 @@ from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_valu
 from assoc.packing.simplex.cuts import odd_sets
 from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
 from assoc.packing.simplex.program import all_allowed, certified, make_feasible, program_of, weight_limit
-from experiments.common.instances.scenes import ghost
 from experiments.common.oracles import gated_problem
 from tests.packing.test_branching import all_covers
+from tests.packing.test_passes import ghosts
 
 
 def odd_packings(count, seed):
@@ -118,35 +117,6 @@ def test_only_better_solutions_are_looked_for_with_cuts():
         search = BranchAndBound(packing, dual_bound(packing), best, 1e-9, to_the_end=True)
         search.run(10_000)
         assert search.done and search.columns is None
-
-
-def ghosts(targets, seed):
-    """The largest component of a scene of ghosts, multipliers, and a bound that they give."""
-    packing = prepare(build_problem(ghost(targets, seed), 0)).packing
-    packing = max((packing.component(c) for c in range(packing.num_components)), key=lambda one: one.num_columns)
-    duals = dual_bound(packing)
-    return packing, duals, certified_bound(packing, duals)
-
-
-def test_bounds_of_passes_hold_and_rise():
-    """From poor incumbents, looked at after every node: never a bound above the optimum, and never one that falls."""
-    risen = 0
-    for seed in (8, 13, 15, 21, 34):
-        packing, duals, bound = ghosts(12, seed)
-        whole = BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))
-        while not whole.done:
-            whole.run(1000)
-        best = whole.weight
-        for floor in (-np.inf, best - 0.5 * (best - bound)):
-            search = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, floor=floor)
-            bounds = []
-            while not search.done:
-                search.run(1)
-                bounds.append(search.lower_bound)
-            assert search.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
-            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9 and bounds[0] >= min(floor, best) - 1e-6
-            risen += len(np.unique(bounds)) > 2
-    assert risen > 2
 
 
 def test_passes_need_no_good_incumbent(monkeypatch):

@@ -15,9 +15,9 @@ _LARGE = "assoc/packing/neighbourhoods/large.py"
 _SIMPLEX = "assoc/packing/simplex/dual.py"
 _PRICING = "assoc/packing/simplex/pricing.py"
 _TRIAL = "assoc/packing/simplex/trial.py"
-_SEARCH = "assoc/packing/branching/search.py"
+_BRANCHING = "assoc/packing/branching/search.py"
 _OF_TRIALS = "tests/packing/test_trial.py"
-_OF_PASSES = "tests/packing/test_cuts.py"
+_OF_PASSES = "tests/packing/test_passes.py"
 
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
@@ -179,14 +179,14 @@ FAULTS = (
     ),
     Fault(
         "branch and bound makes no passes",
-        _SEARCH,
+        _BRANCHING,
         "self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf",
         "self._aim = np.inf",
         _OF_PASSES,
     ),
     Fault(
         "a pass proves more than its aim",
-        _SEARCH,
+        _BRANCHING,
         "self._floor = max(self._floor, self._aim)",
         "self._floor = self.weight",
         _OF_PASSES,

@@ -1,0 +1,38 @@
+"""Passes of a branch and bound that is meant to go to the end: what they say of the optimum on the way."""
+
+import numpy as np
+import pytest
+
+from assoc.costs import build_problem
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.prepare import prepare
+from experiments.common.instances.scenes import ghost
+
+
+def ghosts(targets, seed):
+    """The largest component of a scene of ghosts, multipliers, and a bound that they give."""
+    packing = prepare(build_problem(ghost(targets, seed), 0)).packing
+    packing = max((packing.component(c) for c in range(packing.num_components)), key=lambda one: one.num_columns)
+    duals = dual_bound(packing)
+    return packing, duals, certified_bound(packing, duals)
+
+
+def test_bounds_of_passes_hold_and_rise():
+    """From poor incumbents, looked at after every node: never a bound above the optimum, and never one that falls."""
+    for seed in (16, 24, 31, 37):
+        packing, duals, bound = ghosts(10, seed)
+        whole = BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))
+        while not whole.done:
+            whole.run(1000)
+        best = whole.weight
+        for floor in (-np.inf, best - 0.5 * (best - bound)):
+            search = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, floor=floor)
+            bounds = []
+            while not search.done:
+                search.run(1)
+                bounds.append(search.lower_bound)
+            assert search.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
+            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9 and bounds[0] >= min(floor, best) - 1e-6
+            # pass by pass, and not at the end alone
+            assert len(np.unique(bounds)) > (2 if np.isfinite(floor) else 3)
