@@ -48,6 +48,9 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="everything in some 25 minutes: two seeds (ghosts up to ten), and other solvers get 5 s",
     )
+    parser.add_argument(
+        "--processes", type=int, default=1, metavar="N", help="seeds at a time, everybody on one core (default 1)"
+    )
     parser.add_argument("--csv", type=Path, metavar="FILE", help=f"the rows (default {TABLE})")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="the report (default: beside the rows)")
     parser.add_argument(
@@ -70,6 +73,8 @@ def main(argv: list[str] | None = None) -> int:
             parser.error(f"--families: unknown {name!r}; known: {', '.join(FAMILIES)}")
     if options.seeds is not None and options.seeds < 1:
         parser.error(f"--seeds: expected at least 1, got {options.seeds}")
+    if options.processes < 1:
+        parser.error(f"--processes: expected at least 1, got {options.processes}")
     if options.peer_limit is not None and not options.peer_limit > 0:
         parser.error(f"--peer-limit: expected more than 0 seconds, got {options.peer_limit:g}")
     table: Path = options.csv or (QUICK_TABLE if options.quick else TABLE)
@@ -116,6 +121,7 @@ def _command(options: argparse.Namespace) -> str:
         if getattr(options, name):
             words += [f"--{name}", *(value.replace(" ", "_") for value in getattr(options, name))]
     words += [f"--seeds {options.seeds}"] if options.seeds else []
+    words += [f"--processes {options.processes}"] if options.processes > 1 else []
     words += [f"--peer-limit {options.peer_limit:g}"] if options.peer_limit else []
     return " ".join(words)
 
@@ -146,12 +152,9 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
         chosen = [case.with_peers_within(options.peer_limit) for case in chosen]
     if options.solvers:
         chosen = [case.restricted_to(options.solvers) for case in chosen]
-    run.warm_up(
-        {entry.solver for case in chosen for entry in case.ours},
-        {entry.solver for case in chosen for entry in case.peers},
-    )
-    for case in chosen:
-        yield run.run_case(case, options.seeds, log)
+    if options.processes > 1:
+        chosen = [case.on_one_core() for case in chosen]
+    yield from run.run_all(chosen, options.seeds, options.processes, log)
     if "scale" in families:
         yield scale.run(options.quick, 2 if options.brief else options.seeds, log)
     if "kbest" in families:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
+from experiments.benchmarks import FIRST_SEED
 from experiments.common.instances import scenes, synthetic
 
 HEURISTICS = ("aco", "genetic", "tabu")
@@ -69,6 +70,17 @@ class Case:
         """Return the same case with only these solvers and peers."""
         ours = tuple(entry for entry in self.ours if entry.solver in solvers)
         return replace(self, ours=ours, peers=tuple(entry for entry in self.peers if entry.solver in solvers))
+
+    def on_one_core(self) -> Case:
+        """Return the same case without peers that need two."""
+        both = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
+        peers = (replace(entry, solver=both.get(entry.solver, entry.solver)) for entry in self.peers)
+        return replace(self, peers=tuple(dict.fromkeys(peers)))
+
+    def by_seed(self, most: int | None = None) -> list[Case]:
+        """Return a case for each seed, of so many at the most."""
+        every = self.chosen or tuple(range(FIRST_SEED, FIRST_SEED + self.seeds))
+        return [replace(self, chosen=(seed,)) for seed in every[:most]]
 
     def with_peers_within(self, limit: float) -> Case:
         """Return the same case with peers that get this time limit at the most."""

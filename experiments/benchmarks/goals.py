@@ -11,7 +11,7 @@ from experiments.benchmarks import ranking
 from experiments.benchmarks.families import HEURISTICS
 from experiments.benchmarks.rows import Row
 
-PROVING_PEERS = ("cp_sat", "highs", "scip", "scip_1")
+PROVING_PEERS = ("cp_sat", "cp_sat_1", "highs", "scip", "scip_1")
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,8 @@ def _gated(results: Results) -> list[Verdict]:
 
 def _lagrangian_speed(results: Results, size: str) -> list[Verdict]:
     rows = results.of("gated", size, "lagrangian@0.1%")
-    peer = {row.seed: row.seconds for row in results.of("gated", size, "cp_sat")}
+    theirs = results.of("gated", size, "cp_sat") or results.of("gated", size, "cp_sat_1")
+    peer = {row.seed: row.seconds for row in theirs}
     ratios = [peer[row.seed] / row.seconds for row in rows if row.seed in peer]
     if not ratios:
         return []

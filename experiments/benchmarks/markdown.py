@@ -34,11 +34,12 @@ HOW = """\
 Instances are code and seed (`experiments/common/instances`); the seeds here, from 1000 on, were not used
 for tuning. Times are wall times, from the tuples to the Solution, after warm-up; beside them the processor's, all
 threads together. Our solvers have one core. Peers (other
-solvers) get the same tuples in the same process: CP-SAT (costs times 1e6, rounded) and `scip` on both
-cores, `scip_1` and HiGHS (scipy, gap 1e-9) on one; `sequential` assigns one sensor at a time with scipy, as
+solvers) get the same tuples in the same process: CP-SAT (`cp_sat`; costs times 1e6, rounded) and `scip` on both
+cores, `cp_sat_1`, `scip_1` and HiGHS (scipy, gap 1e-9) on one. With `--processes` in the command above everybody had
+one core, several seeds at a time. `sequential` assigns one sensor at a time with scipy, as
 most trackers do; `nrl_tracker` needs a dense tensor and takes part if that has at most 8 million elements.
-`chils`, `branch_reduce` and `mmwis` search for the heaviest independent set of the conflict graph, on both cores where
-they can; `kap` knows costs of pairs alone.
+`chils`, `branch_reduce` and `mmwis` search for the heaviest independent set of the conflict graph, on all cores
+that they have; `kap` knows costs of pairs alone.
 Independent code checks the feasibility and cost of every answer.
 
 *Found*: runs whose cost is the reference: the optimum (by construction, or proven by any solver) or else,

@@ -14,7 +14,7 @@ from experiments.benchmarks.rows import Row
 BEGIN = "<!-- from here to the end mark: written by python -m experiments.benchmarks -->"
 END = "<!-- end mark -->"
 
-PEERS = {"cp_sat": "CP-SAT", "highs": "HiGHS", "scip": "SCIP", "scip_1": "SCIP"}
+PEERS = {"cp_sat": "CP-SAT", "cp_sat_1": "CP-SAT", "highs": "HiGHS", "scip": "SCIP", "scip_1": "SCIP"}
 TIMED = {
     ("gated", "3x100"): "3 sensors, 100 targets",
     ("gated", "3x300"): "3 sensors, 300 targets",

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import math
+import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import assoc
 from assoc.costs import build_problem
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solution import TracePoint
-from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.families import HEURISTICS, Case, Entry, Instance
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.wide_gaps import linear_bound
@@ -57,6 +59,70 @@ def warm_up(ours: set[str], others: set[str]) -> None:
     peers.warm_up(sorted(others))
 
 
+def run_all(
+    cases: Sequence[Case], seeds: int | None, processes: int, log: Callable[[str], None] = lambda text: None
+) -> Iterator[list[Row]]:
+    """Yield the rows of each case, in their order.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    seeds : int or None
+        Number of seeds at the most; None: all of each case.
+    processes : int
+        More than 1: so many seeds at once, each process on a core of its own.
+    log : callable
+        Told what was done, line by line.
+    """
+    if processes == 1:
+        _warm_up_for(cases)
+        for case in cases:
+            yield run_case(case, seeds, log)
+        return
+    units = [case.by_seed(seeds) for case in cases]
+    context = multiprocessing.get_context("fork")
+    # instances are made by functions that cannot be sent: each process has all units from its start
+    flat = [one for ones in units for one in ones]
+    started = context.Value("i", 0)
+    with ProcessPoolExecutor(processes, context, _take_a_core, (started, cases, flat)) as pool:
+        found = pool.map(_run_unit, range(len(flat)))
+        for ones in units:
+            rows: list[Row] = []
+            for _ in ones:
+                more, lines = next(found)
+                for line in lines:
+                    log(line)
+                rows += more
+            yield rows
+
+
+_UNITS: list[Case] = []
+
+
+def _take_a_core(started: Any, cases: Sequence[Case], units: list[Case]) -> None:
+    """Begin a process: on a core of its own, warm, with what there is to run."""
+    with started.get_lock():
+        number = started.value
+        started.value += 1
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[number % len(cores)]})
+    _warm_up_for(cases)
+    _UNITS[:] = units
+
+
+def _run_unit(place: int) -> tuple[list[Row], list[str]]:
+    lines: list[str] = []
+    return run_case(_UNITS[place], log=lines.append), lines
+
+
+def _warm_up_for(cases: Sequence[Case]) -> None:
+    warm_up(
+        {entry.solver for case in cases for entry in case.ours},
+        {entry.solver for case in cases for entry in case.peers},
+    )
+
+
 def run_case(
     case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None
 ) -> list[Row]:
@@ -72,8 +138,8 @@ def run_case(
         Told what was done, line by line.
     """
     rows: list[Row] = []
-    every = case.chosen or range(FIRST_SEED, FIRST_SEED + case.seeds)
-    for seed in every[:seeds]:
+    for one in case.by_seed(seeds):
+        (seed,) = one.chosen
         for item, instance in enumerate(case.make(seed)):
             found = _run_instance(case, instance, seed, item)
             rows += found

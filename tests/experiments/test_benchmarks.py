@@ -12,7 +12,7 @@ from experiments.benchmarks import FIRST_SEED, goals, markdown, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
-from experiments.benchmarks.run import run_case
+from experiments.benchmarks.run import run_all, run_case
 from experiments.common.instances import synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
@@ -113,6 +113,24 @@ def test_a_limit_for_peers_and_chosen_seeds() -> None:
     found = run_case(short, 1)
     assert {row.seed for row in found} == {7} and {row.seed for row in run_case(short)} == {7, 9}
     assert all(row.cpu > 0 for row in found if row.solver != "sequential")
+
+
+def test_several_processes_measure_the_same_on_one_core_each() -> None:
+    def make(seed: int):  # type: ignore[no-untyped-def]
+        yield Instance(*synthetic.planted(3, seed, targets=4))
+
+    peers = (Entry("cp_sat", 5.0), Entry("scip", 5.0), Entry("scip_1", 5.0), Entry("sequential", 5.0))
+    case = Case("planted", "S=3", make, (Entry("exact", 5.0),), peers, 3).on_one_core()
+    assert [entry.solver for entry in case.peers] == ["cp_sat_1", "scip_1", "sequential"]
+    assert [one.chosen for one in case.by_seed(2)] == [(1000,), (1001,)]
+    other = replace(case, size="again", chosen=(7, 5))
+    lines: list[str] = []
+    found = list(run_all([case, other], None, 2, lines.append))
+    alone = [run_case(one) for one in (case, other)]
+    assert [[(r.size, r.seed, r.solver, r.cost) for r in rows] for rows in found] == [
+        [(r.size, r.seed, r.solver, r.cost) for r in rows] for rows in alone
+    ]
+    assert len(lines) == 5 and "again seed 7" in lines[3]
 
 
 def test_lagrangian_goal() -> None:
