@@ -8,6 +8,7 @@ from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from experiments.common.instances.scenes import ghost
+from experiments.common.instances.synthetic import axial_random
 
 
 def ghosts(targets, seed):
@@ -36,3 +37,23 @@ def test_bounds_of_passes_hold_and_rise():
             assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9 and bounds[0] >= min(floor, best) - 1e-6
             # pass by pass, and not at the end alone
             assert len(np.unique(bounds)) > (2 if np.isfinite(floor) else 3)
+
+
+def test_passes_over_whole_numbers_end_at_the_optimum_itself():
+    """An aim between two whole numbers proves the larger one."""
+    nodes = 0
+    for seed in range(8):
+        packing = prepare(axial_random(14, seed)).packing
+        assert packing.granularity >= 1.0
+        duals = dual_bound(packing)
+        found = []
+        for above in (np.inf, 0.0, 1.0, 5.0, 20.0):
+            incumbent = above if not found else found[0] + above
+            search = BranchAndBound(packing, duals, incumbent, 0.9, to_the_end=True)
+            while not search.done:
+                search.run(1)
+            assert search.lower_bound == search.weight
+            found.append(search.weight)
+            nodes += search.nodes
+        assert set(found) == {found[0]}
+    assert nodes > 100

@@ -128,10 +128,12 @@ class BranchAndBound:
     @property
     def lower_bound(self) -> float:
         """No solution weighs less."""
+        searched = max(self._floor, min(self._aim, self._open.least_bound))
+        if searched < self.weight - self.tolerance:
+            return searched
         # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
         whole = self.tolerance < self._packing.granularity
-        proved = self.weight if whole else self.weight - self.tolerance
-        return min(proved, max(self._floor, min(self._aim, self._open.least_bound)))
+        return self.weight if whole else self.weight - self.tolerance
 
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
