@@ -16,8 +16,9 @@ class ExactParameters(Parameters):
     nodes : int
         Nodes of branch and bound at the most; what is then open keeps its gap.
     patience : int
-        Iterations of tabu search without improvement on an open component, for every 60 measurements, before
-        branching starts; while it is branched on, one more iteration follows every three turns.
+        Iterations of tabu search and breeding without improvement on an open component of 150 measurements and more,
+        for every 60 of them, before branching starts; while it is branched on, one more iteration follows every three
+        turns.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})

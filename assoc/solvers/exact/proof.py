@@ -22,9 +22,9 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
-# rows from which tabu search and breeding pay beside the branching, and turns of branching between their iterations
-_LARGE = 30
-_MANY = 90
+# rows from which tabu search and breeding pay beside the branching, whose passes need no good incumbent, and turns of
+# branching between their iterations
+_LARGE = 150
 _TURNS = 3
 # share of a component's gap by which its bound has risen when the trace says so
 _WORTH = 0.02
@@ -232,9 +232,7 @@ def _search_better(task: _Task, run: Run) -> bool:
     if task.heuristics is None:
         task.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
     before = component.weight
-    # small components are branched sooner than a population is bred: most of them end there at once
-    turn = task.improvements % 2 if task.search is not None or component.packing.num_rows >= _MANY else 0
-    task.heuristics[turn].iterate(component, run.rng)
+    task.heuristics[task.improvements % 2].iterate(component, run.rng)
     task.improvements += 1
     component.refine(run, TabuParameters.clusters)
     component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
