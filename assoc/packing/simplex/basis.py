@@ -89,15 +89,21 @@ def basis_without(program: Program, columns: int) -> Basis:
 @njit
 def copy_basis(source: Basis, target: Basis) -> None:
     """Make ``target`` the same basis as ``source``."""
+    copy_without_inverse(source, target)
+    target.inverse[:] = source.inverse
+    target.anchors[:] = source.anchors
+    target.age[:] = source.age
+
+
+@njit
+def copy_without_inverse(source: Basis, target: Basis) -> None:
+    """Give ``target`` the variables of ``source``, their values, the weights of the edges, and the multipliers."""
     target.variable[:] = source.variable
     target.place[:] = source.place
     target.slack_place[:] = source.slack_place
-    target.inverse[:] = source.inverse
     target.norms[:] = source.norms
     target.values[:] = source.values
     target.duals[:] = source.duals
-    target.anchors[:] = source.anchors
-    target.age[:] = source.age
 
 
 @njit

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, enter
+from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, copy_without_inverse, enter
 from assoc.packing.simplex.dual import (
     CUT,
     INFEASIBLE,
@@ -162,12 +162,7 @@ def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effo
     bound that was reached (to rounding, so that they are to be made feasible).
     """
     basis, num = trial.basis, program.weights.size
-    basis.variable[:] = base.variable
-    basis.place[:] = base.place
-    basis.slack_place[:] = base.slack_place
-    basis.norms[:] = base.norms
-    basis.values[:] = base.values
-    basis.duals[:] = base.duals
+    copy_without_inverse(base, basis)
     pricing, columns, at_first = basis.pricing, allowed.columns, trial.reduced
     reduced, column = pricing.reduced, pricing.column
     for a in range(pricing.listed[0]):
