@@ -205,6 +205,10 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
         main(["--families", "gatd"])
     assert stop.value.code == 2
     assert "gatd" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stop:
+        main(["--processes", "0"])
+    assert stop.value.code == 2
+    assert "--processes: expected at least 1, got 0" in capsys.readouterr().err
     path = tmp_path / "b.csv"
     with pytest.raises(SystemExit):
         main(["--report-only", "--csv", str(path)])

@@ -68,7 +68,8 @@ class Work(NamedTuple):
 
 def work_memory(rows: float, columns: int) -> float:
     """Bytes that `new_work` takes: an inverse by columns and by rows, and what is known of pairs."""
-    return 34.0 * rows * rows + 100.0 * columns
+    # of a column: two lists for pricing, masks, and its rows, of up to eight sensors
+    return 34.0 * rows * rows + 200.0 * columns
 
 
 @njit

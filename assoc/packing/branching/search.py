@@ -49,14 +49,18 @@ _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
 
 
 class Limits(NamedTuple):
-    """How much better than the incumbent and lighter than what a solution must be, and where the search stops.
+    """What is looked for, and when a search stops.
 
     Attributes
     ----------
-    tolerance, aim : float
+    tolerance : float
+        How much better than the incumbent a solution must be.
+    aim : float
+        The weight below which it must be.
     nodes : int
+        Nodes at the most.
     deadline : float
-        By the kernels' clock (clock.py).
+        When time is over, by the kernels' clock (clock.py).
     """
 
     tolerance: float

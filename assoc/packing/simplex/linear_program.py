@@ -84,7 +84,7 @@ class LinearProgram:
     @staticmethod
     def memory(columns: int, rows: int) -> float:
         """Bytes that the program of a packing takes."""
-        return 8.0 * rows * rows + 80.0 * columns
+        return 8.0 * rows * rows + 120.0 * columns
 
     def solve(
         self,
