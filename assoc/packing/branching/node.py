@@ -14,6 +14,7 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.packing import PackingArrays
 from assoc.packing.simplex.basis import Basis, new_basis, refactor
 from assoc.packing.simplex.dual import Effort, most_exchanges, solve_dual
@@ -120,9 +121,9 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
     basis = work.basis
     num = take_node(stack, top, work.node)
     if at_work != top:
-        basis.variable[:] = stack.variable[top]
-        basis.duals[:] = stack.duals[top]
-        basis.anchors[:] = stack.duals[top]
+        copy_to(basis.variable, stack.variable[top])
+        copy_to(basis.duals, stack.duals[top])
+        copy_to(basis.anchors, stack.duals[top])
         refactor(work.program, allowed_at(work, num), basis)
     return num
 
@@ -132,7 +133,7 @@ def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
     """Solve the linear program of the node at work; how that ended, and a bound that holds."""
     allowed = allowed_at(work, num)
     status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, most_exchanges(work.program), deadline))
-    work.duals[:] = work.basis.duals
+    copy_to(work.duals, work.basis.duals)
     make_feasible(work.program, allowed, work.duals)
     return status, certified(work.program, allowed, work.duals)
 
@@ -142,9 +143,9 @@ def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
     """Make the node at work the one side of it that is left; how many columns it has."""
     side, node = work.trials.side, work.node
     num = answer(work.cols, allowed_at(work, num), pair, joined, side)
-    node.active[:num] = side.active[:num]
-    node.columns[:] = side.columns
-    node.slack[:] = side.slack
+    copy_to(node.active[:num], side.active[:num])
+    copy_to(node.columns, side.columns)
+    copy_to(node.slack, side.slack)
     return num
 
 

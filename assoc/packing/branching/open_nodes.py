@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc.packing.branching.root import Root
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Allowed
 
@@ -102,8 +103,8 @@ def has_room(stack: Stack, top: int) -> bool:
 def take_node(stack: Stack, top: int, node: Allowed) -> int:
     """Make the node at ``top`` the one at work; how many columns it has."""
     num = stack.size[top]
-    node.active[:num] = stack.arena[stack.first[top] : stack.first[top] + num]
-    node.slack[:] = stack.slack[top]
+    copy_to(node.active[:num], stack.arena[stack.first[top] : stack.first[top] + num])
+    copy_to(node.slack, stack.slack[top])
     node.columns[:] = False
     for j in node.active[:num]:
         node.columns[j] = True
@@ -117,8 +118,8 @@ def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float)
     num = node.active.size
     stack.first[top] = place
     stack.size[top] = num
-    stack.arena[place : place + num] = node.active
-    stack.slack[top] = node.slack
+    copy_to(stack.arena[place : place + num], node.active)
+    copy_to(stack.slack[top], node.slack)
     stack.bound[top] = lower
-    stack.variable[top] = basis.variable
-    stack.duals[top] = basis.duals
+    copy_to(stack.variable[top], basis.variable)
+    copy_to(stack.duals[top], basis.duals)

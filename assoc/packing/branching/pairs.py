@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, bound_of
 from assoc.packing.simplex.program import Allowed, Program, certified, make_feasible
@@ -96,7 +97,7 @@ def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) 
     """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
     active, columns, slack = side.active, side.columns, side.slack
     columns[:] = False
-    slack[:] = allowed.slack
+    copy_to(slack, allowed.slack)
     one, two = pair
     if joined:
         slack[one] = False
@@ -146,7 +147,7 @@ def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
                         place = count - 1
                     while place > 0 and values[place - 1] * (1.0 - values[place - 1]) < doubt:
                         values[place] = values[place - 1]
-                        pairs[place] = pairs[place - 1]
+                        pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
                         place -= 1
                     values[place] = value
                     pairs[place, 0], pairs[place, 1] = one, two
@@ -164,7 +165,7 @@ def _try(
     status = try_dual(program, side, basis, trials.trial, effort)
     if status == CUT or status == INFEASIBLE:
         # to be believed it must hold
-        trials.duals[:] = trials.trial.basis.duals
+        copy_to(trials.duals, trials.trial.basis.duals)
         make_feasible(program, side, trials.duals)
         return status, certified(program, side, trials.duals)
     return status, bound_of(program, trials.trial.basis)
@@ -271,7 +272,7 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
                     place = found - 1
                 while place > 0 and values[place - 1] < others:
                     values[place] = values[place - 1]
-                    pairs[place] = pairs[place - 1]
+                    pairs[place, 0], pairs[place, 1] = pairs[place - 1, 0], pairs[place - 1, 1]
                     place -= 1
                 values[place] = others
                 pairs[place, 0], pairs[place, 1] = one, two

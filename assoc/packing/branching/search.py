@@ -39,6 +39,7 @@ from assoc.packing.branching.node import (
 from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room
 from assoc.packing.branching.pairs import NEITHER, TOGETHER, WHOLE, any_open_pair, decide, doubtful_pairs
 from assoc.packing.branching.root import MOST_ROWS, plain_root, root_with_cuts
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
@@ -277,7 +278,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
             if weight < incumbent - 1e-3 * tolerance:
                 incumbent = weight
                 count_found = count
-                work.found[:count] = work.trial[:count]
+                copy_to(work.found[:count], work.trial[:count])
                 cut = min(cut, incumbent - tolerance)
                 if lower >= cut:
                     closed = True
@@ -311,7 +312,7 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
             if weight < incumbent:
                 incumbent = weight
                 count_found = count
-                work.found[:count] = work.trial[:count]
+                copy_to(work.found[:count], work.trial[:count])
             continue
         num_open = branch(work, stack, top, num, (one, two), likely >= 0.5, lower)
         at_work = num_open - 1

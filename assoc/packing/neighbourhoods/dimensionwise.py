@@ -24,6 +24,7 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.kernels.columns import first_row
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.neighbourhoods.cover import own, weight_of
 from assoc.packing.packing import Packing, PackingArrays
@@ -267,7 +268,7 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
     change = _weight(cols, weights, owner) - before
     if change < 0.0:
         return change
-    owner[:] = previous
+    copy_to(owner, previous)
     return 0.0
 
 

@@ -20,6 +20,7 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Prices
 from assoc.packing.kernels.columns import first_row, fits
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
 from assoc.packing.packing import PackingArrays
 
@@ -127,5 +128,5 @@ def walk(
                 weight += weights[j]
         if weight < best_weight:
             best_weight = weight
-            best[:] = owner
+            copy_to(best, owner)
     return best, best_weight

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.pricing import Pricing, new_pricing
 from assoc.packing.simplex.program import Allowed, Program
 
@@ -86,24 +87,21 @@ def basis_without(program: Program, columns: int) -> Basis:
     )  # fmt: skip
 
 
-@njit
 def copy_basis(source: Basis, target: Basis) -> None:
     """Make ``target`` the same basis as ``source``."""
-    copy_without_inverse(source, target)
-    target.inverse[:] = source.inverse
-    target.anchors[:] = source.anchors
-    target.age[:] = source.age
+    for name in ("variable", "place", "slack_place", "inverse", "norms", "values", "duals", "anchors", "age"):
+        getattr(target, name)[:] = getattr(source, name)
 
 
 @njit
 def copy_without_inverse(source: Basis, target: Basis) -> None:
     """Give ``target`` the variables of ``source``, their values, the weights of the edges, and the multipliers."""
-    target.variable[:] = source.variable
-    target.place[:] = source.place
-    target.slack_place[:] = source.slack_place
-    target.norms[:] = source.norms
-    target.values[:] = source.values
-    target.duals[:] = source.duals
+    copy_to(target.variable, source.variable)
+    copy_to(target.place, source.place)
+    copy_to(target.slack_place, source.slack_place)
+    copy_to(target.norms, source.norms)
+    copy_to(target.values, source.values)
+    copy_to(target.duals, source.duals)
 
 
 @njit
@@ -123,8 +121,8 @@ def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: B
             basis.variable[r] = num + size + r
     basis.age[:] = 0
     basis.norms[:] = 1.0
-    basis.values[:] = program.sides
-    basis.duals[:] = duals
+    copy_to(basis.values, program.sides)
+    copy_to(basis.duals, duals)
 
 
 @njit
@@ -280,7 +278,7 @@ def residual(program: Program, basis: Basis) -> float:
     """How far the values in the basis are from satisfying the rows."""
     num, size = program.weights.size, program.sides.size
     left = basis.sums
-    left[:] = program.sides
+    copy_to(left, program.sides)
     for i in range(size):
         code = basis.variable[i]
         value = basis.values[i]

@@ -27,6 +27,7 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Program
 
@@ -125,7 +126,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
                         change[r] += step
             if size % 2 == 1 and f < best:
                 best = f
-                best_set[:] = inside
+                copy_to(best_set, inside)
             row = -1
             least = np.inf
             for r in range(num_rows):
@@ -155,7 +156,7 @@ def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
                 return kept
             # the new one takes its place
             for k in range(i, kept - 1):
-                sets[k] = sets[k + 1]
+                copy_to(sets[k], sets[k + 1])
                 scores[k] = scores[k + 1]
             return _keep_at(sets, scores, kept - 1, new, score)
     return _keep_at(sets, scores, place, new, score)
@@ -171,10 +172,10 @@ def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> in
     else:
         kept += 1
     while place > 0 and scores[place - 1] > score:
-        sets[place] = sets[place - 1]
+        copy_to(sets[place], sets[place - 1])
         scores[place] = scores[place - 1]
         place -= 1
-    sets[place] = new
+    copy_to(sets[place], new)
     scores[place] = score
     return kept
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
     Basis,
@@ -195,7 +196,8 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         if done >= effort.exchanges:
             return STOPPED, done
         sign = 1.0 if basis.values[p] > 0.0 else -1.0
-        row[:] = basis.inverse[:, p]
+        for r in range(row.size):
+            row[r] = basis.inverse[r, p]
         chosen, step = entering(program, allowed, basis, sign, tolerance)
         if chosen < 0:
             if age[0] > 0:
@@ -207,7 +209,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         if chosen < num:
             coordinates(program, basis, chosen, basis.column)
         else:
-            basis.column[:] = basis.inverse[chosen - num]
+            copy_to(basis.column, basis.inverse[chosen - num])
         if abs(basis.column[p]) < SMALL_PIVOT and age[0] > 0:
             _renew(program, allowed, basis, tolerance)
             continue

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.program import Allowed, Program
 
 
@@ -96,7 +97,7 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
 @njit
 def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
     """Add to ``sums``, by position, the terms of the rows of each column."""
-    pricing.terms[: terms.size] = terms
+    copy_to(pricing.terms[: terms.size], terms)
     padded, codes, count = pricing.terms, pricing.codes, pricing.listed[0]
     for s in range(codes.shape[0]):
         for a in range(count):

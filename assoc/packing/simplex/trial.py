@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, copy_without_inverse, enter
 from assoc.packing.simplex.dual import (
     CUT,
@@ -85,8 +86,11 @@ def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) 
     pricing = trial.basis.pricing
     list_columns(program, allowed, pricing)
     price(program, base.duals, base.place, pricing)
-    trial.reduced[: allowed.active.size] = pricing.reduced[: allowed.active.size]
-    trial.rows[:] = base.inverse.T
+    for a in range(allowed.active.size):
+        trial.reduced[a] = pricing.reduced[a]
+    for i in range(trial.rows.shape[0]):
+        for r in range(trial.rows.shape[1]):
+            trial.rows[i, r] = base.inverse[r, i]
 
 
 @njit
@@ -124,7 +128,7 @@ def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, vari
     if variable < num:
         coordinates(program, base, variable, column)
     else:
-        column[:] = base.inverse[variable - num]
+        copy_to(column, base.inverse[variable - num])
     for k in range(done):
         place = pivots[k]
         share = column[place]

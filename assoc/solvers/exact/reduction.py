@@ -31,6 +31,7 @@ from assoc.packing.bounds.priced import TOLERANCE
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_components
 from assoc.packing.kernels.columns import first_row
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, penalised
 from assoc.packing.packing import Packing, PackingArrays, assembled, find
@@ -235,7 +236,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         row_start = packing.row_start
         for c in range(alive.size):
             if not alive[c]:
-                closed[counts[2]] = bound[c], weight[c]
+                closed[counts[2], 0], closed[counts[2], 1] = bound[c], weight[c]
                 counts[2] += 1
                 for r in range(row_start[c], row_start[c + 1]):
                     j = owner[r]
@@ -405,10 +406,10 @@ def _compare(
             weight[c] = best_of_both(cols, weights, top, end, owner, new_owner, parent, gain)
         elif complete:
             weight[c] = new_weight[c]
-            owner[top:end] = new_owner[top:end]
+            copy_to(owner[top:end], new_owner[top:end])
         if new_bound[c] >= bound[c]:
             bound[c] = new_bound[c]
-            duals[top:end] = new_duals[top:end]
+            copy_to(duals[top:end], new_duals[top:end])
         # whole-numbered weights: what is not better by nearly 1 is not better
         step = 0.999 * granularity
         gap = weight[c] - new_bound[c] - step

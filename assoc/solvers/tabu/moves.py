@@ -16,6 +16,7 @@ from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc.packing.components.component import NEIGHBOURHOODS, Component
 from assoc.packing.kernels.columns import first_row, fits
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.neighbourhoods.insertion import insert, insertion_gain
 from assoc.packing.packing import PackingArrays
@@ -197,5 +198,5 @@ def _moves(
                 gain[row_cols[k]] = insertion_gain(cols, weights, owner, row_cols[k])
         if current < record - 1e-9:
             record = current
-            best[:] = owner
+            copy_to(best, owner)
     return clock
