@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
-from assoc.packing.kernels.heap import doubled, pop, push
+from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 
 NOT_COMPLETE = -1
 _ALONE = -1
@@ -132,7 +133,7 @@ def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: 
     if store.num[0] < k:
         if store.num[0] == store.key.size:
             store = Store(
-                doubled(store.key), doubled(store.slot), doubled(store.marks), doubled(store.columns), store.num
+                doubled(store.key), doubled(store.slot), doubled(store.marks), doubled_rows(store.columns), store.num
             )
         at = store.num[0]
         push(store.key, store.slot, at, -weight, at)
@@ -142,7 +143,8 @@ def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: 
         pop(store.key, store.slot, k - 1)
         push(store.key, store.slot, k - 1, -weight, at)
     store.marks[at] = mark
-    store.columns[at, :count] = own
+    for t in range(count):
+        store.columns[at, t] = own[t]
     store.columns[at, count] = -1
     return store
 
@@ -262,7 +264,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
             ordered = False
             break
     if not ordered:
-        own[:] = own[np.argsort(reduced[own], kind="mergesort")]
+        copy_to(own, own[np.argsort(reduced[own], kind="mergesort")])
 
 
 @njit

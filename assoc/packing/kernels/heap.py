@@ -11,9 +11,21 @@ from assoc._system.compiled import njit
 
 @njit
 def doubled(array: Any) -> Any:
-    """Return a copy with twice the room along the first axis."""
-    larger = np.empty((2 * array.shape[0], *array.shape[1:]), array.dtype)
-    larger[: array.shape[0]] = array
+    """Return a copy with twice the room."""
+    larger = np.empty(2 * array.size, array.dtype)
+    for i in range(array.size):
+        larger[i] = array[i]
+    return larger
+
+
+@njit
+def doubled_rows(table: Any) -> Any:
+    """Return a copy of a table with room for twice as many rows."""
+    num, width = table.shape
+    larger = np.empty((2 * num, width), table.dtype)
+    for i in range(num):
+        for k in range(width):
+            larger[i, k] = table[i, k]
     return larger
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
 from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Taboo
 
@@ -158,11 +159,11 @@ def make_node(
     dummy = graph.column_alone.size
     row = order[parent, place]
     length, num_reached, num_tree = search_path(graph, nodes, taboo, work, parent, row, alone, np.inf)
-    edge_of[node] = edge_of[parent]
-    row_of[node] = row_of[parent]
-    u[node] = u[parent]
-    v[node] = v[parent]
-    order[node] = order[parent]
+    copy_to(edge_of[node], edge_of[parent])
+    copy_to(row_of[node], row_of[parent])
+    copy_to(u[node], u[parent])
+    copy_to(v[node], v[parent])
+    copy_to(order[node], order[parent])
     fixed[node] = place
     own = edge_of[parent, row]
     forbidden[node, 0] = parent if place == fixed[parent] else -1
@@ -211,7 +212,7 @@ def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node
         bounds = np.empty(num_rows - start)
         for t in range(start, num_rows):
             bounds[t - start] = -_way_round(graph, nodes, taboo, node, order[node, t])
-        order[node, start:] = order[node, start:][np.argsort(bounds, kind="mergesort")]
+        copy_to(order[node, start:], order[node, start:][np.argsort(bounds, kind="mergesort")])
     for t in range(first, num_rows):
         r = order[node, t]
         bound = node_cost[node] + _way_round(graph, nodes, taboo, node, r)

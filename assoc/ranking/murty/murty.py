@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.kernels.matching import match_sparse
 from assoc.ranking.murty.arrays import (
@@ -178,7 +179,7 @@ def _root(graph: Graph, nodes: Nodes, queues: Queues) -> bool:
     cost = match_sparse(row_ptr, edge_columns, edge_costs, row_slack, column_slack, matched, nodes.u[0], own_v)
     if cost == np.inf:
         return False
-    nodes.v[0, :num_columns] = own_v
+    copy_to(nodes.v[0, :num_columns], own_v)
     nodes.v[0, num_columns] = 0.0
     row_of[0] = -1
     for r in range(num_rows):

@@ -19,6 +19,7 @@ import numpy as np
 
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.ranking.pairs.graph import PairGraph
 
 OPEN, PAIR, CLOSE = 0, 1, 2
@@ -168,7 +169,7 @@ def swept(steps: Any, weights: Floats, free: Floats, probability: Floats) -> Non
             table[size : 2 * size] = 0.0
             size *= 2
         elif kind == PAIR:
-            before[used : used + size] = table[:size]
+            copy_to(before[used : used + size], table[:size])
             used += size
             for i in range(size):
                 if not i & low and not i & high:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.compiled import njit, search_njit
+from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.losses import Priced
 
 VISITS = 20_000
@@ -148,7 +149,7 @@ def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: A
                 total += _left_over(trees, taken, good, start, history, known, used)
             if total < least - margin:
                 least = total
-                best[:] = taken
+                copy_to(best, taken)
             i -= 1
             continue
         if taken[i] >= 0:

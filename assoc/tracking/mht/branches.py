@@ -13,6 +13,7 @@ import numpy as np
 
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Array
+from assoc.packing.kernels.copying import copy_to
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.losses import priced
 from assoc.tracking.mht.pruning import keep_best
@@ -123,12 +124,12 @@ def _extend(tables: Tables, miss: Any, hits: Hits, roots: Roots, column: int, sc
         tree[old + pairs + i], score[old + pairs + i] = ids[i], first[i]
     wide = np.zeros((score.size, history.shape[1]), np.int32)
     for i in range(old):
-        wide[i] = history[i]
+        copy_to(wide[i], history[i])
     for i in range(pairs):
-        wide[old + i] = history[branch[i]]
+        copy_to(wide[old + i], history[branch[i]])
         wide[old + i, column] = measurement[i] + 1
     for i in range(ids.size):
-        wide[old + pairs + i, : rows.shape[1]] = rows[i]
+        copy_to(wide[old + pairs + i, : rows.shape[1]], rows[i])
     known = priced(tree, score, wide)
     chosen, doubtful = choose(score, wide, known, limits.visits)
     grown = _Grown(tree, score, known.loss, chosen)
@@ -155,12 +156,12 @@ def _cut(tables: Tables, hits: Hits, roots: Roots, grown: _Grown, column: int, s
             new_numbers[k, SCORE] = new_numbers[k, BEST] = new_numbers[k, EXISTS] = first[i]
             new_numbers[k, STARTED] = new_numbers[k, LAST] = since[i]
             new_counts[k, ID] = ids[i]
-            new_history[k, : rows.shape[1]] = rows[i]
+            copy_to(new_history[k, : rows.shape[1]], rows[i])
             continue
         source = row if row < old else branch[row - old]
-        new_numbers[k] = numbers[source]
-        new_counts[k] = counts[source]
-        new_history[k] = history[source]
+        copy_to(new_numbers[k], numbers[source])
+        copy_to(new_counts[k], counts[source])
+        copy_to(new_history[k], history[source])
         new_born[k] = born[source]
         new_numbers[k, SCORE] = score[row]
         new_numbers[k, EXISTS] += score[row] - numbers[source, SCORE]

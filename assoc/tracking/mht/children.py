@@ -19,7 +19,8 @@ import numpy as np
 
 from assoc._system.compiled import search_njit
 from assoc._types import Array
-from assoc.packing.kernels.heap import doubled, pop, push
+from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.kernels.matching import match_sparse
 
 NEW, FALSE = -1, -2
@@ -131,7 +132,7 @@ def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, mo
     parent, choice, after = _rank(Parents(holds, alone), meanings, most, drop)
     held = np.zeros((parent.size, tracks + pairs + meanings.birth.size), np.bool_)
     for c in range(parent.size):
-        held[c, :tracks] = holds[parent[c]]
+        copy_to(held[c, :tracks], holds[parent[c]])
         for j in range(choice.shape[1]):
             if choice[c, j] == NEW:
                 held[c, tracks + pairs + j] = True
@@ -185,8 +186,8 @@ def _rank(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
         size += 1
         while made + count > key.size:
             nodes = _Nodes(
-                doubled(nodes.parent), doubled(nodes.above), doubled(nodes.turn), doubled(nodes.choice),
-                doubled(nodes.cost), doubled(nodes.rise),
+                doubled(nodes.parent), doubled(nodes.above), doubled(nodes.turn), doubled_rows(nodes.choice),
+                doubled(nodes.cost), doubled_rows(nodes.rise),
             )  # fmt: skip
             nodes.cost[made:] = np.inf
             key, item = doubled(key), doubled(item)
