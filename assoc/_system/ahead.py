@@ -17,7 +17,7 @@ from assoc._system.compiled import is_kept
 _under_way: list[subprocess.Popen[bytes]] = []
 
 
-def compile_ahead(kernel: Any, prepare: Callable[[], object]) -> None:
+def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> None:
     """Let another process call ``prepare``, if no compiled code of the kernel that it is for is on disk.
 
     Parameters
@@ -25,8 +25,10 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object]) -> None:
     kernel : Dispatcher
     prepare : callable
         A function at the top level of a module, which calls the kernel.
+    anyway : bool
+        Also where this thread interprets nothing: all that it needs is to be compiled.
     """
-    if _under_way or not interpreted.may_use_processes() or is_kept(kernel):
+    if _under_way or not (anyway or interpreted.may_use_processes()) or is_kept(kernel):
         return
     words = [sys.executable, "-m", __name__, prepare.__module__, prepare.__qualname__]
     quiet = subprocess.DEVNULL

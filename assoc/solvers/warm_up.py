@@ -7,7 +7,6 @@ ones never meet branch and bound, and the first hard one would wait for half a m
 from __future__ import annotations
 
 import contextlib
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -16,10 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.ahead import wait_for_kernels
 from assoc._system.door import door
 from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
+from assoc.packing import prepare as packing_form
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.search import compile_all_branching_ahead
+from assoc.packing.components.splitting import split_components
 from assoc.packing.kernels.sorting import ascending
+from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
@@ -30,10 +35,11 @@ _TUPLES = 2000
 # iterations without improvement, or nodes, after which a search has met all its kernels
 _LIMITS = {"patience": 12, "nodes": 60}
 
-
-# what a second process compiles while this one compiles the kernels of the other solvers; each loads what the other has
-# compiled before
-_HEURISTICS = ("tabu", "genetic", "aco")
+# solvers that need branch and bound, on hard problems at least; a second process compiles that, half of all there is,
+# while this one compiles what they need besides
+_BRANCHING = ("exact", "aco", "genetic", "tabu")
+# solvers that `exact` takes iterations of, in large components
+_WITH_EXACT = ("genetic", "tabu")
 
 
 @door
@@ -62,19 +68,24 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
     for name in names:
         registry.parameters(name)
-    beside = [name for name in names if name in _HEURISTICS]
-    here = [name for name in names if name not in beside]
+    if "exact" in names:
+        names += [name for name in _WITH_EXACT if name not in names]
+    branching = [name for name in names if name in _BRANCHING]
+    if branching:
+        compile_all_branching_ahead()
     with compiled_only(), _Line() as say:
-        helper = _begin_beside(beside) if beside and here else None
-        for name in here:
+        for name in names:
+            if name not in branching:
+                say(name)
+                prepare([name])
+        if branching:
+            say(", ".join(branching))
+            _begin_searches(branching)
+        for name in branching:
+            # the first branch and bound waits for the other process
             say(name)
             prepare([name])
-        if helper is not None:
-            say(", ".join(beside))
-            helper.wait()
-        for name in beside:
-            say(name)
-            prepare([name])
+        wait_for_kernels()
         # only large problems sort so, and their time limits are the hardest to keep
         ascending(np.zeros(10_000))
     return time.perf_counter() - started
@@ -98,15 +109,37 @@ class _Line:
             sys.stderr.flush()
 
 
-def _begin_beside(names: list[str]) -> subprocess.Popen[bytes] | None:
-    """Start a process that compiles the kernels of these solvers; None where none can be started."""
-    code = f"from assoc.solvers.warm_up import prepare; prepare({names!r})"
-    command = [sys.executable, "-c", code]
-    quiet: Any = subprocess.DEVNULL
-    try:
-        return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
-    except OSError:
-        return None
+def _begin_searches(names: list[str]) -> None:
+    """Compile what solvers need before their first branch and bound, and what they do between two of them."""
+    packing = packing_form.prepare(_small_problem()).packing
+    run = Run(0)
+    if "exact" in names:
+        from assoc.solvers.exact.reduction import Reduction
+
+        reduction = Reduction(packing, run)
+        reduction.reduce()
+        # summed up to decide whether these multipliers alone are a proof
+        _ = reduction.proof
+    component = split_components(packing, dual_bound(packing, run=run), np.arange(packing.num_columns))[0]
+    component.offer_greedy()
+    if "tabu" in names:
+        from assoc.solvers.tabu.moves import TabuSearch
+        from assoc.solvers.tabu.parameters import TabuParameters
+
+        TabuSearch(component, TabuParameters()).iterate(component, run.rng)
+    if "genetic" in names:
+        from assoc.solvers.genetic.parameters import GeneticParameters
+        from assoc.solvers.genetic.population import Breeding
+
+        breeding = Breeding(component, GeneticParameters())
+        for _ in range(2):
+            # a population, then its children
+            breeding.iterate(component, run.rng)
+    if "aco" in names:
+        from assoc.solvers.aco.max_min import Colony
+        from assoc.solvers.aco.parameters import AcoParameters
+
+        Colony(component, AcoParameters(), lambda component, colony: None).iterate(component, run.rng)
 
 
 def prepare(names: Iterable[str]) -> None:
@@ -129,17 +162,17 @@ def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
 
 
 def _problems() -> list[AssignmentProblem]:
-    """Problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one.
-
-    The first is too small for `exact` to call a metaheuristic, but not closed by its bound: by the time that it needs
-    their kernels, the other process has compiled them.
-    """
-    small = _random_problem(np.random.default_rng(2), 8, 150)
+    """Problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one."""
     rng = np.random.default_rng(1)
     dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
     planar = AssignmentProblem.from_dense(rng.normal(size=(5, 6)))
-    return [small, axial, dense, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
+    return [_small_problem(), axial, dense, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
+
+
+def _small_problem() -> AssignmentProblem:
+    """A problem that is not closed by its bound, and too small for dives in the linear program."""
+    return _random_problem(np.random.default_rng(2), 8, 150)
 
 
 def _random_problem(rng: np.random.Generator, rows: int, count: int) -> AssignmentProblem:

@@ -324,9 +324,24 @@ def compile_branching_ahead() -> None:
     compile_ahead(_search, compile_branching)
 
 
+def compile_all_branching_ahead() -> None:
+    """The same, with what searches to the end need besides, and also where nothing is to be interpreted."""
+    compile_ahead(_search, compile_all_branching, anyway=True)
+
+
 def compile_branching() -> None:
     """Compile the search, on three measurements of which each two could be one target."""
+    _on_three(to_the_end=False)
+
+
+def compile_all_branching() -> None:
+    """Compile the search, and the cuts of its root: the three measurements are an odd set, of which one is cut off."""
+    compile_branching()
+    _on_three(to_the_end=True)
+
+
+def _on_three(to_the_end: bool) -> None:
     with interpreted_only():
         rows = np.array([[0, 1, -1], [0, -1, 2], [-1, 1, 2]], np.int32)
         packing = assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)
-    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9).run(10)
+    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9, to_the_end=to_the_end).run(10)
