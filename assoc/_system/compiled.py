@@ -20,7 +20,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import caching, event
+from numba.core import caching, event, types
 
 from assoc._system import compile_time, shipped, temporary
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
@@ -35,6 +35,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wra
 _CACHES: Any = caching.CacheImpl
 _CONFIG: Any = numba.config
 _EVENT: Any = event
+_TYPES: Any = types
 _STANDARD_LOCATORS = tuple(_CACHES._locator_classes)
 
 
@@ -99,13 +100,40 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
         return found
 
 
+def _common(kind: Any) -> Any:
+    """The type for which a kernel is compiled where another one gives it a whole number: always the same."""
+    if isinstance(kind, (_TYPES.IntegerLiteral, _TYPES.BooleanLiteral)):
+        kind = kind.literal_type
+    if isinstance(kind, _TYPES.Integer) and kind.signed and kind.bitwidth < 64:
+        return _TYPES.int64
+    if type(kind) in (_TYPES.Tuple, _TYPES.UniTuple):
+        return _TYPES.Tuple(tuple(map(_common, kind)))
+    return kind
+
+
+def _called_with_common_types(kernel: Any) -> Callable[..., Any]:
+    """What answers kernels that call this one: numba would compile it for each literal number and each width anew."""
+    call_template = kernel.get_call_template
+
+    def template(args: Any, kws: Any) -> Any:
+        return call_template(tuple(map(_common, args)), {name: _common(kind) for name, kind in dict(kws).items()})
+
+    return template
+
+
 def njit(
-    function: Callable[..., Any], *, small: int = SMALL, stand_in: Callable[..., Any] | None = None
+    function: Callable[..., Any],
+    *,
+    small: int = SMALL,
+    stand_in: Callable[..., Any] | None = None,
+    literal: bool = False,
 ) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True``.
 
     Until it is compiled, calls with arrays of at most ``small`` elements together are interpreted (interpreted.py), by
     ``stand_in`` where that is given.
+
+    Kernels that call it give it whole numbers as int64, whatever their own are; with ``literal`` as they are.
 
     With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
     """
@@ -118,6 +146,8 @@ def njit(
 
         return silent
     kernel: Any = numba.njit(**_OPTIONS)(function)
+    if not literal:
+        kernel.get_call_template = _called_with_common_types(kernel)
     # nowhere to keep it, not even for a while: each process compiles for itself
     with contextlib.suppress(OSError):
         kernel._cache = _KernelCache(function)
@@ -128,6 +158,11 @@ def njit(
 def search_njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel that searches a tree: as `njit`, but interpreted only where its arrays are very small."""
     return njit(function, small=SMALL_SEARCH)
+
+
+def literal_njit(function: Callable[..., Any]) -> Any:
+    """Compile a kernel as `njit`, but anew for each literal number that it is given: its loops are unrolled then."""
+    return njit(function, literal=True)
 
 
 def is_kept(kernel: Any) -> bool:

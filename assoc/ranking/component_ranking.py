@@ -220,8 +220,8 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
     """
     deadline = wanted.deadline
     nodes = 0
-    # the node whose basis is at work; not a literal -1: numba would compile what it is given to for that, too
-    at_work: Any = np.int64(-1)
+    # the node whose basis is at work
+    at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
         if not has_room(stack, top) or is_over(deadline):

@@ -202,8 +202,7 @@ def enumerate_solutions(
     slack_left = np.empty(num_rows, np.bool_)
     spent = np.empty(num_rows + 1)
     chosen = np.empty(num_rows + 1, np.int32)
-    # not a literal 0: numba would compile what it is given to for that, too
-    count = np.int64(0)
+    count = 0
     depth = 0
     steps = 0
     spent[0] = base

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import literal_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
@@ -96,7 +96,7 @@ def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: A
         )  # fmt: skip
 
 
-@njit
+@literal_njit
 def correct(
     d: int, c: int, mean: Array, P: Array, columns: Array, H: Array, R: Array, v: Array, S: Array,
     new_mean: Array, new_P: Array, X: Array, K: Array, L: Array, W: Array, G: Array, M: Array,

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import literal_njit, njit
 from assoc._types import Array
 
 
-@njit
+@literal_njit
 def factor(A: Array, n: int, L: Array) -> bool:
     """Write the lower Cholesky factor of A[:n, :n] into L; False where A is not positive definite."""
     for i in range(n):

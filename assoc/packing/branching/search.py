@@ -245,8 +245,8 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
     cols, program, basis, trials = work.cols, work.program, work.basis, work.trials
     count_found = -1
     nodes = 0
-    # the node whose basis is at work; not a literal -1: numba would compile what it is given to for that, too
-    at_work: Any = np.int64(-1)
+    # the node whose basis is at work
+    at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
         if not has_room(stack, top):

@@ -137,8 +137,7 @@ def match_sparse(
         v[j] = 0.0
     owner = np.full(m, -1, np.int64)
     pending = np.empty(n, np.int64)
-    # not a literal 0: numba would compile what it is given to for that, too
-    num_pending = np.int64(0)
+    num_pending = 0
     for i in range(n):
         row_edge[i] = -1
         least, best = np.inf, -1

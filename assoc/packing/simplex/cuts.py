@@ -90,8 +90,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
                 place[r] += 1
     sets = np.zeros((_KEPT, num_rows), np.bool_)
     scores = np.full(_KEPT, _LARGEST)
-    # not a literal 0: numba would compile what it is given to for that, too
-    kept = np.int64(0)
+    kept = 0
     inside, odd = np.zeros(num_rows, np.bool_), np.zeros(count, np.bool_)
     change, rest = np.empty(num_rows), np.empty(num_rows, np.int64)
     best_set = np.zeros(num_rows, np.bool_)
