@@ -311,7 +311,7 @@ def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadlin
                 start[which[j] + 1] += 1
     for k in range(_CLASSES):
         start[k + 1] += start[k]
-    order = np.empty(start[_CLASSES], np.int64)
+    order = np.empty(start[_CLASSES], np.int32)
     for j in range(weights.size):
         if which[j] < _CLASSES:
             order[start[which[j]]] = j

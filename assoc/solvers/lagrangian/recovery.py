@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.cover import chosen_columns
+from assoc.packing.neighbourhoods.cover import chosen_columns, own
 from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
 
 
@@ -25,16 +25,16 @@ class _Partial(NamedTuple):
     """Whether a partial tuple has a row that must be covered, bool (R,)."""
 
 
-def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int64] | None:
+def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
     """Return a feasible choice of columns built up sensor by sensor, None where that met a dead end."""
-    owner = np.full(duals.size, -1, dtype=np.int64)
+    owner = np.full(duals.size, -1, dtype=np.int32)
     if arranged.cols.shape[1] == 1:
         # with one sensor there is nothing to assign upward: each row takes its cheapest column
         order = np.argsort(-arranged.weights, kind="stable")
         owner[arranged.cols[order, 0]] = order
     elif not _recover(arranged, duals, owner):
         return None
-    chosen: NDArray[np.int64] = chosen_columns(arranged.cols, owner)
+    chosen: NDArray[np.int32] = chosen_columns(arranged.cols, owner)
     return chosen
 
 
@@ -148,10 +148,12 @@ def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
                 e = row_edge[p]
                 if e >= 0:
                     taken[indices[e]] = True
-                _own(cols, owner, column[e] if e >= 0 else left_column[p])
+                j = column[e] if e >= 0 else left_column[p]
+                if j >= 0:
+                    own(cols, j, owner)
             for i in range(num_right):
-                if not taken[i]:
-                    _own(cols, owner, right_column[i])
+                if not taken[i] and right_column[i] >= 0:
+                    own(cols, right_column[i], owner)
             return True
         partner = np.full(num_partial, -1, np.int64)
         for p in range(num_partial):
@@ -204,12 +206,3 @@ def _grow(arranged: Arranged, partial: _Partial, partner: Any, column: Any, righ
         if sensor[r] <= level and not slack[r]:
             must[of_row[r]] = True
     return count
-
-
-@njit
-def _own(cols: Any, owner: Any, j: int) -> None:
-    """Make a column, if it is one, the owner of its rows."""
-    if j >= 0:
-        for s in range(cols.shape[1]):
-            if cols[j, s] >= 0:
-                owner[cols[j, s]] = j
