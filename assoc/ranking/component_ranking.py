@@ -39,6 +39,8 @@ from assoc.packing.branching.pairs import (
     part_certain,
 )
 from assoc.packing.branching.root import plain_root
+from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
@@ -148,12 +150,12 @@ class ComponentRanking:
 
 @njit
 def _sorted_store(store: Store) -> Any:
-    order = np.argsort(-store.key[: store.num[0]], kind="mergesort")
+    order = order_of(-store.key[: store.num[0]])
     weights = np.empty(order.size)
     columns = np.empty((order.size, store.columns.shape[1]), np.int32)
     for i in range(order.size):
         weights[i] = -store.key[order[i]]
-        columns[i] = store.columns[store.slot[order[i]]]
+        copy_to(columns[i], store.columns[store.slot[order[i]]])
     return weights, columns
 
 
@@ -166,9 +168,9 @@ def _priced(work: Work, num: int) -> PricedColumns:
     reduced = np.empty(num)
     row_ptr = np.zeros(work.trial.size + 1, np.int64)
     for a in range(num):
-        own_cols[a] = cols[active[a]]
         reduced[a] = reduced_cost(work.program, work.duals, active[a])
         for s in range(num_sensors):
+            own_cols[a, s] = cols[active[a], s]
             if own_cols[a, s] >= 0:
                 row_ptr[own_cols[a, s] + 1] += 1
     for r in range(work.trial.size):

@@ -21,6 +21,7 @@ from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
+from assoc.packing.kernels.sorting import order_of
 
 NOT_COMPLETE = -1
 _ALONE = -1
@@ -263,7 +264,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
             ordered = False
             break
     if not ordered:
-        copy_to(own, own[np.argsort(reduced[own], kind="mergesort")])
+        copy_to(own, own[order_of(reduced[own])])
 
 
 @njit

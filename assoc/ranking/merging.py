@@ -89,5 +89,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
 @njit
 def _wider(array: Any, columns: int) -> Any:
     result = np.empty((array.shape[0], columns), np.int32)
-    result[:, : array.shape[1]] = array
+    for i in range(array.shape[0]):
+        for k in range(array.shape[1]):
+            result[i, k] = array[i, k]
     return result

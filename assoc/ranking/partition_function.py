@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import njit, search_njit
 from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
 from assoc.packing.packing import Packing
 from assoc.ranking.columns import AllColumns
@@ -174,7 +175,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
             if used == log_spent.size:
                 done, log_spent, log_bound = doubled_rows(done), doubled(log_spent), doubled(log_bound)
                 key, item = doubled(key), doubled(item)
-            done[used] = before
+            copy_to(done[used], before)
             done[used, row] = True
             if j >= 0:
                 for s in range(cols.shape[1]):

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
-from assoc.packing.kernels.sorting import ascending
+from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
@@ -161,6 +162,10 @@ def test_sorting_as_numpy_does():
         np.zeros(0),
     ):
         assert np.array_equal(ascending(values), np.argsort(values, kind="stable"))
+        with compiled_only():
+            for size in (values.size, 100, 33, 32, 17, 16, 1):
+                some = values[:size]
+                assert np.array_equal(order_of(some), np.argsort(some, kind="stable"))
 
 
 def test_clusters_and_distinct_tuples():

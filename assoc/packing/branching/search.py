@@ -40,6 +40,7 @@ from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room
 from assoc.packing.branching.pairs import NEITHER, TOGETHER, WHOLE, any_open_pair, decide, doubtful_pairs
 from assoc.packing.branching.root import MOST_ROWS, plain_root, root_with_cuts
 from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
@@ -197,7 +198,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
     covered = np.zeros(trial.size, np.bool_)
     weight = 0.0
     count = 0
-    for a in np.argsort(work.key[: active.size], kind="mergesort"):
+    for a in order_of(work.key[: active.size]):
         j = active[a]
         free = True
         duty = False

@@ -25,7 +25,7 @@ from assoc._system.compiled import njit, search_njit
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
 from assoc.packing.kernels.columns import first_row
-from assoc.packing.kernels.sorting import ascending
+from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
 from assoc.packing.packing import PackingArrays
 
@@ -249,7 +249,7 @@ def _search_clusters(
                 count = collect(packing, by_row, prices, rows[:num], local, limit, found)
             count, base = tighten(found, count, num, budget, max(0.15 * excess, 1e-12), sweep)
             if count > 0:
-                order = np.argsort(cost[:count], kind="mergesort")
+                order = order_of(cost[:count])
                 lists[0, 0] = count
                 for t in range(count):
                     e = order[t]

@@ -11,7 +11,7 @@ is 0 in every solution, whose cost can be what we like. With anchors of cost u, 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.sorting import order_of
 from assoc.packing.simplex.pricing import Pricing, new_pricing
 from assoc.packing.simplex.program import Allowed, Program
 
@@ -226,7 +227,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
         for k in range(program.start[order[i]], program.start[order[i] + 1]):
             if not taken[program.rows[k]]:
                 open_rows[i] += 1.0
-    for i in np.argsort(open_rows, kind="mergesort"):
+    for i in order_of(open_rows):
         j = order[i]
         coordinates(program, basis, j, column)
         p = -1
@@ -295,10 +296,8 @@ def residual(program: Program, basis: Basis) -> float:
     return largest
 
 
-@njit
-def primal_values(program: Program, basis: Basis, primal: Any) -> None:
+def primal_values(program: Program, basis: Basis, primal: Floats) -> None:
     """Value of every column."""
+    columns = basis.variable < program.weights.size
     primal[:] = 0.0
-    for i in range(basis.variable.size):
-        if basis.variable[i] < program.weights.size:
-            primal[basis.variable[i]] = max(basis.values[i], 0.0)
+    primal[basis.variable[columns]] = np.maximum(basis.values[columns], 0.0)

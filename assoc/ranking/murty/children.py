@@ -14,6 +14,7 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
+from assoc.packing.kernels.sorting import order_of
 from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Taboo
 
 
@@ -212,7 +213,7 @@ def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node
         bounds = np.empty(num_rows - start)
         for t in range(start, num_rows):
             bounds[t - start] = -_way_round(graph, nodes, taboo, node, order[node, t])
-        copy_to(order[node, start:], order[node, start:][np.argsort(bounds, kind="mergesort")])
+        copy_to(order[node, start:], order[node, start:][order_of(bounds)])
     for t in range(first, num_rows):
         r = order[node, t]
         bound = node_cost[node] + _way_round(graph, nodes, taboo, node, r)

@@ -18,7 +18,7 @@ from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
-from assoc.packing.kernels.sorting import ascending
+from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cover import Cover, own
 from assoc.packing.neighbourhoods.insertion import insert_and_eject
 from assoc.packing.packing import PackingArrays
@@ -150,7 +150,7 @@ def _cross(
                 # exponential races: small reduced costs tend to come first
                 key[count] = reduced[k] / temperature - math.log(-math.log(rng.random() + 1e-300) + 1e-300)
                 count += 1
-    order = np.argsort(key[:count], kind="mergesort")
+    order = order_of(key[:count])
     for i in order:
         j = rest[i]
         if fits(cols, owner, j):

@@ -16,6 +16,7 @@ import numpy as np
 
 from assoc._system.compiled import njit, search_njit
 from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.sorting import order_of
 from assoc.tracking.mht.losses import Priced
 
 VISITS = 20_000
@@ -48,8 +49,8 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
     good = np.flatnonzero(score > 0.0)
     num = known.trees.size
     # branches of each tree, the least loss first
-    good = good[np.argsort(known.loss[good], kind="mergesort")]
-    good = good[np.argsort(known.number[good], kind="mergesort")]
+    good = good[order_of(known.loss[good])]
+    good = good[order_of(known.number[good])]
     start = np.searchsorted(known.number[good], np.arange(num + 1))
     # trees that share a measurement are of one group
     parent = np.arange(num)
@@ -67,7 +68,7 @@ def choose(score: Any, history: Any, known: Priced, visits: int) -> Any:
     for t in range(num):
         group[t] = _root(parent, t)
     used = np.zeros(known.measurements.size, np.bool_)
-    order = np.argsort(group, kind="mergesort")
+    order = order_of(group)
     begin = 0
     while begin < num:
         end = begin + 1
@@ -130,7 +131,7 @@ def _search(trees: Any, good: Any, start: Any, history: Any, known: Any, used: A
     """Choose the branches of one group; what is left of the visits, negative when they did not suffice."""
     depth = trees.size
     # trees of high prices first: without a branch of theirs little is left
-    trees = trees[np.argsort(-known.trees[trees], kind="mergesort")]
+    trees = trees[order_of(-known.trees[trees])]
     place = np.empty(depth + 1, np.int64)
     taken = np.full(depth, -1, np.int64)
     best = np.full(depth, -1, np.int64)

@@ -20,6 +20,7 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc.packing.bounds.dual_ascent import START, SmoothPoint, hard_sweeps, smooth_passes, spread
+from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import PackingArrays, assembled
 
 # temperatures of the smoothed ascent, in nats: alternatives of a tree differ by some ten, however large their scores
@@ -106,7 +107,7 @@ def priced(tree: Any, score: Any, history: Any) -> Any:
 @njit
 def _numbered(tree: Any) -> Any:
     """Number the trees from 0; also how many there are."""
-    order = np.argsort(tree, kind="mergesort")
+    order = order_of(tree)
     number = np.empty(tree.size, np.int64)
     trees = 0
     for k in range(tree.size):

@@ -8,6 +8,7 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
+from assoc.packing.kernels.sorting import order_of
 
 MOST_SCANS = 1000
 """The most scans that a decision may be put off: every branch carries its history with it."""
@@ -30,7 +31,7 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
     drop : float
         Branches with a greater loss are cut.
     """
-    order = np.argsort(tree, kind="mergesort")
+    order = order_of(tree)
     kept = np.empty(order.size, np.int64)
     count, begin = 0, 0
     while begin < order.size:
@@ -38,7 +39,7 @@ def keep_best(tree: Array, score: Array, loss: Array, most: int, drop: float) ->
         while end < order.size and tree[order[end]] == tree[order[begin]]:
             end += 1
         group = order[begin:end]
-        group = group[np.argsort(loss[group], kind="mergesort")]
+        group = group[order_of(loss[group])]
         limit = drop + max(0.0, -score[group].max())
         for rank in range(min(most, group.size)):
             if loss[group[rank]] <= limit:
@@ -98,7 +99,7 @@ def _decide(tree: Any, score: Any, chosen: Any, old: Any, oldest: Any, most: int
             waiting[size] = row
             size += 1
     waiting = waiting[:size]
-    for row in waiting[np.argsort(-score[waiting], kind="mergesort")]:
+    for row in waiting[order_of(-score[waiting])]:
         free = speaker[number[row]] < 0
         for s in range(sensors):
             free = free and not taken[s, oldest[row, s]]
