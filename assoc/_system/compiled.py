@@ -31,6 +31,9 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 # nobody calls kernels as functions of C: what would let them is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
+# functions of inner kernels
+_inner: set[Callable[..., Any]] = set()
 
 _CACHES: Any = caching.CacheImpl
 _CONFIG: Any = numba.config
@@ -58,7 +61,8 @@ class _PackageCacheLocator:
             _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
             locator = _STANDARD_LOCATORS[0].from_function(py_func, py_file)
         # neither the place in the file nor its time: a copied or checked-out tree keeps its compiled kernels
-        locator.get_source_stamp = lambda: KernelStamp(py_func, _OPTIONS)
+        options = _INNER_OPTIONS if py_func in _inner else _OPTIONS
+        locator.get_source_stamp = lambda: KernelStamp(py_func, options)
         locator.get_disambiguator = lambda: "kernel"
         return locator
 
@@ -158,6 +162,31 @@ def njit(
 def search_njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel that searches a tree: as `njit`, but interpreted only where its arrays are very small."""
     return njit(function, small=SMALL_SEARCH)
+
+
+def inner_njit(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that other kernels alone call, without what lets Python call it.
+
+    That takes arrays out of their objects and puts them in again: most of the code of a small kernel of many arrays.
+    Where Python calls it (tests do) it is interpreted.
+    """
+    if _CONFIG.DISABLE_JIT:
+        return njit(function)
+    _inner.add(function)
+    kernel: Any = numba.njit(**_INNER_OPTIONS)(function)
+    kernel.get_call_template = _called_with_common_types(kernel)
+
+    @functools.wraps(function)
+    def silent(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+
+    # there is nothing that Python could call, so that it must find nothing
+    kernel._insert = lambda *overload: None
+    kernel._compile_for_args = lambda *arguments: function if thread.interpreting else silent
+    with contextlib.suppress(OSError):
+        kernel._cache = _KernelCache(function)
+    return kernel
 
 
 def literal_njit(function: Callable[..., Any]) -> Any:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 
 
 class PackingArrays(NamedTuple):
@@ -135,7 +135,7 @@ def assemble(
     return Packing(*(*arrays, granularity))
 
 
-@njit
+@inner_njit
 def find(parent: NDArray[np.int32], i: int) -> int:
     """Root of i in a union-find forest; halves the path on the way."""
     while parent[i] != i:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.packing.packing import Packing, assembled
 from assoc.problem import AssignmentProblem
 
@@ -103,7 +103,7 @@ def _whole_numbers(weights: NDArray[np.float64]) -> bool:
     return True
 
 
-@njit
+@inner_njit
 def _columns_with_dummies(
     tuples: NDArray[np.int32], costs: NDArray[np.float64], offsets: NDArray[np.int64], total: int
 ) -> Any:

@@ -126,3 +126,29 @@ def test_kernels_ask_for_nothing_that_numpy_does_otherwise():
     ]
     assert len(kernels) > 100
     assert [call for kernel in kernels for call in doubtful_calls(kernel)] == []
+
+
+def is_kernel(node: ast.stmt, mark: str = "njit") -> bool:
+    return isinstance(node, ast.FunctionDef) and any(mark in ast.unparse(one) for one in node.decorator_list)
+
+
+def test_inner_kernels_are_called_by_kernels_alone():
+    # Python would interpret them, however large their arrays are
+    package = Path(assoc.__file__).parent
+    trees = {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts): ast.parse(path.read_text())
+        for path in package.rglob("*.py")
+    }
+    inner = {(name, node.name) for name, tree in trees.items() for node in tree.body if is_kernel(node, "inner_njit")}
+    assert len(inner) > 50
+    calls = []
+    for name, tree in trees.items():
+        known = {one for module, one in inner if module == name}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                known |= {one.name for one in node.names if (node.module, one.name) in inner}
+        for node in tree.body:
+            if not is_kernel(node):
+                calls += [f"{name}, line {call.lineno}" for call in ast.walk(node) if isinstance(call, ast.Call)
+                          and isinstance(call.func, ast.Name) and call.func.id in known]  # fmt: skip
+    assert calls == []

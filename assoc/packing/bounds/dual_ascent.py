@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import Run
@@ -203,7 +203,7 @@ def hard_sweeps(packing: PackingArrays, duals: Floats, reduced: Floats, sweeps: 
                     reduced[row_cols[k]] -= least
 
 
-@njit
+@inner_njit
 def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
     """Sum of ``values[places[first:end]]`` in four strands, which do not wait for each other."""
     a = b = c = d = 0.0
@@ -220,7 +220,7 @@ def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
     return (a + b) + (c + d)
 
 
-@njit
+@inner_njit
 def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Floats, passes: int, deadline: float) -> int:
     """Move ``point`` by smoothed passes at one temperature per component; the column visits made."""
     slack, row_start, row_ptr = packing.slack, packing.row_start, packing.row_ptr
@@ -283,7 +283,7 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
     return visits
 
 
-@njit
+@inner_njit
 def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, limit: float, near: _Near) -> None:
     """Number the columns of component c whose reduced cost is at most ``limit``, and list them by row."""
     cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
@@ -84,7 +84,7 @@ def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
     )  # fmt: skip
 
 
-@njit
+@inner_njit
 def drop(work: Work, num: int, bound: float, cut: float) -> int:
     """Drop the columns and the slack that no solution below the cut has; how many columns are left.
 
@@ -109,7 +109,7 @@ def drop(work: Work, num: int, bound: float, cut: float) -> int:
     return kept
 
 
-@njit
+@inner_njit
 def allowed_at(work: Work, num: int) -> Allowed:
     """What the node at work allows, of which so many columns are left."""
     return Allowed(work.node.active[:num], work.node.columns, work.node.slack)
@@ -128,7 +128,7 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
     return num
 
 
-@njit
+@inner_njit
 def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
     """Solve the linear program of the node at work; how that ended, and a bound that holds."""
     allowed = allowed_at(work, num)
@@ -138,7 +138,7 @@ def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
     return status, certified(work.program, allowed, work.duals)
 
 
-@njit
+@inner_njit
 def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
     """Make the node at work the one side of it that is left; how many columns it has."""
     side, node = work.trials.side, work.node

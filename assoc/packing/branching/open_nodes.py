@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc.packing.branching.root import Root
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
@@ -93,13 +93,13 @@ class OpenNodes:
         self.arrays = Stack(*(np.concatenate([array, np.zeros_like(array)]) for array in self.arrays))
 
 
-@njit
+@inner_njit
 def has_room(stack: Stack, top: int) -> bool:
     """Whether there is room for two children in the place of the node at ``top``."""
     return top + 2 < stack.first.size and stack.first[top] + 2 * stack.size[top] <= stack.arena.size
 
 
-@njit
+@inner_njit
 def take_node(stack: Stack, top: int, node: Allowed) -> int:
     """Make the node at ``top`` the one at work; how many columns it has."""
     num = stack.size[top]
@@ -111,7 +111,7 @@ def take_node(stack: Stack, top: int, node: Allowed) -> int:
     return num
 
 
-@njit
+@inner_njit
 def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float) -> None:
     """Put a node on top of those below ``top``; its columns follow theirs."""
     place = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0

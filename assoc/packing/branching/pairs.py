@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
@@ -92,7 +92,7 @@ def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
     return uses == 1 if joined else uses == 2
 
 
-@njit
+@inner_njit
 def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
     """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
     active, columns, slack = side.active, side.columns, side.slack
@@ -154,7 +154,7 @@ def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
     return count
 
 
-@njit
+@inner_njit
 def _try(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, which: Any, effort: Effort
 ) -> Any:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._system.ahead import compile_ahead, wait_for_kernels
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import inner_njit, search_njit
 from assoc._system.interpreted import interpreted_only
 from assoc._types import Floats
 from assoc.packing.branching.node import (
@@ -191,7 +191,7 @@ class BranchAndBound:
         self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf
 
 
-@njit
+@inner_njit
 def _greedy(work: Work, allowed: Allowed) -> Any:
     """Take columns by ``key`` while they fit; the weight (inf when a duty is left) and their number."""
     cols, weights, trial, active, slack = work.cols, work.weights, work.trial, allowed.active, allowed.slack
@@ -222,7 +222,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
     return weight, count
 
 
-@njit
+@inner_njit
 def _by_values(work: Work, allowed: Allowed) -> bool:
     """Lower the keys by the LP's values, so that these decide first; whether all of them are whole numbers."""
     in_basis, values, active, key = work.basis.place, work.basis.values, allowed.active, work.key

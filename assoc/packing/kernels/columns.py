@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 
 
-@njit
+@inner_njit
 def first_row(cols: Any, j: int) -> int:
     """Row of column j in the first sensor that it has; -1 for a column without rows.
 
@@ -22,7 +22,7 @@ def first_row(cols: Any, j: int) -> int:
     return -1
 
 
-@njit
+@inner_njit
 def fits(cols: Any, owner: Any, j: int) -> bool:
     """Whether all rows of column j are free; ``owner`` is the column that covers each row, -1 for none."""
     for s in range(cols.shape[1]):

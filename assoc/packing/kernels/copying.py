@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 
 
-@njit
+@inner_njit
 def copy_to(target: Any, source: Any) -> None:
     """Copy a list over another one of the same length."""
     for i in range(target.size):

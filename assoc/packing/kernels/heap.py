@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 
 
-@njit
+@inner_njit
 def doubled(array: Any) -> Any:
     """Return a copy with twice the room."""
     larger = np.empty(2 * array.size, array.dtype)
@@ -18,7 +18,7 @@ def doubled(array: Any) -> Any:
     return larger
 
 
-@njit
+@inner_njit
 def doubled_rows(table: Any) -> Any:
     """Return a copy of a table with room for twice as many rows."""
     num, width = table.shape
@@ -29,7 +29,7 @@ def doubled_rows(table: Any) -> Any:
     return larger
 
 
-@njit
+@inner_njit
 def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
     """Add an item under a key; ``size`` is the number of items before."""
     place = size
@@ -44,7 +44,7 @@ def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
     item[place] = thing
 
 
-@njit
+@inner_njit
 def pop(key: Any, item: Any, size: int) -> None:
     """Remove the root; ``size`` is what is left."""
     value = key[size]

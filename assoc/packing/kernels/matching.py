@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.kernels.heap import doubled, pop, push
@@ -173,7 +173,7 @@ def match_sparse(
     return total
 
 
-@njit
+@inner_njit
 def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
     """Augmenting row reduction: each row takes its best column at the price of its second best.
 
@@ -224,7 +224,7 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
     return left
 
 
-@njit
+@inner_njit
 def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
     """Shortest augmenting path from each pending row; False when one must be matched and cannot be."""
     indptr, indices, costs, row_slack, base = problem

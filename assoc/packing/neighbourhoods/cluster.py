@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import inner_njit, njit, search_njit
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced, Prices
 from assoc.packing.kernels.columns import first_row
@@ -151,7 +151,7 @@ def _by_row(cols: Any, row_ptr: Any, order: Any) -> Any:
     return result
 
 
-@njit
+@inner_njit
 def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int:
     """Add a row and all rows of its owner to the cluster."""
     if local[r] >= 0:
@@ -170,7 +170,7 @@ def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int
     return num
 
 
-@njit
+@inner_njit
 def _grow(
     packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, size: int, local: Any, rows: Any
 ) -> int:

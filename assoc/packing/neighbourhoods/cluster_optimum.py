@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Prices
 from assoc.packing.packing import PackingArrays
@@ -46,7 +46,7 @@ class Limits(NamedTuple):
     nodes: int
 
 
-@njit
+@inner_njit
 def collect(
     packing: PackingArrays, by_row: Any, prices: Prices, rows: Any, local: Any, limit: float, found: ClusterColumns
 ) -> int:
@@ -97,7 +97,7 @@ def collect(
     return count
 
 
-@njit
+@inner_njit
 def _index(place: Any, count: int, num: int, pointer: Any, by_place: Any) -> None:
     """Index the columns by the cluster's rows."""
     num_sensors = place.shape[1]
@@ -119,7 +119,7 @@ def _index(place: Any, count: int, num: int, pointer: Any, by_place: Any) -> Non
     pointer[0] = 0
 
 
-@njit
+@inner_njit
 def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperature: float, sweep: Sweep) -> Any:
     """Raise the cluster's multipliers, drop what they exclude; ``cost`` becomes the new reduced cost.
 
@@ -175,7 +175,7 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
     return count, base
 
 
-@njit
+@inner_njit
 def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits, lists: Any, best: Any) -> Any:
     """Choose columns that cover each of ``num`` places once, of total cost up to ``budget``.
 
@@ -289,7 +289,7 @@ def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits
     return found, num_best, nodes
 
 
-@njit
+@inner_njit
 def _sensor_of(cols: Any, row_ptr: Any, by_row: Any, r: int) -> int:
     if row_ptr[r] < row_ptr[r + 1]:
         for s in range(cols.shape[1]):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_eject, search_arrays
 from assoc.packing.packing import Packing
@@ -101,7 +101,7 @@ def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:
     return not bool((owner[~packing.slack] < 0).any())
 
 
-@njit
+@inner_njit
 def own(cols: Any, j: int, owner: Any) -> None:
     """Make column j the owner of its rows."""
     for s in range(cols.shape[1]):

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import now
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.kernels.columns import first_row
@@ -130,7 +130,7 @@ def _improve(packing: PackingArrays, owner: Any, masks: Any, rounds: int, deadli
     return total
 
 
-@njit
+@inner_njit
 def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any, size: Any, first: Any) -> int:
     """Number the halves on one side (1: sensors in ``mask``): each row's half, sizes, and a row of each."""
     count = 0
@@ -164,7 +164,7 @@ def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any,
     return count
 
 
-@njit
+@inner_njit
 def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> int:
     """Which half on a side column j has in full: -1 none at all, -2 only some rows or several halves."""
     found = -1
@@ -181,7 +181,7 @@ def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> 
     return found
 
 
-@njit
+@inner_njit
 def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> float:
     """Re-match the halves of one split; returns the change of weight (0: nothing better)."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
@@ -272,7 +272,7 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
     return 0.0
 
 
-@njit
+@inner_njit
 def _weight(cols: Any, weights: Any, owner: Any) -> float:
     total = 0.0
     for r in range(owner.size):

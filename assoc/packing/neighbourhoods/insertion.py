@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.packing import Packing, PackingArrays
 
@@ -66,7 +66,7 @@ def add_greedily(packing: PackingArrays, order: Any, owner: Any) -> None:
                     owner[cols[j, s]] = j
 
 
-@njit
+@inner_njit
 def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
     """Weight of column j less that of the columns it would eject; negative is good."""
     num_sensors = cols.shape[1]
@@ -85,7 +85,7 @@ def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
     return change
 
 
-@njit
+@inner_njit
 def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int:
     """Eject the owners of column j's rows and insert it; rows that lost their owner go to ``changed``."""
     num_sensors = cols.shape[1]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
@@ -77,7 +77,7 @@ def new_basis(program: Program) -> Basis:
     return basis_without(program, program.sides.size)
 
 
-@njit
+@inner_njit
 def basis_without(program: Program, columns: int) -> Basis:
     """Room for a basis of whose inverse there are so many columns alone."""
     num, size = program.weights.size, program.sides.size
@@ -94,7 +94,7 @@ def copy_basis(source: Basis, target: Basis) -> None:
         getattr(target, name)[:] = getattr(source, name)
 
 
-@njit
+@inner_njit
 def copy_without_inverse(source: Basis, target: Basis) -> None:
     """Give ``target`` the variables of ``source``, their values, the weights of the edges, and the multipliers."""
     copy_to(target.variable, source.variable)
@@ -126,7 +126,7 @@ def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: B
     copy_to(basis.duals, duals)
 
 
-@njit
+@inner_njit
 def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
     """Coordinates of column j in the basis."""
     inverse, rows = basis.inverse, program.rows
@@ -137,7 +137,7 @@ def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
             column[i] += inverse[r, i]
 
 
-@njit
+@inner_njit
 def exchange(basis: Basis, p: int, column: Floats) -> None:
     """Let the variable of these coordinates take place p: the inverse, the norms, the values."""
     inverse, row, sums, norms, values = basis.inverse, basis.row, basis.sums, basis.norms, basis.values
@@ -173,7 +173,7 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
     basis.age[0] += 1
 
 
-@njit
+@inner_njit
 def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
     """Note that a variable has taken place p."""
     num, size = program.weights.size, program.sides.size

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
@@ -140,7 +140,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
     return sets[:kept].copy()
 
 
-@njit
+@inner_njit
 def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
     """Insert a set in order of f, unless it has too many rows in common with a better one; how many are kept."""
     place = kept
@@ -161,7 +161,7 @@ def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
     return _keep_at(sets, scores, place, new, score)
 
 
-@njit
+@inner_njit
 def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
     place = kept
     if kept == scores.size:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
@@ -64,7 +64,7 @@ def most_exchanges(program: Program) -> int:
     return _A_ROW * program.sides.size
 
 
-@njit
+@inner_njit
 def cost_tolerance(program: Program, allowed: Allowed) -> float:
     """Reduced costs this far below 0 are 0."""
     scale = 0.0
@@ -83,7 +83,7 @@ def bound_of(program: Program, basis: Basis) -> float:
     return bound
 
 
-@njit
+@inner_njit
 def leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
     """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
     num, size = program.weights.size, program.sides.size
@@ -109,7 +109,7 @@ def leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
     return place
 
 
-@njit
+@inner_njit
 def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
     """The variable that first limits the step of the multipliers, and the step; -1: none does.
 
@@ -151,7 +151,7 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     return chosen, step
 
 
-@njit
+@inner_njit
 def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: float, step: float) -> None:
     """Move the multipliers along the row of place p, and the reduced costs with them."""
     pricing, row, duals = basis.pricing, basis.row, basis.duals
@@ -221,14 +221,14 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         done += 1
 
 
-@njit
+@inner_njit
 def _renew(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
     """Compute everything anew."""
     refactor(program, allowed, basis)
     _make_fit(program, allowed, basis, 1e3 * tolerance)
 
 
-@njit
+@inner_njit
 def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
     """Compute the reduced costs; where the multipliers are not feasible, begin from others."""
     least = price(program, basis.duals, basis.place, basis.pricing)

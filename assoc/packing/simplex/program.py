@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.packing import PackingArrays
 
@@ -77,7 +77,7 @@ def program_of(packing: PackingArrays) -> Program:
     return Program(packing.weights, start, rows, np.ones(packing.slack.size), num_sensors)
 
 
-@njit
+@inner_njit
 def reduced_cost(program: Program, duals: Floats, j: int) -> float:
     """Weight of column j less the multipliers of its rows."""
     start, rows = program.start, program.rows

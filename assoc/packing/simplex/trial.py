@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, copy_without_inverse, enter
@@ -93,7 +93,7 @@ def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) 
             trial.rows[i, r] = base.inverse[r, i]
 
 
-@njit
+@inner_njit
 def _tableau_row(trial: Trial, done: int, p: int) -> None:
     """Fill ``row`` with that of place p in the inverse, after the exchanges done."""
     factors, shares, row = trial.factors, trial.shares, trial.basis.row
@@ -121,7 +121,7 @@ def _tableau_row(trial: Trial, done: int, p: int) -> None:
         factors[place] = 0.0
 
 
-@njit
+@inner_njit
 def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, variable: int) -> None:
     """Fill ``column`` with the coordinates of a variable in the basis, after the exchanges done."""
     num, column, etas, pivots = program.weights.size, trial.basis.column, trial.etas, trial.pivots
@@ -138,7 +138,7 @@ def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, vari
                 column[i] += share * etas[k, i]
 
 
-@njit
+@inner_njit
 def _exchange(trial: Trial, done: int, p: int) -> None:
     """Let the variable of ``column`` take place p: the eta, the weights, the values."""
     basis, etas = trial.basis, trial.etas

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import (
     COOLING,
@@ -295,7 +295,7 @@ def _raised_bounds(packing: PackingArrays, duals: Floats) -> Floats:
     return bounds_by_component(packing, duals)
 
 
-@njit
+@inner_njit
 def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadline: float) -> Any:
     """A cover from the columns of small reduced cost, improved by insertion."""
     weights, slack, col_start = packing.weights, packing.slack, packing.col_start
@@ -338,7 +338,7 @@ def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadlin
     return owner
 
 
-@njit
+@inner_njit
 def _cover_weights(packing: PackingArrays, owner: Any) -> Floats:
     """Weight of the chosen columns of each component."""
     cols, weights, row_start = packing.cols, packing.weights, packing.row_start
@@ -383,7 +383,7 @@ def best_of_both(
     return total
 
 
-@njit
+@inner_njit
 def _compare(
     packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float
 ) -> Any:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.packing import Packing
 
@@ -93,7 +93,7 @@ def _arrange(cols: Any, slack: Any) -> Any:
     return ordered, sensor, by_pair, group_start[: count + 1].copy()
 
 
-@njit
+@inner_njit
 def priced(cols: Any, weights: Floats, duals: Floats, j: int, first: int) -> float:
     """Weight of a column less the multipliers of its rows in sensors from ``first`` on."""
     value = weights[j]
@@ -103,7 +103,7 @@ def priced(cols: Any, weights: Floats, duals: Floats, j: int, first: int) -> flo
     return value
 
 
-@njit
+@inner_njit
 def number_rows(sensor: Any, which: int, local: Any, rows: Any) -> int:
     """Number the rows of one sensor."""
     count = 0
@@ -115,7 +115,7 @@ def number_rows(sensor: Any, which: int, local: Any, rows: Any) -> int:
     return count
 
 
-@njit
+@inner_njit
 def alone_prices(rows: Any, num: int, slack: Any) -> Floats:
     """Cost of leaving each of these rows out: 0 with slack, infinite without."""
     prices = np.zeros(num)
@@ -125,7 +125,7 @@ def alone_prices(rows: Any, num: int, slack: Any) -> Floats:
     return prices
 
 
-@njit
+@inner_njit
 def drop_needless_prices(left: Floats, right: Floats) -> None:
     """Where all on the left must be matched and both sides are as long, the right needs no price."""
     if left.size == right.size and (left.size == 0 or left.min() == np.inf):

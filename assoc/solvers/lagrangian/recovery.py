@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.matching import match_sparse
 from assoc.packing.neighbourhoods.cover import chosen_columns, own
@@ -38,7 +38,7 @@ def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
     return chosen
 
 
-@njit
+@inner_njit
 def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
     """Which partial tuple column j continues: -1 none (it has no row so far), -2 it does not fit."""
     found = -1
@@ -55,7 +55,7 @@ def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
     return found
 
 
-@njit
+@inner_njit
 def _keep_cheapest(indptr: Any, indices: Any, column: Any, costs: Floats, num_right: int) -> None:
     """Leave one edge for each pair that edges join, the cheapest: dense problems have as many as a sensor has rows."""
     place = np.full(num_right, -1, np.int64)
@@ -163,7 +163,7 @@ def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
     return True
 
 
-@njit
+@inner_njit
 def _grow(arranged: Arranged, partial: _Partial, partner: Any, column: Any, right: Any, level: int) -> int:
     """Join partial tuples to their partners of the next sensor; returns how many there are then.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.matching import match_sparse
 from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needless_prices, number_rows, priced
@@ -109,7 +109,7 @@ def _relax(arranged: Arranged, duals: Any, subgradient: Any) -> bool:
     return True
 
 
-@njit
+@inner_njit
 def _use(cols: Any, j: int, subgradient: Any) -> None:
     """Count the relaxed rows of a column as used once more."""
     for s in range(2, cols.shape[1]):
