@@ -10,6 +10,7 @@ which comes back now and then for a look at the clock.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +44,8 @@ _PASSES = np.array([10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
 _VISITS = 3_000_000
 # classes of reduced cost, by which columns are sorted before rounding
 _CLASSES = 256
+# elements up to which a call may be interpreted: a problem of the usual number and the state of the reduction
+_SMALL = 8000
 
 
 class _State(NamedTuple):
@@ -130,7 +133,8 @@ class Reduction:
         on small problems mostly without loss.
         """
         duals = self._proof.copy()
-        loss = self.closed_bound - math.fsum(_raised_bounds(self._whole.arrays, duals))
+        hard_sweeps(self._whole.arrays, duals, np.empty(self._whole.num_columns), 2)
+        loss = self.closed_bound - math.fsum(bounds_by_component(self._whole.arrays, duals))
         return duals if loss <= TOLERANCE * max(1.0, abs(self.closed_bound)) else None
 
     def reduce(self) -> list[Component]:
@@ -138,14 +142,29 @@ class Reduction:
         num, granularity = self._whole.num_rows, self._whole.granularity
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
-        arrays, incumbents = self._whole.arrays, self._incumbents()
-        state = _state(_begin(arrays, *incumbents, closed, granularity, self._run.deadline()))
+        state = _state(_reduce(self._beginning(), closed, granularity, self._run.deadline()))
         while state and counts[0] < _PASSES.size and state.packing.weights.size and not self._run.should_stop():
             state = _state(_reduce(state, closed, granularity, self._run.deadline()))
         self.closed_columns.append(closed.columns[: counts[1]])
         self.closed_bound = math.fsum(closed.values[: counts[2], 0])
         self.closed_weight = math.fsum(closed.values[: counts[2], 1])
         return self._open_components(state) if state else []
+
+    def _beginning(self) -> _State:
+        """The whole with its incumbents; the first call of the kernel fills in multipliers and temperatures."""
+        num, rows, components = self._whole.num_columns, self._whole.num_rows, self._whole.num_components
+        owner, weight = self._incumbents()
+        return _State(
+            packing=self._whole.arrays,
+            origin=np.arange(num, dtype=np.int32),
+            rows=np.arange(rows, dtype=np.int32),
+            smooth=np.zeros(rows),
+            hard=np.empty(rows),
+            owner=owner,
+            weight=weight,
+            bound=np.full(components, -np.inf),
+            temperature=np.empty(components),
+        )
 
     def _incumbents(self) -> tuple[NDArray[np.int32], Floats]:
         """What is known, for the components that it covers as they must be: the column of each row, and weights."""
@@ -179,37 +198,21 @@ def _state(arrays: Any) -> _State | None:
     return None if arrays is None else _State(PackingArrays(*arrays[:count]), *arrays[count:])
 
 
-@njit
-def _begin(
-    packing: PackingArrays, owner: Any, weight: Floats, done: _Closed, granularity: float, deadline: float
-) -> Any:
-    """Begin with incumbents and go through temperatures; one kernel, as most scenes need no second one."""
-    num, num_rows, num_components = packing.weights.size, packing.slack.size, packing.col_start.size - 1
-    smooth = np.zeros(num_rows)
-    hard_sweeps(packing, smooth, np.empty(num), 1)
-    state = _State(
-        packing,
-        np.arange(num).astype(np.int32),
-        np.arange(num_rows).astype(np.int32),
-        smooth,
-        smooth.copy(),
-        owner,
-        weight,
-        np.full(num_components, -np.inf),
-        spread(packing) * START,
-    )
-    return _reduce(state, done, granularity, deadline)
-
-
-@njit
+@partial(njit, small=_SMALL)
 def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> Any:
-    """Go through temperatures until none is left or the visits are used up.
+    """Go through temperatures, from the first where none is done, until none is left or the visits are used up.
 
     Returns the arrays of the new state, in its order; None: nothing is open. A plain tuple: where Ctrl-C comes while a
     result is converted, numba calls a record's class without having found it, and the process dies.
     """
     packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
     counts, closed_columns, closed, proof = done
+    if counts[0] == 0:
+        hard_sweeps(packing, smooth, np.empty(packing.weights.size), 1)
+        copy_to(hard, smooth)
+        width = spread(packing)
+        for c in range(width.size):
+            temperature[c] = width[c] * START
     visits = 0
     while counts[0] < _PASSES.size and packing.weights.size > 0 and visits < _VISITS:
         num, num_rows = packing.weights.size, packing.slack.size
@@ -225,7 +228,8 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         best = _Incumbent(bound, hard, owner, weight)
         new = _Incumbent(bounds_by_component(packing, duals), duals, new_owner, _cover_weights(packing, new_owner))
         keep, alive = _compare(packing, best, new, reduced, granularity)
-        temperature = temperature * COOLING
+        for c in range(temperature.size):
+            temperature[c] *= COOLING
         counts[0] += 1
         kept = 0
         for j in range(keep.size):
@@ -288,13 +292,6 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
     )  # fmt: skip
 
 
-@njit
-def _raised_bounds(packing: PackingArrays, duals: Floats) -> Floats:
-    """Raise multipliers by two passes with the hard minimum; the bound of each component."""
-    hard_sweeps(packing, duals, np.empty(packing.weights.size), 2)
-    return bounds_by_component(packing, duals)
-
-
 @inner_njit
 def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadline: float) -> Any:
     """A cover from the columns of small reduced cost, improved by insertion."""
@@ -318,8 +315,13 @@ def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadlin
             start[which[j]] += 1
     owner = np.full(slack.size, -1, np.int32)
     add_greedily(packing, order, owner)
-    loose = np.flatnonzero(owner < 0).astype(np.int32)
-    if loose.size > 0:
+    loose = np.empty(slack.size, np.int32)
+    count = 0
+    for r in range(slack.size):
+        if owner[r] < 0:
+            loose[count] = r
+            count += 1
+    if count > 0:
         axial = False
         for r in range(slack.size):
             if not slack[r]:
@@ -334,7 +336,7 @@ def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadlin
             packing.row_ptr,
             packing.row_cols,
         )
-        insert_and_eject(searched, owner, loose, deadline)
+        insert_and_eject(searched, owner, loose[:count], deadline)
     return owner
 
 
