@@ -73,7 +73,6 @@ def work_memory(rows: float, columns: int) -> float:
     return 34.0 * rows * rows + 200.0 * columns
 
 
-@njit
 def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
     """Room for the search of a program whose first rows are those of the packing."""
     num_rows = packing.slack.size

@@ -70,7 +70,6 @@ class Trials(NamedTuple):
     duals: Floats
 
 
-@njit
 def new_trials(program: Program, num_rows: int) -> Trials:
     """Room for trials of pairs of measurements, the program's first rows; nothing is known of any."""
     num, size = program.weights.size, program.sides.size
@@ -92,7 +91,7 @@ def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
     return uses == 1 if joined else uses == 2
 
 
-@inner_njit
+@njit
 def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
     """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
     active, columns, slack = side.active, side.columns, side.slack

@@ -71,13 +71,11 @@ class Basis(NamedTuple):
     age: NDArray[np.int64]
 
 
-@njit
 def new_basis(program: Program) -> Basis:
     """Room for a basis."""
     return basis_without(program, program.sides.size)
 
 
-@inner_njit
 def basis_without(program: Program, columns: int) -> Basis:
     """Room for a basis of whose inverse there are so many columns alone."""
     num, size = program.weights.size, program.sides.size

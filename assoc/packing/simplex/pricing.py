@@ -52,13 +52,10 @@ class Pricing(NamedTuple):
     listed: NDArray[np.int64]
 
 
-@njit
 def new_pricing(program: Program) -> Pricing:
     """Room for the columns of a program."""
     num, size = program.weights.size, program.sides.size
-    extra = 0
-    for j in range(num):
-        extra += max(program.start[j + 1] - program.start[j] - program.width, 0)
+    extra = int(np.maximum(np.diff(program.start) - program.width, 0).sum())
     return Pricing(
         np.empty(num, np.int32), np.empty(num, np.int32), np.empty((program.width, num), np.uint32),
         np.empty(extra, np.uint32), np.empty(extra, np.uint32), np.empty(num), np.empty(num),

@@ -8,7 +8,7 @@ rows of cuts may have more. The slack s_r belongs to rows that may stay uncovere
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,21 +60,13 @@ class Allowed(NamedTuple):
     slack: NDArray[np.bool_]
 
 
-@njit
 def program_of(packing: PackingArrays) -> Program:
     """The linear program of a packing."""
-    cols = packing.cols
-    num, num_sensors = cols.shape
+    used = packing.cols >= 0
+    num, num_sensors = used.shape
     start = np.zeros(num + 1, np.int64)
-    rows = np.empty(packing.row_cols.size, np.int32)
-    place = 0
-    for j in range(num):
-        for s in range(num_sensors):
-            if cols[j, s] >= 0:
-                rows[place] = cols[j, s]
-                place += 1
-        start[j + 1] = place
-    return Program(packing.weights, start, rows, np.ones(packing.slack.size), num_sensors)
+    np.cumsum(np.count_nonzero(used, axis=1), out=start[1:])
+    return Program(packing.weights, start, packing.cols[used], np.ones(packing.slack.size), num_sensors)
 
 
 @inner_njit
@@ -147,17 +139,13 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
     return total + least * most - 1e-15 * size
 
 
-@njit
 def weight_limit(program: Program) -> float:
     """More than any solution can weigh: a bound beyond it says that there is none."""
-    most = 0.0
-    for j in range(program.weights.size):
-        most = max(most, abs(program.weights[j]))
+    most = float(np.abs(program.weights).max(initial=0.0))
     return 1.0 + 2.0 * most * program.sides.size
 
 
-@njit
-def all_allowed(program: Program, slack: Any) -> Allowed:
+def all_allowed(program: Program, slack: NDArray[np.bool_]) -> Allowed:
     """No mask: every column, and the slack of the rows that have one."""
     num = program.weights.size
-    return Allowed(np.arange(num).astype(np.int32), np.ones(num, np.bool_), slack.copy())
+    return Allowed(np.arange(num, dtype=np.int32), np.ones(num, np.bool_), slack.copy())

@@ -70,7 +70,6 @@ class Trial(NamedTuple):
     shares: NDArray[np.int32]
 
 
-@njit
 def new_trial(program: Program, exchanges: int) -> Trial:
     """Room for a trial of so many exchanges."""
     size = program.sides.size
