@@ -151,7 +151,9 @@ def assembled(
     """Return the arrays of a `Packing`, in its order, from columns over rows in any numbering."""
     num, num_sensors = rows.shape
     total = slack.size
-    parent = np.arange(total).astype(np.int32)
+    parent = np.empty(total, np.int32)
+    for r in range(total):
+        parent[r] = r
     used = np.zeros(total, np.bool_)
     for j in range(num):
         first = -1

@@ -47,7 +47,9 @@ def _order_by_numpy(values: Any) -> Any:
 def order_of(values: Any) -> Any:
     """Return the places of numbers in ascending order, ties in their order: a stable argsort, for kernels."""
     num = values.size
-    order, other = np.arange(num), np.empty(num, np.int64)
+    order, other = np.empty(num, np.int64), np.empty(num, np.int64)
+    for i in range(num):
+        order[i] = i
     for begin in range(0, num, _RUN):
         for i in range(begin + 1, min(begin + _RUN, num)):
             own = order[i]
@@ -81,13 +83,14 @@ def _by_digits(bits: Any) -> Any:
     base = 1 << _BITS
     counts = np.zeros((digits, base + 1), np.int64)
     keys = np.empty(num, np.uint64)
+    order = np.empty(num, np.int32)
     for i in range(num):
+        order[i] = i
         # negative floats: all bits turned; others: the sign's bit set
         key = np.uint64(~bits[i] if bits[i] < 0 else bits[i] ^ np.int64(-9223372036854775808))
         keys[i] = key
         for d in range(digits):
             counts[d, np.int64((key >> np.uint64(_BITS * d)) & np.uint64(base - 1)) + 1] += 1
-    order = np.arange(num).astype(np.int32)
     other = np.empty(num, np.int32)
     other_keys = np.empty(num, np.uint64)
     for d in range(digits):

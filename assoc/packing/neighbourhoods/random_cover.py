@@ -76,8 +76,9 @@ def walk(
     best = np.full(num_rows, -1, np.int32)
     best_weight = np.inf
     owner = np.empty(num_rows, np.int32)
-    order = np.arange(num_rows).astype(np.int32)
-    everything = np.arange(num_rows).astype(np.int32)
+    order, everything = np.empty(num_rows, np.int32), np.empty(num_rows, np.int32)
+    for r in range(num_rows):
+        order[r] = everything[r] = r
     timed = deadline < np.inf
     for ant in range(ants):
         if timed and now() > deadline:

@@ -69,7 +69,9 @@ def _arrange(cols: Any, slack: Any) -> Any:
     for r in range(num_rows):
         sensor[r] = place[sensor[r]]
     # sorted by counting, by the second row and then by the first
-    by_pair, other = np.arange(num), np.empty(num, np.int64)
+    by_pair, other = np.empty(num, np.int64), np.empty(num, np.int64)
+    for j in range(num):
+        by_pair[j] = j
     for s in range(min(num_sensors, 2) - 1, -1, -1):
         start = np.zeros(num_rows + 2, np.int64)
         for j in range(num):
