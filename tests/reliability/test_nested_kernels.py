@@ -1,0 +1,70 @@
+"""Kernels that kernels call: for which types they are compiled, and those that Python cannot call compiled."""
+
+import json
+import os
+import subprocess
+import sys
+
+_PROGRAM = """
+import json
+import numpy as np
+from numba.core import event
+from assoc._system.compiled import inner_njit, literal_njit, njit
+
+@njit
+def plain(j, up):
+    return j + 1 if up else j
+
+@literal_njit
+def literal(j):
+    return j + 1
+
+@njit
+def paired(pair, up):
+    one, two = pair
+    return plain(one, up) + two
+
+@inner_njit
+def inner(values):
+    total = 0.0
+    for i in range(values.size):
+        total += values[i]
+    return total
+
+@njit
+def outer(values, rows):
+    total = inner(values)
+    for r in rows:
+        total += plain(r, True) + paired((r, 1), False)
+    done = 0
+    while done < 2:
+        total += plain(done, rows.size > 1)
+        done += 1
+    return total + plain(2, False) + paired((rows.size, rows.size), True) + literal(3) + literal(rows.size)
+
+compiled = event.RecordingListener()
+event.register("numba:compile", compiled)
+rows = np.arange(3, dtype=np.int32)
+found = [outer(np.ones(4), rows)]
+# compiled code is silent about overflow
+np.seterr(over="raise")
+found += [inner(np.ones(3)), inner(np.array([1e308, 1e308]))]
+overloads = [len(one.signatures) for one in (plain, literal, paired, inner, outer)]
+print(json.dumps([found, overloads, sum(one.is_start for _, one in compiled.buffer)]))
+"""
+
+
+def run(tmp_path, **variables):
+    program = tmp_path / "program.py"
+    program.write_text(_PROGRAM)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "ASSOC_INTERPRET": "0", **variables}
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, env=environment)
+    return json.loads(done.stdout)
+
+
+def test_one_overload_for_all_whole_numbers_and_inner_kernels_from_python(tmp_path):
+    # 4; 1 + 2 + 3 and 1 + 2 + 3; 1 + 2; 2; 7; 4 and 4
+    expected = [36.0, 3.0, float("inf")]
+    assert run(tmp_path) == [expected, [1, 2, 1, 1, 1], 6]
+    # what was kept is loaded, with all that it calls in it
+    assert run(tmp_path) == [expected, [0, 0, 0, 0, 1], 0]
