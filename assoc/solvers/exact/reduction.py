@@ -250,12 +250,16 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
         for r in range(rows.size):
             proof[rows[r]] = hard[r]
-        chosen = np.empty(kept, np.int32)
-        place = np.full(keep.size, -1, np.int32)
+        # number by number here and below: numba compiles every ``values[places]`` anew
+        num_sensors = packing.cols.shape[1]
+        chosen, place = np.empty(kept, np.int32), np.full(keep.size, -1, np.int32)
+        cols_kept, weights_kept = np.empty((kept, num_sensors), np.int32), np.empty(kept)
         kept = 0
         for j in range(keep.size):
             if keep[j]:
-                chosen[kept] = j
+                chosen[kept], weights_kept[kept] = j, packing.weights[j]
+                for s in range(num_sensors):
+                    cols_kept[kept, s] = packing.cols[j, s]
                 kept += 1
         # rows without slack of components that are done have been covered: they leave as rows with slack do
         free = packing.slack.copy()
@@ -265,19 +269,26 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
             if not alive[c]:
                 free[row_start[c] : row_start[c + 1]] = True
         cols, weights, slack, col_start, row_start, row_ptr, row_cols, column, row = assembled(
-            packing.cols[chosen], packing.weights[chosen], free, chosen
+            cols_kept, weights_kept, free, chosen
         )
         packing = PackingArrays(cols, weights, slack, col_start, row_start, row_ptr, row_cols)
+        new_origin = np.empty(column.size, np.int32)
         for j in range(column.size):
             place[column[j]] = j
-        new_owner = np.empty(row.size, np.int32)
+            new_origin[j] = origin[column[j]]
+        # what a component falls into starts from the same cover and the same multipliers
+        new_owner, new_rows = np.empty(row.size, np.int32), np.empty(row.size, np.int32)
+        new_smooth, new_hard = np.empty(row.size), np.empty(row.size)
         for r in range(row.size):
             j = owner[row[r]]
             new_owner[r] = place[j] if j >= 0 else -1
-        owner, smooth, hard, origin, rows = new_owner, smooth[row], hard[row], origin[column], rows[row]
-        # what a component falls into starts from the same cover and the same multipliers
-        first = parent[row[row_start[:-1]]]
-        temperature = temperature[first]
+            new_rows[r], new_smooth[r], new_hard[r] = rows[row[r]], smooth[row[r]], hard[row[r]]
+        owner, smooth, hard, origin, rows = new_owner, new_smooth, new_hard, new_origin, new_rows
+        first, cooled = np.empty(col_start.size - 1, np.int32), np.empty(col_start.size - 1)
+        for c in range(first.size):
+            first[c] = parent[row[row_start[c]]]
+            cooled[c] = temperature[first[c]]
+        temperature = cooled
         new_weight = _cover_weights(packing, owner)
         for c in range(new_weight.size):
             if weight[first[c]] == np.inf:
