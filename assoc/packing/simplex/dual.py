@@ -179,18 +179,23 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
     _make_fit(program, allowed, basis, 1e3 * tolerance)
     done = 0
     age, row = basis.age, basis.row
+    # whether everything is to be computed anew
+    stale = False
     while True:
         if done % _LOOK == 0 and is_over(effort.deadline):
             return STOPPED, done
-        if age[0] >= _FRESH or (age[0] > 0 and age[0] % _LOOK == 0 and not residual(program, basis) <= _RESIDUAL):
-            _renew(program, allowed, basis, tolerance)
+        stale = stale or age[0] >= _FRESH
+        if stale or (age[0] > 0 and age[0] % _LOOK == 0 and not residual(program, basis) <= _RESIDUAL):
+            refactor(program, allowed, basis)
+            _make_fit(program, allowed, basis, 1e3 * tolerance)
+            stale = False
         bound = bound_of(program, basis)
         if bound >= effort.cutoff:
             return CUT, done
         p = leaving(program, allowed, basis)
         if p < 0:
             if age[0] > 0 and not residual(program, basis) <= _RESIDUAL:
-                _renew(program, allowed, basis, tolerance)
+                stale = True
                 continue
             return OPTIMAL, done
         if done >= effort.exchanges:
@@ -201,7 +206,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         chosen, step = entering(program, allowed, basis, sign, tolerance)
         if chosen < 0:
             if age[0] > 0:
-                _renew(program, allowed, basis, tolerance)
+                stale = True
                 continue
             # the multipliers can rise for ever; as far as they are asked for is enough
             step_along(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
@@ -211,7 +216,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         else:
             copy_to(basis.column, basis.inverse[chosen - num])
         if abs(basis.column[p]) < SMALL_PIVOT and age[0] > 0:
-            _renew(program, allowed, basis, tolerance)
+            stale = True
             continue
         step_along(program, allowed, basis, p, sign, step)
         if chosen < num:
@@ -219,13 +224,6 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         exchange(basis, p, basis.column)
         enter(program, basis, p, chosen)
         done += 1
-
-
-@inner_njit
-def _renew(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
-    """Compute everything anew."""
-    refactor(program, allowed, basis)
-    _make_fit(program, allowed, basis, 1e3 * tolerance)
 
 
 @inner_njit
