@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.filters.base import Expected
@@ -108,15 +108,25 @@ def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int
                     break
             if inside:
                 if count == tracks.size:
-                    tracks = np.concatenate((tracks, np.empty(count, np.int64)))
-                    found = np.concatenate((found, np.empty(count, np.int64)))
+                    tracks, found = _doubled(tracks), _doubled(found)
                 tracks[count] = t
                 found[count] = order[k]
                 count += 1
                 if count > most:
                     return tracks[:count].copy(), found[:count].copy()
-        found[first:count] = np.sort(found[first:count])
+        # number by number: a line for all would compile the text for lengths that differ
+        own = np.sort(found[first:count])
+        for k in range(own.size):
+            found[first + k] = own[k]
     return tracks[:count].copy(), found[:count].copy()
+
+
+@inner_njit
+def _doubled(array: Any) -> Any:
+    larger = np.empty(2 * array.size, np.int64)
+    for i in range(array.size):
+        larger[i] = array[i]
+    return larger
 
 
 def _reach(expected: Expected, gate: float) -> Array:
