@@ -48,7 +48,9 @@ FAULTS = (
         _OF_TABU,
     ),
     Fault("a forced column is not held", _TABU, "held = forced if 3 * move < moves else -1", "held = -1", _OF_TABU),
-    Fault("the best cover met is not kept", _TABU, "            best[:] = owner\n", "            pass\n", _OF_TABU),
+    Fault(
+        "the best cover met is not kept", _TABU, "            copy_to(best, owner)\n", "            pass\n", _OF_TABU
+    ),
     Fault(
         "never back to the best",
         _TABU,

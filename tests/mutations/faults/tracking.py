@@ -18,8 +18,8 @@ FAULTS = (
     Fault(
         "branches are kept by number, not by what they cost the best hypothesis",
         _PRUNING,
-        'group = group[np.argsort(loss[group], kind="mergesort")]',
-        'group = group[np.argsort(-loss[group], kind="mergesort")]',
+        "group = group[order_of(loss[group])]",
+        "group = group[order_of(-loss[group])]",
         _OF_HYPOTHESES,
     ),
     Fault(
