@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
@@ -39,7 +39,7 @@ _DOUBTFUL = 3.0
 _HEIGHT_SLACK = 1.1
 
 
-@njit
+@inner_njit
 def _descend(
     sensors: SensorArrays,
     scan: ScanArrays,
@@ -94,7 +94,7 @@ def _descend(
     return chi, x, y, z, (a0, a1, a2, a3, a4, a5)
 
 
-@njit
+@inner_njit
 def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
     """Whether the information is above the prior's in every direction (judged by the inverse's trace)."""
     h = sensors.half
@@ -111,7 +111,7 @@ def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
     return ok and c0 + c3 + c5 <= 1.0 / _WEAK
 
 
-@njit
+@inner_njit
 def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
     """The region's prior along those directions only which the information `A` leaves open."""
     h = sensors.half
@@ -147,7 +147,7 @@ def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
     return P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2]
 
 
-@njit
+@inner_njit
 def _settle(
     sensors: SensorArrays,
     scan: ScanArrays,
@@ -174,7 +174,7 @@ def _settle(
     return chi, x, y, z, A, prior
 
 
-@njit
+@inner_njit
 def _from(
     sensors: SensorArrays, scan: ScanArrays, members: Array, at: tuple[float, float, float], full: bool, flat: bool
 ) -> tuple[float, float, float, float, Six, Six]:
@@ -186,7 +186,7 @@ def _from(
     return _settle(sensors, scan, members, at, flat)
 
 
-@njit
+@inner_njit
 def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[float, float, float, float, Six, Six]:
     """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.estimation import fit
@@ -35,7 +35,7 @@ class Pairs(NamedTuple):
     """(N, S + 1): partners of measurement n in sensor t are rows start[n, t] to start[n, t + 1]."""
 
 
-@njit
+@inner_njit
 def _may_cross(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
     """Whether two bearings may meet ahead of both sensors once they are moved within the gate."""
     s, t = scan.owner[n], scan.owner[m]
@@ -57,7 +57,7 @@ def _may_cross(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: f
     return least <= limit * (1.0 + 1e-9)
 
 
-@njit
+@inner_njit
 def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
     """Whether two measurements may pass a gate of `limit`; errs only towards True."""
     s, t = scan.owner[n], scan.owner[m]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.sensors.kernels.dispatch import add_information
 from assoc.sensors.kernels.records import Information
 
 
-@njit
+@inner_njit
 def normal(
     sensors: SensorArrays, scan: ScanArrays, members: Array, x: float, y: float, z: float
 ) -> Information:

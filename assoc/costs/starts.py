@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.residuals import normal
@@ -17,7 +17,7 @@ _FAR = 2.0
 _NEAR_ZENITH = 3.0
 
 
-@njit
+@inner_njit
 def mean_start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bool) -> tuple[float, float, float]:
     """Where to begin: the mean of the converted measurements, weighted by their information."""
     b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
@@ -38,7 +38,7 @@ def mean_start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bo
     return x, y, z
 
 
-@njit
+@inner_njit
 def at_height(sensors: SensorArrays, scan: ScanArrays, n: int, z: float) -> tuple[float, float, float]:
     """Where a range and azimuth are at a height; as high or low as the range allows."""
     s = scan.owner[n]
@@ -52,7 +52,7 @@ def at_height(sensors: SensorArrays, scan: ScanArrays, n: int, z: float) -> tupl
     )
 
 
-@njit
+@inner_njit
 def bearing_starts(
     sensors: SensorArrays, scan: ScanArrays, members: Array
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -80,7 +80,7 @@ def bearing_starts(
     return ahead, (m[0], m[1], m[2])
 
 
-@njit
+@inner_njit
 def height_start(
     sensors: SensorArrays, scan: ScanArrays, members: Array, all_slant: bool
 ) -> tuple[float, float, float, float]:
@@ -101,7 +101,7 @@ def height_start(
     return least, at[0], at[1], at[2]
 
 
-@njit
+@inner_njit
 def singular_start(
     sensors: SensorArrays, scan: ScanArrays, members: Array, near: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.sensors.kernels.records import Six
 
 
@@ -42,7 +42,7 @@ def inverse(A: Six) -> tuple[bool, float, float, float, float, float, float]:
     return ok and ok1 and ok2, c0, c1, c2, c3, c4, c5
 
 
-@njit
+@inner_njit
 def inverse_by_cofactors(c: Six) -> tuple[bool, float, float, float, float, float, float]:
     """Inverse of a positive definite matrix by its cofactors, quicker and less exact than `inverse`.
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import literal_njit, njit
+from assoc._system.compiled import inner_njit, literal_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.linear_algebra import factor
 from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
@@ -31,7 +31,7 @@ STATUSES = 4
 LOG_TURN = math.log(2.0 * math.pi)
 
 
-@njit
+@inner_njit
 def multiply(F: Array, P: Array, out: Array) -> None:
     """Write F P into out; zeros of F cost nothing."""
     n = P.shape[0]
@@ -45,7 +45,7 @@ def multiply(F: Array, P: Array, out: Array) -> None:
                     out[i, j] += f * P[k, j]
 
 
-@njit
+@inner_njit
 def predict_one(m: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: Array, out: Array, W: Array) -> None:
     """`predict` for one target; W (n, n) is working space."""
     n = len(m)
@@ -184,7 +184,7 @@ def correct(
     return True, nis, log_det
 
 
-@njit
+@inner_njit
 def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: float, out: Array) -> None:
     """Debias a radar residual v (range, azimuth, elevation) in place and write its covariance into out.
 
@@ -209,7 +209,7 @@ def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: flo
     out[1, 1] += tan * tan * (st * sp + st * bp + sp * bt)
 
 
-@njit
+@inner_njit
 def update_one(
     m: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
     given: Array, given_H: Array, kind: int, new_mean: Array, new_P: Array, v: Array, S: Array,

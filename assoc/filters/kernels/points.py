@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.filters.kernels.gaussian import (
     BAD_COVARIANCE,
@@ -23,7 +23,7 @@ from assoc.filters.kernels.linear_algebra import factor, solve_in_place
 from assoc.sensors.kernels.dispatch import measure, measure_moving, wrap
 
 
-@njit
+@inner_njit
 def observe_point(x: Array, code: int, d: int, place: Array, columns: Array, matrix: Array, h: Array) -> None:
     """Write the noise-free measurement of one state into h."""
     if code == LINEAR:
@@ -39,7 +39,7 @@ def observe_point(x: Array, code: int, d: int, place: Array, columns: Array, mat
         measure(code, d, place, x[columns[0]], x[columns[1]], height, h)
 
 
-@njit
+@inner_njit
 def observe_from_first(
     s: int, x: Array, code: int, d: int, place: Array, columns: Array, matrix: Array, first: Array, h: Array
 ) -> None:

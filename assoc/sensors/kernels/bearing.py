@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import TURN, Information, Six, Three
 from assoc.sensors.radar import NEAREST
 
 
-@njit
+@inner_njit
 def measure_bearing(dx: float, dy: float, h: Array) -> None:
     """Write the azimuth of a place, relative to the sensor, into h."""
     h[0] = math.atan2(dy, dx)
 
 
-@njit
+@inner_njit
 def linearise_bearing(dx: float, dy: float, h: Array, H: Array) -> None:
     """Write the azimuth into h and its derivatives into H, which holds zeros."""
     flat = math.hypot(dx, dy)
@@ -25,7 +25,7 @@ def linearise_bearing(dx: float, dy: float, h: Array, H: Array) -> None:
     H[0, 0], H[0, 1] = -dy / (ground * ground), dx / (ground * ground)
 
 
-@njit
+@inner_njit
 def add_bearing(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.sensors.codes import BEARING, POSITION, RADAR2D, RADAR3D
 from assoc.sensors.kernels.bearing import add_bearing, linearise_bearing, measure_bearing
@@ -102,7 +102,7 @@ def wrap(code: int, v: Array) -> None:
         v[1] -= TURN * math.ceil(v[1] / TURN - 0.5)
 
 
-@njit
+@inner_njit
 def add_information(
     code: int, dim: int, W: Six, place: Three, measured: Three, at: Three, sums: Information
 ) -> Information:
@@ -127,7 +127,7 @@ def add_information(
     return add_radar3d(W, place, measured, at, sums)
 
 
-@njit
+@inner_njit
 def convert_one(
     code: int, dim: int, z: Array, place: Array, R: Array, heights: Three, reach: float, least: float,
     centre: Array, c: Array,

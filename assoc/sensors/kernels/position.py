@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import Information, Six, Three
 
 
-@njit
+@inner_njit
 def measure_position(dim: int, x: float, y: float, z: float, h: Array) -> None:
     """Write x, y (and z) into h."""
     h[0], h[1] = x, y
@@ -15,7 +15,7 @@ def measure_position(dim: int, x: float, y: float, z: float, h: Array) -> None:
         h[2] = z
 
 
-@njit
+@inner_njit
 def linearise_position(dim: int, x: float, y: float, z: float, h: Array, H: Array) -> None:
     """Write x, y (and z) into h, and ones into H, which holds zeros."""
     h[0], h[1] = x, y
@@ -25,7 +25,7 @@ def linearise_position(dim: int, x: float, y: float, z: float, h: Array, H: Arra
         H[2, 2] = 1.0
 
 
-@njit
+@inner_njit
 def add_position(dim: int, W: Six, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
@@ -41,7 +41,7 @@ def add_position(dim: int, W: Six, measured: Three, at: Three, sums: Information
     return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
 
 
-@njit
+@inner_njit
 def convert_position(dim: int, z: Array, R: Array, middle: float, centre: Array, c: Array) -> None:
     """Write the position and its covariance; see `assoc.sensors.kernels.dispatch.convert_one`."""
     centre[0], centre[1] = z[0], z[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Array
 from assoc.sensors.kernels.records import TURN, Information, Six, Three
 from assoc.sensors.radar import NEAREST
@@ -13,7 +13,7 @@ START_REACH = 10.0
 """Squared Mahalanobis distance that a converted measurement covers where a search for a position starts."""
 
 
-@njit
+@inner_njit
 def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
     """Write range and azimuth of a place, relative to the radar, into h; return the ground range."""
     flat = math.hypot(dx, dy)
@@ -21,7 +21,7 @@ def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
     return flat
 
 
-@njit
+@inner_njit
 def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array) -> Three:
     """Write range, azimuth and their derivatives; return the ground range, and it and the slant range above zero."""
     flat = measure_range_azimuth(dx, dy, dz, h)
@@ -32,7 +32,7 @@ def linearise_range_azimuth(dx: float, dy: float, dz: float, h: Array, H: Array)
     return flat, ground, slant
 
 
-@njit
+@inner_njit
 def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> None:
     """Write range, azimuth and elevation into h and their derivatives into H, which holds zeros."""
     flat, ground, slant = linearise_range_azimuth(dx, dy, dz, h, H)
@@ -42,7 +42,7 @@ def linearise_radar3d(dx: float, dy: float, dz: float, h: Array, H: Array) -> No
     H[2, 2] = ground / (slant * slant)
 
 
-@njit
+@inner_njit
 def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Array, columns: int) -> float:
     """Write the range rate's derivatives by position and, from `columns` on, by velocity into H[3]; return it."""
     slant = math.hypot(max(math.hypot(dx, dy), NEAREST), dz)
@@ -54,7 +54,7 @@ def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Ar
     return rate
 
 
-@njit
+@inner_njit
 def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
@@ -101,7 +101,7 @@ def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Informat
     return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
 
 
-@njit
+@inner_njit
 def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
@@ -130,7 +130,7 @@ def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Informat
     return chi, g0, g1, g2, a0, a1, a2, a3, a4, a5
 
 
-@njit
+@inner_njit
 def convert_radar3d(z: Array, place: Array, R: Array, reach: float, least: float, centre: Array, c: Array) -> None:
     """Range, azimuth, elevation; see `assoc.sensors.kernels.dispatch.convert_one`."""
     slant = max(z[0], 0.0)
@@ -158,7 +158,7 @@ def convert_radar3d(z: Array, place: Array, R: Array, reach: float, least: float
             entry += 1
 
 
-@njit
+@inner_njit
 def convert_radar2d(
     z: Array,
     place: Array,
