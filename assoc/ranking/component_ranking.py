@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import inner_njit, njit, search_njit
 from assoc._types import Floats
 from assoc.packing.branching.node import (
     Work,
@@ -159,7 +159,7 @@ def _sorted_store(store: Store) -> Any:
     return weights, columns
 
 
-@njit
+@inner_njit
 def _priced(work: Work, num: int) -> PricedColumns:
     """The columns of the node at work with its multipliers, indexed by row."""
     cols, active = work.cols, work.node.active
@@ -188,7 +188,7 @@ def _priced(work: Work, num: int) -> PricedColumns:
     )
 
 
-@njit
+@inner_njit
 def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
     """The pair to branch on, what is to be done with it (`decide`), and whether it is likelier together."""
     program, cols, basis, trials = work.program, work.cols, work.basis, work.trials

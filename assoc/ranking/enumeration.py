@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
@@ -104,7 +104,7 @@ def cut_of(store: Store, wanted: Wanted) -> float:
     return wanted.limit
 
 
-@njit
+@inner_njit
 def _mark(column: int) -> np.uint64:
     """Well mixed bits for a column number (splitmix64), so that their xor identifies a set."""
     z = np.uint64(column + 1) * np.uint64(0x9E3779B97F4A7C15)
@@ -113,7 +113,7 @@ def _mark(column: int) -> np.uint64:
     return z ^ (z >> np.uint64(31))
 
 
-@njit
+@inner_njit
 def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: bool) -> Store:
     """Add a solution, in the place of the heaviest if there are k; with ``check`` only if it is new."""
     mark = np.uint64(0)
@@ -150,7 +150,7 @@ def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: 
     return store
 
 
-@search_njit
+@inner_njit
 def enumerate_solutions(
     priced: PricedColumns, top: int, end: int, base: float, wanted: Wanted, check: bool, store: Store
 ) -> Any:
@@ -255,7 +255,7 @@ def enumerate_solutions(
             return NOT_COMPLETE, store
 
 
-@njit
+@inner_njit
 def _sort_row(reduced: Floats, own: Any) -> None:
     """Put columns in order of reduced cost, in place; ties stay in their order."""
     ordered = True
@@ -267,7 +267,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
         copy_to(own, own[order_of(reduced[own])])
 
 
-@njit
+@inner_njit
 def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float) -> Any:
     """Return the row with the fewest choices left (-1: all are decided), and how many these are."""
     _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
@@ -289,7 +289,7 @@ def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float)
     return row, least
 
 
-@njit
+@inner_njit
 def _decide(priced: PricedColumns, top: int, row: int, taken: int, done: Any, do: bool) -> int:
     """Take a column, or leave a row alone, or take that back; the number of columns this concerns."""
     cols, row_ptr, row_cols, blocked = priced.cols, priced.row_ptr, priced.row_cols, priced.blocked

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.kernels.heap import pop, push
 
@@ -86,7 +86,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
     return total, choice
 
 
-@njit
+@inner_njit
 def _wider(array: Any, columns: int) -> Any:
     result = np.empty((array.shape[0], columns), np.int32)
     for i in range(array.shape[0]):

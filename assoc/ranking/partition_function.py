@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
-from assoc._system.compiled import njit, search_njit
+from assoc._system.compiled import inner_njit, search_njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import doubled, doubled_rows, pop, push
@@ -199,7 +199,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     return result + 1e-11 + 4e-16 * (num_rows + 3) * size_of_sums
 
 
-@njit
+@inner_njit
 def _added(largest: float, total: float, term: float) -> Any:
     """Add exp(term) to total * exp(largest); ``largest`` becomes the largest term so far."""
     if term == -np.inf:
@@ -209,7 +209,7 @@ def _added(largest: float, total: float, term: float) -> Any:
     return term, total * math.exp(largest - term) + 1.0
 
 
-@njit
+@inner_njit
 def _is_open(cols: Any, done: Any, j: int) -> bool:
     """Whether none of a column's rows is decided."""
     for s in range(cols.shape[1]):
@@ -218,7 +218,7 @@ def _is_open(cols: Any, done: Any, j: int) -> bool:
     return True
 
 
-@njit
+@inner_njit
 def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
     """Return the least logarithm of the product (module's equation) over the cyclic orders of the sensors."""
     cols, weights, alone = terms.cols, terms.weights, terms.alone
@@ -254,7 +254,7 @@ def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
     return best
 
 
-@njit
+@inner_njit
 def _log_row(terms: Terms, done: Any, row: int, first: int) -> float:
     """Logarithm of a row's sum where it underflows: the columns that begin in the row, and leaving it uncovered."""
     cols, num_sensors = terms.cols, terms.cols.shape[1]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 
 ALONE = -1
 
@@ -145,7 +145,7 @@ def index_edges(rows: Any, columns: Any, num_rows: int, num_columns: int, keep: 
     return row_ptr, row_edges, column_ptr, column_edges
 
 
-@njit
+@inner_njit
 def new_taboo(graph: Graph) -> Taboo:
     """Room for what is taboo; nothing is."""
     return Taboo(
@@ -155,7 +155,7 @@ def new_taboo(graph: Graph) -> Taboo:
     )
 
 
-@njit
+@inner_njit
 def new_path_work(graph: Graph) -> PathWork:
     """Room for shortest paths."""
     num_rows, num_columns = graph.row_alone.size, graph.column_alone.size

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.kernels.sorting import order_of
 from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Taboo
 
 
-@njit
+@inner_njit
 def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int, on: bool) -> None:
     """Mark (or unmark) what the child at ``place`` may not touch: its fixed rows and its forbidden edges."""
     for t in range(place):
@@ -39,7 +39,7 @@ def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int,
             node = forbidden[node, 0]
 
 
-@njit
+@inner_njit
 def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
     """Whether the child of ``row`` may leave that row alone."""
     order, fixed, forbidden = nodes.order, nodes.fixed, nodes.forbidden
@@ -54,7 +54,7 @@ def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
     return True
 
 
-@njit
+@inner_njit
 def _relax(work: PathWork, size: int, num_reached: int, item: int, value: float, edge: int, row: int) -> Any:
     """Offer a way to a column (or the dummy); the sizes of the queue and of the list of what was reached."""
     distance, previous, previous_row, closed, reached, _, _, queue_key, queue_item = work
@@ -70,7 +70,7 @@ def _relax(work: PathWork, size: int, num_reached: int, item: int, value: float,
     return size + 1, num_reached
 
 
-@njit
+@inner_njit
 def search_path(
     graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, parent: int, row: int, alone: bool, limit: float
 ) -> Any:
@@ -141,7 +141,7 @@ def search_path(
             i = row_of[parent, item]
 
 
-@njit
+@inner_njit
 def clear(work: PathWork, num_reached: int) -> None:
     """Make the working arrays ready for the next path."""
     for t in range(num_reached):
@@ -149,7 +149,7 @@ def clear(work: PathWork, num_reached: int) -> None:
         work.closed[work.reached[t]] = False
 
 
-@njit
+@inner_njit
 def make_node(
     graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, node: int, parent: int, place: int, alone: bool
 ) -> None:
@@ -194,7 +194,7 @@ def make_node(
     clear(work, num_reached)
 
 
-@njit
+@inner_njit
 def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node: int, worst: float) -> None:
     """Queue the children of a node by their bounds."""
     columns, row_alone = graph.columns, graph.row_alone
@@ -231,7 +231,7 @@ def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node
     taboo_column[:] = False
 
 
-@njit
+@inner_njit
 def _way_round(graph: Graph, nodes: Nodes, taboo: Taboo, node: int, row: int) -> float:
     """Return a bound on any path from a row to what it is matched to: the first step and the last."""
     costs, rows, columns, row_alone, column_alone, row_ptr, row_edges, column_ptr, column_edges = graph
