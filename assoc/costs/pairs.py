@@ -76,9 +76,7 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
         return abs(off) <= math.asin(math.sqrt(ball / away)) + math.sqrt(
             2.0 * limit * sensors.covariance[t, 0, 0]
         )
-    # for bent measurement models the two ellipsoids are added up, not their covariances
-    if sensors.code[s] != POSITION or sensors.code[t] != POSITION:
-        limit *= 2.0
+    limit = _wide(sensors, s, t, limit)
     dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
     c0, c1, c3 = (
         scan.spread[n, 0] + scan.spread[m, 0],
@@ -113,6 +111,14 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
 
 
 @njit
+def _twice_as_long(pairs: Array) -> Array:
+    longer = np.empty((2 * len(pairs), 2), np.int32)
+    for k in range(len(pairs)):
+        longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
+    return longer
+
+
+@njit
 def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, high: int) -> Array:
     """All near pairs whose first is in low .. high, int32 (K, 2), by looking at every combination."""
     found = np.empty((1024, 2), np.int32)
@@ -131,31 +137,52 @@ def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, 
                     continue
             if _near(sensors, scan, n, m, limits[s, t]):
                 if count == len(found):
-                    wider = np.empty((2 * count, 2), np.int32)
-                    for k in range(count):
-                        wider[k, 0], wider[k, 1] = found[k, 0], found[k, 1]
-                    found = wider
+                    found = _twice_as_long(found)
                 found[count, 0], found[count, 1] = n, m
                 count += 1
     return found[:count]
 
 
 @njit
-def _keep_near(sensors: SensorArrays, scan: ScanArrays, pairs: Array, limit: float) -> Array:
-    """The near ones among given pairs."""
+def _wide(sensors: SensorArrays, s: int, t: int, limit: float) -> float:
+    """The gate of two sensors' ellipsoids: for bent measurement models these are added up, not their covariances."""
+    return limit if sensors.code[s] == POSITION and sensors.code[t] == POSITION else 2.0 * limit
+
+
+@njit
+def _near_within(
+    sensors: SensorArrays, scan: ScanArrays, t: int, rows: Array, others: Array, first: Array, last: Array, limit: float
+) -> Array:
+    """The near pairs of rows of one sensor, each with its window others[first : last] of sensor t, int32 (K, 2).
+
+    In each pair the earlier sensor's comes first.
+    """
+    found = np.empty((1024, 2), np.int32)
     count = 0
-    for k in range(len(pairs)):
-        if _near(sensors, scan, pairs[k, 0], pairs[k, 1], limit):
-            pairs[count, 0], pairs[count, 1] = pairs[k, 0], pairs[k, 1]
-            count += 1
-    return pairs[:count]
-
-
-def _expand(rows: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Rows repeated with each index from low to high."""
-    counts = high - low
-    offsets = np.repeat(low - (np.cumsum(counts) - counts), counts)
-    return np.repeat(rows, counts), np.arange(counts.sum()) + offsets
+    # out of the tuple first: a field read in the loop costs a reference count each time
+    centre, spread = scan.centre, scan.spread
+    s = scan.owner[rows[0]]
+    located = sensors.code[s] != BEARING and sensors.code[t] != BEARING
+    tall = sensors.full[s] and sensors.full[t]
+    wide = (1.0 + 1e-9) * _wide(sensors, s, t, limit)
+    for k in range(len(rows)):
+        n = rows[k]
+        for e in range(first[k], last[k]):
+            m = others[e]
+            if located:
+                # coordinate by coordinate: most are ruled out by one
+                dx, dy, dz = centre[n, 0] - centre[m, 0], centre[n, 1] - centre[m, 1], centre[n, 2] - centre[m, 2]
+                if dx * dx > wide * (spread[n, 0] + spread[m, 0]) or dy * dy > wide * (spread[n, 3] + spread[m, 3]):
+                    continue
+                if tall and dz * dz > wide * (spread[n, 5] + spread[m, 5]):
+                    continue
+            low, high = min(n, m), max(n, m)
+            if _near(sensors, scan, low, high, limit):
+                if count == len(found):
+                    found = _twice_as_long(found)
+                found[count, 0], found[count, 1] = low, high
+                count += 1
+    return found[:count]
 
 
 def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[tuple[Array, float]]:
@@ -174,100 +201,66 @@ def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[
     for s, t in itertools.combinations(range(len(sensors.dim)), 2):
         size = float(np.diff(scan.start)[[s, t]].prod())
         for pairs, share in _between(sensors, scan, s, t, float(limits[s, t])):
-            yield _keep_near(sensors, scan, pairs, limits[s, t]), (done + share * size) / work[-1]
+            yield pairs, (done + share * size) / work[-1]
         done += size
 
 
 def _between(
     sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
 ) -> Iterator[tuple[Array, float]]:
-    """Blocks of pairs of sensors s and t that hold all near ones, found by k-d tree or by sorted azimuths."""
-    if sensors.code[s] == BEARING and sensors.code[t] == BEARING:
-        yield from _everything(scan, s, t)
-    elif sensors.code[s] == BEARING or sensors.code[t] == BEARING:
-        yield from _by_azimuth(sensors, scan, s, t, limit)
-    else:
-        yield from _by_tree(sensors, scan, s, t, limit)
-
-
-def _everything(scan: ScanArrays, s: int, t: int) -> Iterator[tuple[Array, float]]:
+    """Blocks of the near pairs of sensors s and t, each with the share of them that is done after it."""
+    if sensors.code[s] == BEARING:
+        # windows are those of located measurements, where there are any
+        s, t = t, s
     rows = np.arange(scan.start[s], scan.start[s + 1])
-    width = int(scan.start[t + 1] - scan.start[t])
-    step = max(1, _BLOCK // max(width, 1))
-    for k in range(0, len(rows), step):
-        part = rows[k : k + step]
-        low = np.full(len(part), scan.start[t])
-        yield (
-            np.stack(_expand(part, low, low + width), axis=1).astype(np.int32),
-            min(1.0, (k + step) / len(rows)),
-        )
-
-
-def _by_azimuth(
-    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
-) -> Iterator[tuple[Array, float]]:
-    swap = sensors.code[s] == BEARING
-    located, bearing = (t, s) if swap else (s, t)
-    rows = np.arange(scan.start[located], scan.start[located + 1])
-    low, high = int(scan.start[bearing]), int(scan.start[bearing + 1])
-    azimuths = scan.z[low:high, 0]
-    d = scan.centre[rows, :2] - sensors.place[bearing, :2]
-    ball = 2.0 * limit * (scan.spread[rows, 0] + scan.spread[rows, 3])
-    ratio = np.sqrt(ball / np.maximum((d**2).sum(axis=1), 1e-300))
-    half = np.where(ratio < 1.0, np.arcsin(np.minimum(ratio, 1.0)), math.pi)
-    half = np.minimum(half + math.sqrt(2.0 * limit * sensors.covariance[bearing, 0, 0]) + 1e-12, math.pi)
-    middle = np.arctan2(d[:, 1], d[:, 0])
-    # the circle unrolled twice, so that an interval through +-pi is one run
-    unrolled = np.concatenate([azimuths - 2 * math.pi, azimuths, azimuths + 2 * math.pi])
-    first = np.searchsorted(unrolled, middle - half, side="left")
-    last = np.minimum(np.searchsorted(unrolled, middle + half, side="right"), first + (high - low))
+    others, first, last = _windows(sensors, scan, s, t, limit)
     counts = np.cumsum(last - first)
     k = 0
     while k < len(rows):
         so_far = counts[k - 1] if k else 0
         stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
-        located_rows, where = _expand(rows[k:stop], first[k:stop], last[k:stop])
-        bearing_rows = low + where % (high - low) if high > low else where
-        columns = (bearing_rows, located_rows) if swap else (located_rows, bearing_rows)
-        yield np.stack(columns, axis=1).astype(np.int32), stop / len(rows)
+        yield _near_within(sensors, scan, t, rows[k:stop], others, first[k:stop], last[k:stop], limit), stop / len(rows)
         k = stop
 
 
-def _by_tree(
+def _windows(
     sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
-) -> Iterator[tuple[Array, float]]:
-    from scipy.spatial import cKDTree
+) -> tuple[Array, Array, Array]:
+    """Measurements of sensor t, and for each of sensor s where among them those near it begin and end.
 
-    axes = 3 if sensors.full[s] and sensors.full[t] else 2
-    a, b = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
-    if a.start == a.stop or b.start == b.stop:
-        return
-    if sensors.code[s] != POSITION or sensors.code[t] != POSITION:
-        limit *= 2.0
-    radius = np.sqrt(limit * (_widest(scan.spread[a], axes) + _widest(scan.spread[b], axes).max())) * (
-        1 + 1e-9
-    )
-    tree = cKDTree(scan.centre[b, :axes])
-    points = scan.centre[a, :axes]
-    counts = np.cumsum(tree.query_ball_point(points, radius, return_length=True))
-    k = 0
-    while k < len(points):
-        so_far = counts[k - 1] if k else 0
-        stop = max(k + 1, int(np.searchsorted(counts, so_far + _BLOCK, side="right")))
-        lists = tree.query_ball_point(points[k:stop], radius[k:stop])
-        lengths = np.diff(counts[k:stop], prepend=so_far)
-        pairs = np.empty((int(lengths.sum()), 2), dtype=np.int32)
-        pairs[:, 0] = np.repeat(np.arange(a.start + k, a.start + stop), lengths)
-        pairs[:, 1] = np.fromiter(itertools.chain.from_iterable(lists), dtype=np.int64, count=len(pairs))
-        pairs[:, 1] += b.start
-        yield pairs, stop / len(points)
-        k = stop
+    If one of the two sensors measures bearings alone, it is t.
+    """
+    rows, others = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
+    if sensors.code[s] == BEARING or not len(others):
+        return others, np.zeros(len(rows), np.int64), np.full(len(rows), len(others))
+    if sensors.code[t] != BEARING:
+        return _windows_along_an_axis(sensors, scan, s, t, limit)
+    azimuths = scan.z[others, 0]
+    d = scan.centre[rows, :2] - sensors.place[t, :2]
+    ball = 2.0 * limit * (scan.spread[rows, 0] + scan.spread[rows, 3])
+    ratio = np.sqrt(ball / np.maximum((d**2).sum(axis=1), 1e-300))
+    half = np.where(ratio < 1.0, np.arcsin(np.minimum(ratio, 1.0)), math.pi)
+    half = np.minimum(half + math.sqrt(2.0 * limit * sensors.covariance[t, 0, 0]) + 1e-12, math.pi)
+    middle = np.arctan2(d[:, 1], d[:, 0])
+    # the circle unrolled twice, so that an interval through +-pi is one run
+    unrolled = np.concatenate([azimuths - 2 * math.pi, azimuths, azimuths + 2 * math.pi])
+    first = np.searchsorted(unrolled, middle - half, side="left")
+    last = np.minimum(np.searchsorted(unrolled, middle + half, side="right"), first + len(others))
+    return np.tile(others, 3), first, last
 
 
-def _widest(spread: Array, axes: int) -> Array:
-    """Largest variance in any direction, of x, y or of x, y, z."""
-    full = spread[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
-    return np.asarray(np.linalg.eigvalsh(full[:, :axes, :axes])[:, -1])
+def _windows_along_an_axis(
+    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
+) -> tuple[Array, Array, Array]:
+    """`_windows` of sensors that measure positions, along the axis, x or y, that spreads those of t the more."""
+    rows, others = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
+    along = int(np.argmax(np.ptp(scan.centre[others, :2], axis=0)))
+    others = others[np.argsort(scan.centre[others, along], kind="stable")]
+    # x and y of a measurement's position, and their variances
+    variance = scan.spread[:, 3 * along]
+    far = np.sqrt(_wide(sensors, s, t, limit) * (variance[rows] + variance[others].max())) * (1.0 + 1e-9)
+    middle, line = scan.centre[rows, along], scan.centre[others, along]
+    return others, np.searchsorted(line, middle - far), np.searchsorted(line, middle + far, side="right")
 
 
 def compatible_pairs(

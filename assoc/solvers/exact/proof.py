@@ -22,9 +22,11 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
-# rows from which tabu search and breeding pay beside the branching, whose passes need no good incumbent, and turns of
-# branching between their iterations
+# rows from which tabu search and breeding pay beside the branching from the start: its passes need no good incumbent.
+# Elsewhere they join it after so many turns, about a second: who stops a long search wants a good incumbent
 _LARGE = 150
+_ALONE = 100
+# turns of branching between their iterations
 _TURNS = 3
 # share of a component's gap by which its bound has risen when the trace says so
 _WORTH = 0.02
@@ -43,7 +45,9 @@ class _Task:
     search: BranchAndBound | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
+    # of branching: since the last iteration of a metaheuristic, and in all
     turns: int = 0
+    age: int = 0
 
     @property
     def bound(self) -> float:
@@ -118,8 +122,10 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             better = task.take_over()
             if not task.search.done:
                 task.turns += 1
+                task.age += 1
+                alone = component.packing.num_rows < _LARGE and task.age < _ALONE
                 # as long as they improve it, metaheuristics get half the time; then less and less
-                if task.turns >= _TURNS * min(1 + component.stalled, 10):
+                if not alone and task.turns >= _TURNS * min(1 + component.stalled, 10):
                     task.turns = 0
                     if _search_better(task, run):
                         task.search.weight = component.weight
@@ -227,7 +233,7 @@ def _search_better(task: _Task, run: Run) -> bool:
     Tabu search and breeding take turns: they get stuck in different places.
     """
     component = task.component
-    if component.best is None or component.packing.num_rows < _LARGE:
+    if component.best is None:
         return False
     if task.heuristics is None:
         task.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
