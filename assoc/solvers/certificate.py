@@ -39,7 +39,8 @@ def certify(
     if not exact:
         raise InfeasibleError("the solver's answer does not use every measurement exactly once")
     bound, duals = outcome.lower_bound, outcome.duals
-    if bound == -np.inf:
+    # also where a solver's own bound is no number
+    if not bound > -np.inf:
         duals = dual_bound(packing, run=run)
         bound = certified_bound(packing, duals)
     # packing weights are differences of costs: what they lose to rounding, half an epsilon a sensor, is taken off

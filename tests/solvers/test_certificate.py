@@ -101,6 +101,11 @@ def test_a_bound_holds_where_false_alarms_add_up_badly():
     assert answer(problem, [], bound=-1.0).lower_bound <= math.fsum(alone[1:])
 
 
+def test_a_bound_that_is_none_is_found_anew():
+    for bound in (-np.inf, np.nan):
+        assert -6.0 < answer(PROBLEM, [column(PROBLEM, 1, 2)], bound).lower_bound <= -5.0
+
+
 def test_a_bound_above_the_cost_is_cut_to_it():
     solution = answer(PROBLEM, [column(PROBLEM, 1, 2)], bound=1e9)
     assert solution.lower_bound == solution.cost
