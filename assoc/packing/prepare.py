@@ -75,7 +75,9 @@ def prepare(problem: AssignmentProblem) -> Prepared:
         whole = _whole_numbers(costs)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
     packing = Packing(*(*arrays, 1.0 if whole else 0.0))
-    prepared = Prepared(packing, float(single_cost.sum()), single, single_cost)
+    # the bound of every solution has this in it: to the last digit
+    offset = math.fsum(single_cost.tolist()) if single_cost.any() else 0.0
+    prepared = Prepared(packing, offset, single, single_cost)
     problem._prepared = prepared
     return prepared
 

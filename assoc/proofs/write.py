@@ -24,6 +24,8 @@ _NODES = 100_000
 # the second stage has what the first has not found too dear
 _STAGES = 2
 _ONE = 10**check.DECIMALS
+# multipliers below this are 0: a float has up to 17 digits after its leading zeros
+_TINY = 10.0 ** (18 - check.DECIMALS)
 
 
 @door
@@ -60,7 +62,8 @@ def write_proof(
     Raises
     ------
     InvalidInputError
-        The solution is not one of this problem, or the file cannot be written.
+        The solution is not one of this problem, a cost has more decimals than the checker reads, or the file cannot be
+        written.
     """
     if not isinstance(problem, AssignmentProblem):
         raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
@@ -93,10 +96,19 @@ def write_proof(
 
 
 def exact_problem(problem: AssignmentProblem) -> check.Problem:
-    """Return a problem as the checker reads it from text: each cost is the shortest decimal that stands for it."""
+    """Return a problem as the checker reads it from text: each cost is the shortest decimal that stands for it.
+
+    Raises
+    ------
+    InvalidInputError
+        A cost has more decimals than the checker reads.
+    """
     costs: dict[tuple[int, ...], int] = {}
     for one, cost in zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True):
-        value = check.number(repr(cost))
+        try:
+            value = check.number(repr(cost))
+        except ValueError as error:
+            raise InvalidInputError(f"problem: cost {error}") from None
         costs[one] = min(value, costs.get(one, value))
     return check.Problem(problem.sizes.tolist(), problem.dummy, costs)
 
@@ -115,6 +127,8 @@ def _proved(
         duals = dual_bound(packing)
         whole = np.array(alone, dtype=np.float64)
         whole[packing.row_origin] += duals
+        # of so small a number the checker would not read all decimals
+        whole[np.abs(whole) < _TINY] = 0.0
         stages.append([whole[first:last].tolist() for first, last in zip(offsets[:-1], offsets[1:], strict=True)])
         u = {row: check.number(repr(value)) for row, value in zip(exact.rows, whole.tolist(), strict=True)}
         bound = check.bounded(columns, exact.needed, u, {})

@@ -1,6 +1,6 @@
 """All solutions of a small packing below a limit, the k lightest kept: depth first over rows.
 
-With feasible multipliers u (bounds.py) a solution x weighs
+With feasible multipliers u (packing/bounds) a solution x weighs
 
     w(x) = sum(u) + sum of the reduced costs of its columns + sum of -u_r over its uncovered rows with slack,
 

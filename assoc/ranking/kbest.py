@@ -1,10 +1,10 @@
 """The true k best solutions of an assignment problem.
 
-Two sensors: Murty's algorithm (murty.py). More: the multipliers of the dual bound give every solution its
+Two sensors: Murty's algorithm (murty/murty.py). More: the multipliers of the dual bound give every solution its
 excess, the sum of its reduced costs, over the bound. All solutions whose excess is at most D use only
 columns of reduced cost <= D. D grows until k solutions lie within; for each D the columns that are left
-fall apart into components, each component's solutions are ranked (ranking.py), and the ranked lists are
-merged. Nothing is sampled or guessed: a solution that is not listed has been excluded by a bound.
+fall apart into components, each component's solutions are ranked (component_ranking.py), and the ranked lists
+are merged (merging.py). Nothing is sampled or guessed: a solution that is not listed has been excluded by a bound.
 """
 
 from __future__ import annotations
@@ -112,7 +112,8 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
     run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
-    packing = prepare(problem).packing
+    prepared = prepare(problem)
+    packing = prepared.packing
     ahead = HeadStart(packing, run)
     if problem.num_sensors == 2:
         columns, found = rank_two_sensors(problem, most, run)
@@ -129,7 +130,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
         * (
             np.abs(columns.weights).max(initial=0.0) * max(columns.slack.size, 1)
             + np.abs(columns.duals).sum()
-            + abs(columns.offset)
+            + np.abs(prepared.single_cost).sum()
         )
     )
     rest = found.rest + columns.offset - rounding

@@ -1,7 +1,7 @@
 """An upper bound on the total weight of all solutions, their partition function.
 
 With multipliers, a solution x has the excess E(x) = sum of the reduced costs of its columns and of -u_r over
-its uncovered rows, all terms >= 0 (deepening.py). For a temperature 1 / a
+its uncovered rows, all terms >= 0 (enumeration.py). For a temperature 1 / a
 
     Z(a) = sum over all x of exp(-a E(x))
 

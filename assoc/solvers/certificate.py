@@ -39,11 +39,13 @@ def certify(
     if not exact:
         raise InfeasibleError("the solver's answer does not use every measurement exactly once")
     bound, duals = outcome.lower_bound, outcome.duals
-    if bound == -np.inf:
+    # also where a solver's own bound is no number
+    if not bound > -np.inf:
         duals = dual_bound(packing, run=run)
         bound = certified_bound(packing, duals)
-    # packing weights are differences of costs: what they lose to rounding is taken off the bound
-    rounding = 4.0 * sys.float_info.epsilon * (magnitude + float(np.abs(prepared.single_cost).sum()))
+    # packing weights are differences of costs: what they lose to rounding, half an epsilon a sensor, is taken off
+    share = max(4.0, 0.5 * (problem.num_sensors + 3)) * sys.float_info.epsilon
+    rounding = share * (magnitude + float(np.abs(prepared.single_cost).sum()))
     cost = math.fsum(costs)
     return Solution(
         tuples=tuples,

@@ -1,11 +1,15 @@
 """Bounds never above the optimum, and multipliers that prove them, checked with plain numpy."""
 
+import math
+
 import numpy as np
 import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, component_bounds, dual_bound
+from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
+from assoc.packing.simplex.program import all_allowed, certified, program_of
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems
@@ -145,6 +149,22 @@ def test_bounds_of_solvers_on_middle_sized_problems(count, name):
         optimum = milp_optimum(problem)
         solution = assign(problem, name)
         assert solution.lower_bound <= optimum + 1e-9 <= solution.cost + 2e-9
+
+
+def test_the_sum_of_many_multipliers_is_a_bound_to_the_last_digit():
+    """A thousand times 0.1 is 99.9999999999986, added one by one: more than the -100 that these multipliers prove."""
+    half = 500
+    links = np.array([(n // 2, half + (n + 1) // 2) for n in range(2 * half - 1)], dtype=np.int32)
+    origin = np.arange(len(links), dtype=np.int32)
+    packing = assemble(links, np.zeros(len(links)), np.ones(2 * half, dtype=np.bool_), origin)
+    assert packing.num_components == 1 and packing.num_rows == 2 * half
+    program = program_of(packing.arrays)
+    allowed = all_allowed(program, packing.slack)
+    for tenths in range(1, 10):
+        duals = np.full(2 * half, -0.1 * tenths)
+        most = math.fsum(duals)
+        for bound in (certified_bound(packing, duals), certified(program, allowed, duals)):
+            assert most + 2e-15 * most <= bound <= most
 
 
 def test_component_without_cover_is_unbounded():

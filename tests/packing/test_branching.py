@@ -6,7 +6,7 @@ import pytest
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import first_solution
-from assoc.packing.branching.node import branch, new_work, open_node
+from assoc.packing.branching.node import branch, drop, new_work, open_node
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import (
     NEITHER,
@@ -19,7 +19,8 @@ from assoc.packing.branching.pairs import (
     new_trials,
 )
 from assoc.packing.branching.root import plain_root
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.search import BranchAndBound, Limits, _search
+from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_values
@@ -106,6 +107,39 @@ def test_without_memory_for_its_tables_a_search_gives_up_its_root():
     search = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, memory_allows=lambda needed: False)
     search.run(10)
     assert search.done and search.out_of_memory and search.nodes == 0 and search.lower_bound == -np.inf
+
+
+def test_nodes_that_hold_nothing_better_need_no_room():
+    """They are closed where there is no room left for children, too, and not given up."""
+    packing = prepare(axial_problem(np.random.default_rng(74), (4, 4, 4))).packing
+    root = plain_root(packing, dual_bound(packing))
+    stack = OpenNodes(root).arrays
+    stack.bound[:] = -7.0
+    work = new_work(packing.arrays, root.program, root.slack)
+    full = stack.first.size - 1
+    num_open, weight, count, nodes = _search(work, stack, full, -7.0, Limits(1e-9, np.inf, 10, np.inf))
+    assert (num_open, weight, count, nodes) == (0, -7.0, -1, 0)
+
+
+def test_a_bound_that_is_no_number_drops_no_column():
+    packing = prepare(axial_problem(np.random.default_rng(79), (4, 4, 4))).packing
+    root = plain_root(packing, dual_bound(packing))
+    work = new_work(packing.arrays, root.program, root.slack)
+    work.duals[:] = np.nan
+    assert drop(work, packing.num_columns, np.nan, 1.0) == packing.num_columns
+    assert work.node.columns.all() and np.array_equal(work.node.slack, packing.slack)
+
+
+@pytest.mark.parametrize("granularity", [0.0, 1.0])
+def test_where_nothing_is_left_to_cover_nothing_is_chosen(granularity):
+    """Dives can end so: with whole-numbered weights they ended in a division by no rows."""
+    none = np.empty((0, 3), dtype=np.int32)
+    packing = assemble(none, np.empty(0), np.ones(4, dtype=np.bool_), np.empty(0, dtype=np.int32), granularity)
+    assert packing.num_rows == 0
+    for incumbent, weight in ((2.0, 0.0), (-2.0, -2.0)):
+        search = BranchAndBound(packing, np.zeros(0), incumbent, 1e-9)
+        search.run(10)
+        assert search.done and search.weight == weight and (search.columns is not None) is (weight == 0.0)
 
 
 @pytest.mark.slow

@@ -70,6 +70,13 @@ def test_what_is_worse_or_incomplete_is_not_kept():
     assert one.weight == weight
 
 
+def test_a_cover_that_is_kept_weighs_what_its_columns_do():
+    """Whatever moves have made of the weight by adding up what they change."""
+    one = component(PROBLEM, "none")
+    owner = one.random_cover(1.0, np.random.default_rng(0))
+    assert one.offer(owner, one.weight_of(owner) + 1e-7) and one.weight == one.weight_of(owner)
+
+
 @pytest.mark.parametrize("name", ["mixed", "four"])
 def test_how_much_new_covers_are_improved(name):
     """none: not at all; local: halves are matched anew; full: exact sub-steps, too."""

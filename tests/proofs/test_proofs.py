@@ -311,6 +311,18 @@ def test_problems_that_cannot_be_read(tmp_path, text, reason):
                 assoc.AssignmentProblem.load(tmp_path / "p.txt")
 
 
+def test_costs_of_many_decimals(tmp_path):
+    """As many as the checker reads make a proof; more are refused in one line."""
+    for cost in (-3e-40, -7e-47, -1e-59):
+        problem = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [cost] * 3, [1, 1, 1])
+        write_proof(tmp_path / "proof.json", problem, assoc.assign(problem))
+        problem.save(tmp_path / "problem.txt")
+        assert run_alone(tmp_path, "problem.txt", "proof.json").returncode == 0
+    problem = assoc.AssignmentProblem([[1, 1]], [-1e-70], [1, 1])
+    with pytest.raises(InvalidInputError, match="cost -1e-70: has more than 60 decimals"):
+        write_proof(tmp_path / "proof.json", problem, assoc.assign(problem))
+
+
 def test_bad_arguments(tmp_path):
     problem = odd_cycle()
     other = assoc.assign(random_problem(np.random.default_rng(1)))

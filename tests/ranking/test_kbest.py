@@ -284,6 +284,13 @@ def test_nothing_to_choose():
         kbest(AssignmentProblem([[1, 1], [2, 1]], [0, 0], [2, 2], dummy=False), 5)
 
 
+def test_bounds_allow_for_what_weights_have_lost():
+    """Beside false alarms of 1e16 that cancel, a tuple of -0.9 weighs 0, as much as its measurements alone."""
+    problem = AssignmentProblem([[1, 1, 1], [1, 0, 0], [0, 0, 1]], [-0.9, 1e16, -1e16], [1, 1, 1])
+    (solution,) = kbest(problem, 1)
+    assert solution.lower_bound <= -0.9
+
+
 def test_one_sensor():
     found = kbest(AssignmentProblem([[1], [2], [2]], [3.0, -1.0, -2.0], [3]), 5)
     assert [s.cost for s in found] == [1.0]

@@ -91,6 +91,21 @@ def test_choices_of_columns_against_a_plain_count(dummy):
     assert accepted > 20 and refused > 20
 
 
+def test_a_bound_holds_where_false_alarms_add_up_badly():
+    """Added as numpy adds them, small costs beside 1 make the sum of all false alarms too large by seven epsilons."""
+    # numpy adds blocks of 128 in eight sums, of which each has a 1 and fifteen small ones
+    alone = np.where(np.arange(127) < 8, 1.0, 1.2e-16)
+    tuples = [[number + 1, 0] for number in range(127)] + [[1, 1]]
+    problem = AssignmentProblem(tuples, [*alone.tolist(), 0.0], [127, 1])
+    # the tuple weighs -1; the answer leaves it out
+    assert answer(problem, [], bound=-1.0).lower_bound <= math.fsum(alone[1:])
+
+
+def test_a_bound_that_is_none_is_found_anew():
+    for bound in (-np.inf, np.nan):
+        assert -6.0 < answer(PROBLEM, [column(PROBLEM, 1, 2)], bound).lower_bound <= -5.0
+
+
 def test_a_bound_above_the_cost_is_cut_to_it():
     solution = answer(PROBLEM, [column(PROBLEM, 1, 2)], bound=1e9)
     assert solution.lower_bound == solution.cost

@@ -22,6 +22,7 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
+from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.run import Run
 
@@ -321,10 +322,15 @@ def bounds_by_component(packing: PackingArrays, duals: Floats) -> Floats:
     bounds = np.zeros(col_start.size - 1)
     for c in range(bounds.size):
         total = 0.0
+        lost = 0.0
         size = 0.0
         for r in range(row_start[c], row_start[c + 1]):
             u = min(duals[r], 0.0) if slack[r] else duals[r]
-            total += u
+            # what an addition loses is kept: a plain sum of many terms is wrong by more than the margin
+            new = total + u
+            part = new - total
+            lost += (total - (new - part)) + (u - part)
+            total = new
             size += abs(u)
             if not slack[r] and row_ptr[r] == row_ptr[r + 1]:
                 total = np.inf
@@ -337,6 +343,6 @@ def bounds_by_component(packing: PackingArrays, duals: Floats) -> Floats:
                 if r >= 0:
                     value -= min(duals[r], 0.0) if slack[r] else duals[r]
             least = min(least, value)
-        # what summing can have lost, and the columns that a solution can have
-        bounds[c] = total + least * (row_start[c + 1] - row_start[c]) - 1e-15 * size
+        # what is negative in the reduced costs, for as many columns as a solution can have, and what rounding hides
+        bounds[c] = total + lost + least * (row_start[c + 1] - row_start[c]) - margin(size, num_sensors)
     return bounds

@@ -95,13 +95,13 @@ def drop(work: Work, num: int, bound: float, cut: float) -> int:
     for a in range(num):
         j = active[a]
         reduced = reduced_cost(program, duals, j)
-        # a column at the cut itself stays
-        if bound + reduced <= cut:
+        # a column at the cut itself stays, and so does every one where the bound is no number
+        if bound + reduced > cut:
+            columns[j] = False
+        else:
             active[kept] = j
             key[kept] = reduced
             kept += 1
-        else:
-            columns[j] = False
     for r in range(slack.size):
         if slack[r] and bound - duals[r] > cut:
             slack[r] = False

@@ -56,7 +56,7 @@ class Trials(NamedTuple):
         Of the side that is tried.
     side : Allowed
         What that side allows; its ``active`` is room.
-    duals : float array, shape (R,)
+    duals : float array, shape (rows of the program,)
         Its multipliers.
     """
 

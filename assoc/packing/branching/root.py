@@ -64,7 +64,8 @@ def _lowered(packing: Packing) -> Floats:
     """
     number = np.arange(packing.num_columns, dtype=np.uint64)
     share = (number * np.uint64(2654435761) % np.uint64(2**32)) / 2.0**32
-    return packing.weights - _LOWERED * packing.granularity / packing.num_rows * share
+    # a packing in which nothing is left to cover has no rows
+    return packing.weights - _LOWERED * packing.granularity / max(packing.num_rows, 1) * share
 
 
 def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: float) -> Root:

@@ -250,12 +250,13 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
     at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
-        if not has_room(stack, top):
-            break
         lower = stack.bound[top]
         if lower >= min(incumbent - tolerance, aim):
             num_open = top
             continue
+        # what holds nothing better needs no room: given up for want of it, it would end the passes
+        if not has_room(stack, top):
+            break
         num = open_node(work, stack, top, at_work)
         at_work = -1
         one, two, likely = -1, -1, 0.5

@@ -155,7 +155,8 @@ class Component(Priced):
     def offer(self, owner: Owner, weight: float) -> bool:
         """Keep a cover if it is complete and better than the best; whether it was."""
         if weight < self.weight - self.tolerance and self.is_complete(owner):
-            self.best, self.weight = owner.copy(), weight
+            # summed anew: bounds of whole-numbered weights are rounded up to it, and moves add up what they change
+            self.best, self.weight = owner.copy(), self.weight_of(owner)
             return True
         return False
 

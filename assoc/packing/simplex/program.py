@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
+from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import PackingArrays
 
 
@@ -118,25 +119,34 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
     """A lower bound on all whole-numbered solutions that holds whatever the multipliers are.
 
     What reduced costs lack to zero is charged for as many columns as a solution can have, and what rounding can have
-    lost in the sum is taken off.
+    hidden is taken off.
     """
     sides, slack, weights, start, rows = program.sides, allowed.slack, program.weights, program.start, program.rows
     total = 0.0
+    lost = 0.0
     size = 0.0
     most = 0.0
     for r in range(duals.size):
         u = min(duals[r], 0.0) if slack[r] else duals[r]
-        total += sides[r] * u
+        # what an addition loses is kept: a plain sum of many terms is wrong by more than the margin
+        term = sides[r] * u
+        new = total + term
+        part = new - total
+        lost += (total - (new - part)) + (term - part)
+        total = new
         size += sides[r] * abs(u)
         most += sides[r]
     least = 0.0
+    # not a literal 0: numba would compile what it is given to for that, too
+    longest = np.int64(0)
     for j in allowed.active:
+        longest = max(longest, start[j + 1] - start[j])
         value = weights[j]
         for k in range(start[j], start[j + 1]):
             r = rows[k]
             value -= min(duals[r], 0.0) if slack[r] else duals[r]
         least = min(least, value)
-    return total + least * most - 1e-15 * size
+    return total + lost + least * most - margin(size, longest)
 
 
 def weight_limit(program: Program) -> float:
