@@ -158,7 +158,7 @@ def _of_scene(
         raise InvalidInputError("--identity: is for plots; the measurements of a scene have no codes")
     if parsed["rates"] is not None:
         raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
-    for flag in ("rotation", *RADAR):
+    for flag in ("rotation", "radar", *RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     if parsed["registration"] is not None:

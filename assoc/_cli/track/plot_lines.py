@@ -123,7 +123,7 @@ def _from_json(text: str, scene: Scene) -> Plot:
             values = [found[name] for name in names]
         identity = _identity(found.get("mode3"), found.get("address"))
         return Plot(sensor, time, [float(one) for one in values], identity)
-    except (ValueError, TypeError, KeyError, RecursionError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError, AttributeError, OverflowError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None
 
