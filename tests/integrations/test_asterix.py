@@ -172,6 +172,8 @@ def test_hostile_files(file, tmp_path):
             assert "\n" not in str(error)
     with pytest.raises(InvalidInputError, match="cannot be read"):
         read_asterix(tmp_path / "none.ast")
+    with pytest.raises(InvalidInputError, match=r"origin: latitude must be within .* \(degrees\?\)"):
+        read_asterix(file, origin=(52.0, 13.0, 40.0))
 
 
 def packet(payload, port=8600):

@@ -136,6 +136,13 @@ def test_solution(scene, association, ax):
     assert np.diff(near.get_xlim())[0] < 1500 and near.get_xlabel() == "x (m)"
     with pytest.raises(assoc.InvalidInputError, match="target: expected 0 to"):
         plotting.plot_solution(scene, one, target=99, ax=ax)
+    for wrong in (0.0, 1.0, -0.5, np.nan):
+        with pytest.raises(assoc.InvalidInputError, match="probability: expected a number between 0 and 1"):
+            plotting.plot_solution(scene, one, probability=wrong, ax=ax)
+        with pytest.raises(assoc.InvalidInputError, match="gate_probability: expected a number between 0 and 1"):
+            plotting.plot_scene(scene, 0, gates=True, gate_probability=wrong, ax=ax)
+    with pytest.raises(assoc.InvalidInputError, match="bins: expected a whole number >= 1, got 0"):
+        plotting.plot_gates(scene, association, bins=0, ax=ax)
 
 
 def test_costs(scene, association, ax):

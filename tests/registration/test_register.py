@@ -273,6 +273,7 @@ def test_bad_input():
     scene = scene_of(radars(2), 1, 2)
     for values, match in (
         ({"components": "range"}, "components"),
+        ({"components": 3}, "components: expected names, got 3"),
         ({"components": ("height",)}, "components: unknown 'height'"),
         ({"components": ("time",), "reference": ("1", "2")}, "no sensor has a bias"),
         ({"reference": ("nobody",)}, "reference: no sensor 'nobody'; there are radar 1, radar 2"),
