@@ -84,9 +84,9 @@ class Option:
             raise InvalidInputError(f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}")
         return value
 
-    def add_to(self, parser: argparse._ActionsContainer, *, hidden: bool = False) -> None:
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
         """Add the option to a parser or a group; without a value it stays out of the parsed arguments."""
-        text = argparse.SUPPRESS if hidden else self.describe().replace("%", "%%")
+        text = self.describe().replace("%", "%%")
         if self.positional:
             parser.add_argument(self.name, metavar=self.name.upper(), help=text)
         elif self.kind is bool:

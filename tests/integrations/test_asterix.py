@@ -204,6 +204,13 @@ def test_bad_arguments(plots, tmp_path):
     far = Recording([0.0], [1e6], [0.0])
     with pytest.raises(InvalidInputError, match="256 nmi"):
         write_plots(tmp_path / "x.ast", far)
+    # 7700 as digits of a CSV file: 12 bits would make 3604 of it
+    digits = Recording([0.0], [1e4], [0.0], identities=[7700])
+    with pytest.raises(InvalidInputError, match="identities of category 048 have 12 bits, got 7700"):
+        write_plots(tmp_path / "x.ast", digits)
+    wide = Recording([0.0], [1e4], [0.0], addresses=[2**24])
+    with pytest.raises(InvalidInputError, match="addresses of category 048 have 24 bits, got 16777216"):
+        write_plots(tmp_path / "x.ast", wide)
     assert not (tmp_path / "x.ast").exists()
 
 

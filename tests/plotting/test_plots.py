@@ -175,6 +175,8 @@ def test_convergence(ax):
         known = bound[~np.isnan(bound[:, 1]), 1]
         assert (np.diff(known) >= 0).all() and known[-1] <= solution.cost + 1e-9
     assert_units(plotting.plot_convergence(found["lagrangian"], over="time", ax=new_figure().subplots()))
+    with pytest.raises(assoc.InvalidInputError, match="solutions: expected at least one, got none"):
+        plotting.plot_convergence({}, ax=ax)
 
 
 def test_pheromone_gathers_on_what_is_chosen(ax):
@@ -217,6 +219,8 @@ def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):
     _, _, middle, low, high = cells(frame.assign(half=frame["rho"] > 0.5), "iterations", "alpha", "half")
     halves = frame.groupby([frame["rho"] > 0.5, "alpha"])["iterations"].mean().to_numpy().reshape(2, 2)
     assert middle == pytest.approx(halves) and (low <= middle).all() and (middle <= high).all()
+    with pytest.raises(assoc.InvalidInputError, match="study: expected the runs of assoc.sweeps.load"):
+        plotting.plot_heat_map(frame[["alpha", "rho"]], ax=ax)
     with pytest.raises(assoc.InvalidInputError, match="needs two that vary"):
         plotting.plot_heat_map(frame[frame["rho"] == 0.3], ax=ax)
 
