@@ -118,6 +118,8 @@ def test_a_clock_that_jumps_for_all_is_believed(scene):
         moved = [plot._replace(time=plot.time + jump) for plot in plots[half:]]
         pictures = fed(tracker, plots[:half] + moved)
         assert sum(words in line for line in told) == 1
+        # no plot is lost that still waited
+        assert sum(len(one.plots) for one in pictures) == tracker.counts["plots"]
         assert pictures[-1].time == pytest.approx(scene.times[-1] + jump, abs=1.5)
         assert len(pictures[-1].tracks) >= 3
         # tracks begin anew, with ids that were not used before

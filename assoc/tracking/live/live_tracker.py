@@ -194,8 +194,9 @@ class LiveTracker:
             self._behind += 1
             if self._behind >= _AGREE:
                 self._tell(f"the clock went back from {self._newest:g} s to {time:g} s: tracks begin anew")
+                pictures = self.finish()
                 self._restart()
-                return self._timed(plot)
+                return [*pictures, *self._timed(plot)]
             return []
         if self._ahead:
             self._drop_ahead()
