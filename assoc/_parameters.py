@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import secrets
+import sys
 import types
 from dataclasses import MISSING, Field, fields
 from numbers import Integral, Real
@@ -73,6 +74,8 @@ class Option:
         if value is None and self.optional:
             return None
         if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
+            if abs(value) > sys.float_info.max:
+                raise InvalidInputError(f"{label}: expected a number within +-1.8e308, got a larger one")
             return float(value)
         if type(value) is not self.kind:
             expected = {int: "a whole number", float: "a number", bool: "true or false"}.get(self.kind, "text")
@@ -81,9 +84,9 @@ class Option:
             raise InvalidInputError(f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}")
         return value
 
-    def add_to(self, parser: argparse._ActionsContainer, *, hidden: bool = False) -> None:
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
         """Add the option to a parser or a group; without a value it stays out of the parsed arguments."""
-        text = argparse.SUPPRESS if hidden else self.describe().replace("%", "%%")
+        text = self.describe().replace("%", "%%")
         if self.positional:
             parser.add_argument(self.name, metavar=self.name.upper(), help=text)
         elif self.kind is bool:
@@ -150,8 +153,10 @@ def checked_time_limit(time_limit: object) -> float | None:
     """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
     if time_limit is None:
         return None
-    if isinstance(time_limit, Real) and not isinstance(time_limit, bool) and float(time_limit) > 0:
-        return float(time_limit)
+    limit: Any = time_limit
+    if isinstance(limit, Real) and not isinstance(limit, bool) and limit > 0:  # type: ignore[operator]
+        # a whole number may be larger than any float
+        return float(limit) if limit <= sys.float_info.max else math.inf
     raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
 
 

@@ -233,6 +233,9 @@ class AssignmentProblem:
             raise InvalidInputError(f"frame: expected a pandas DataFrame, got {type(frame).__name__}")
         if cost not in frame.columns:
             raise InvalidInputError(f"frame: has no column {cost!r}, only {', '.join(map(str, frame.columns))}")
+        twice = frame.columns[frame.columns.duplicated()]
+        if len(twice):
+            raise InvalidInputError(f"frame: expected columns of different names, got {twice[0]!r} twice")
         columns = []
         for name in frame.columns.drop(cost):
             try:
@@ -240,7 +243,8 @@ class AssignmentProblem:
             except (TypeError, ValueError):
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
             numbers = np.where(np.isnan(numbers), 0.0, numbers)
-            if (numbers != np.round(numbers)).any():
+            # nothing beyond all indices may be cast
+            if (np.abs(numbers) > np.iinfo(np.int32).max).any() or (numbers != np.round(numbers)).any():
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers")
             columns.append(numbers.astype(np.int64))
         if not columns:

@@ -18,8 +18,10 @@ from assoc._cli.program import Parser, command, prepare_process, run_program, wr
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import number
+from assoc._files.output import STDOUT, is_stream
 from assoc._system.extras import check_extra
 from assoc._text.plain import printable
+from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from assoc.registration import Registration
@@ -49,6 +51,8 @@ def _register(words: list[str]) -> None:
     parsed = vars(_parser().parse_args(words))
     file, output, page = parsed["file"], parsed["output"], parsed["report"]
     if page == "":
+        if output == STDOUT or is_stream(output):
+            raise InvalidInputError(f"--report: expected a name, for there is none in --output {output}")
         page = f"{output.removesuffix('.npz')}.html"
     check_outputs([output, page, parsed["json"]], [file])
     check_ending(output, "--output", ".npz")

@@ -30,7 +30,7 @@ from assoc._cli.signals import EarlyEnd
 from assoc._cli.speech import add_speech_options, spoken
 from assoc._cli.table import print_table
 from assoc._cli.values import check_kind, cores, density, scan_range
-from assoc._files.output import write_json, write_text
+from assoc._files.output import STDOUT, is_stream, write_json, write_text
 from assoc._parameters import Option, options
 from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
@@ -77,11 +77,14 @@ def _solve(words: list[str]) -> None:
     registry.make_parameters(solver, parameters)
     if "kbest" in settings and (explicit or parameters):
         raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
-    files = parsed["files"]
-    check_outputs([parsed["json"], parsed["csv"], parsed["report"], parsed["proof"]], [*files, parsed["config"]])
+    files, proof = parsed["files"], parsed["proof"]
+    if proof is not None and (proof == STDOUT or is_stream(proof)):
+        raise InvalidInputError(f"--proof: {proof}: expected the name of a file, for its problem is written beside it")
+    proved = [] if proof is None else [proof, _problem_beside(proof)]
+    check_outputs([parsed["json"], parsed["csv"], parsed["report"], *proved], [*files, parsed["config"]])
     for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
         check_ending(parsed[option], flag_of(option), *endings, strict=False)
-    check_ending(parsed["proof"], "--proof", ".json")
+    check_ending(proof, "--proof", ".json")
     if parsed["report"]:
         check_extra("plotly", "report")
 
@@ -205,7 +208,7 @@ def _read_config(path: str) -> dict[str, Any]:
         if key not in _SETTINGS:
             raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
         if key == "target_density":
-            density(str(value), f"{path}: {key}")
+            config[key] = density(str(value), f"{path}: {key}")
             continue
         kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
         check_kind(value, kind, f"{path}: {key}")
@@ -233,9 +236,7 @@ def _plan(
 ) -> tuple[Plan, list[tuple[int, int]]]:
     from assoc.association.plan import Plan
 
-    gating: dict[str, Any] = {
-        key: settings[key] for key in _GATING if key in settings
-    }
+    gating: dict[str, Any] = {key: settings[key] for key in _GATING if key in settings}
     plan = Plan(
         tuple(sources),
         solver,
@@ -290,8 +291,13 @@ def _write_proof(path: str | None, plan: Plan, found: Association, items: Sequen
     from assoc.proofs import write_proof
 
     problem = plan.problem(items[0])
-    problem.save(f"{path.removesuffix('.json')}.txt")
+    problem.save(_problem_beside(path))
     write_proof(path, problem, found.scans[0].solution)
+
+
+def _problem_beside(proof: str) -> str:
+    """Name of the file with the problem of a proof."""
+    return f"{proof.removesuffix('.json')}.txt"
 
 
 class _ScanTable:

@@ -22,7 +22,7 @@ from assoc._cli.speech import spoken
 from assoc._cli.track.options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
 from assoc._cli.track.options import completions as completions
 from assoc._cli.values import number, seconds
-from assoc._files.output import STDOUT
+from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -119,6 +119,9 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
 
 def _is_npz(file: str) -> bool:
     """Whether a file is meant as a scene: by its first bytes, or by its name where it cannot be read."""
+    if is_stream(file):
+        # what is read of a pipe is gone, and a scene cannot come by one
+        return False
     try:
         with open(file, "rb") as stream:
             start = stream.read(4)
@@ -158,7 +161,7 @@ def _of_scene(
         raise InvalidInputError("--identity: is for plots; the measurements of a scene have no codes")
     if parsed["rates"] is not None:
         raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
-    for flag in ("rotation", *RADAR):
+    for flag in ("rotation", "radar", *RADAR):
         if parsed[flag] is not None:
             raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
     if parsed["registration"] is not None:

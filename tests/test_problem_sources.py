@@ -49,6 +49,12 @@ def test_a_table_is_its_tuples():
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1.5], "cost": [1.0]})), "column 'a': expected whole"),
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": ["x"], "cost": [1.0]})), "column 'a': expected whole"),
         (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1], "cost": ["x"]})), "column 'cost'"),
+        (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [np.inf], "cost": [1.0]})), "'a': expected whole"),
+        (lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": [1e300], "cost": [1.0]})), "'a': expected whole"),
+        (
+            lambda: AssignmentProblem.from_frame(pd.DataFrame([[1, 1, -1.0]], columns=["a", "a", "cost"])),
+            "frame: expected columns of different names, got 'a' twice",
+        ),
         (lambda: AssignmentProblem.from_frame([1, 2]), "frame: expected a pandas DataFrame, got list"),
         (lambda: AssignmentProblem.from_sparse(np.zeros((2, 2))), r"array: expected a sparse array \(scipy.sparse\)"),
         (lambda: AssignmentProblem.from_sparse(coo_array(([np.nan], ([1], [1])), shape=(2, 2))), "costs: row 0 is nan"),

@@ -115,13 +115,15 @@ def prepare_process(name: str) -> None:
 
 
 def prepare_streams() -> None:
-    """Open stdout and stderr where they are closed, and let them print any name of a file."""
+    """Open the standard streams where they are closed, and let stdout and stderr print any name of a file."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
         except OSError:
             # takes the lowest number that is free: no file of ours must get it, and be printed into
             os.open(os.devnull, os.O_RDWR)
+    if sys.stdin is None:
+        sys.stdin = open(0, closefd=False)
     if sys.stdout is None:
         sys.stdout = open(1, "w", closefd=False)
     if sys.stderr is None:

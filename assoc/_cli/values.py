@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from typing import Any
 
 from assoc.errors import InvalidInputError
@@ -103,6 +104,8 @@ def place_on_earth(text: str, label: str) -> tuple[float, float, float]:
 def check_kind(value: Any, kind: type, label: str) -> None:
     """Refuse a value of a file that is not text (str), a number (float) or a whole number (int)."""
     taken: Any = (int, float) if kind is float else kind
+    if kind is float and isinstance(value, int) and abs(value) > sys.float_info.max:
+        raise InvalidInputError(f"{label}: expected a number within +-1.8e308, got a larger one")
     if not isinstance(value, taken) or isinstance(value, bool):
         expected = {str: "text", float: "a number"}.get(kind, "a whole number")
         raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")

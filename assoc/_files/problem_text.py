@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FIRST_LINE = "assoc-problem 1"
 ENDINGS = (".txt", ".txt.xz")
 _LARGEST = 500_000_000
+_MOST_INDEX = 2**31
 
 
 def write_problem_text(
@@ -66,8 +67,10 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
         raise InvalidInputError(f"{path}: is damaged, or not packed by xz") from None
     except UnicodeDecodeError:
         raise InvalidInputError(f"{path}: is no text, expected a problem in text form or an npz file") from None
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except InvalidInputError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: no name of a file
+        raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not lines or lines[0].split() != FIRST_LINE.split():
         raise InvalidInputError(f"{path}: the first line must be {FIRST_LINE!r}")
@@ -91,7 +94,9 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
             raise InvalidInputError(f"{path}: tuples: {str(error).splitlines()[0]:.100}") from None
     if table.shape[1] != 1 + sizes.size:
         raise InvalidInputError(f"{path}: tuples: expected a cost and {sizes.size} indices in each line")
-    tuples = table[:, 1:].astype(np.int64)
-    if (tuples != table[:, 1:]).any():
+    indices = table[:, 1:]
+    # nothing that is no number, or beyond all indices, may be cast
+    if not ((np.abs(indices) <= _MOST_INDEX) & (indices == np.round(indices))).all():
         raise InvalidInputError(f"{path}: tuples: indices must be whole numbers")
+    tuples = indices.astype(np.int64)
     return {"tuples": tuples, "costs": table[:, 0], "sizes": sizes, "dummy": head["dummies"][1] == "yes"}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._parameters import positive
+from assoc._parameters import is_whole, positive
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -82,6 +82,8 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or size < 2:
             raise InvalidInputError(f"size must be a whole number of at least 2, got {size!r}")
         self.size = int(size)
+        if not (isinstance(rng, np.random.Generator) or is_whole(rng, 0)):
+            raise InvalidInputError(f"rng must be a Generator or a seed, a whole number >= 0, got {rng!r}")
         self.rng = np.random.default_rng(rng)
         self._factors: tuple[Any, Array] = (None, _NOTHING3)
 

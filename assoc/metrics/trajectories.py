@@ -109,7 +109,7 @@ def _numbers(value: object, name: str) -> Array:
 
 
 def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, Array, Array]]:
-    """Each instant that either of two knows: its time and the rows of both, earliest first.
+    """Each instant that either of two knows, earliest first: its time and the rows of both, by their ids.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, A
     if len(truth) and len(tracks) and truth.dim != tracks.dim:
         raise InvalidInputError(f"positions: the truth has {truth.dim} dimensions, the tracks have {tracks.dim}")
     ticks = np.round(np.concatenate([truth.times, tracks.times]) / SAME_TIME)
-    order = np.argsort(ticks, kind="stable")
+    # stamps of one instant may differ by rounding: the order of the rows is then not that of the ids
+    order = np.lexsort((np.concatenate([truth.ids, tracks.ids]), np.arange(len(ticks)) >= len(truth), ticks))
     for group in np.split(order, np.flatnonzero(np.diff(ticks[order])) + 1):
         if group.size:
             own = group < len(truth)

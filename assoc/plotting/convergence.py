@@ -37,8 +37,10 @@ def plot_convergence(
     """
     if over not in _UNITS:
         raise InvalidInputError(f"over: expected iteration or time, got {over!r}")
-    ax = axes_or_new(ax)
     named = {solutions.solver: solutions} if isinstance(solutions, Solution) else dict(solutions)
+    if not named:
+        raise InvalidInputError("solutions: expected at least one, got none")
+    ax = axes_or_new(ax)
     for number, (name, solution) in enumerate(named.items()):
         # the final bound belongs to the end of the run
         last = (solution.iterations, solution.runtime, solution.cost, solution.lower_bound)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from assoc._parameters import is_whole
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.association.association import Association
@@ -105,6 +106,8 @@ def plot_gates(
     """
     from scipy.special import gammainc
 
+    if not is_whole(bins, 1):
+        raise InvalidInputError(f"bins: expected a whole number >= 1, got {bins!r}")
     ax = axes_or_new(ax)
     scans = association.scans if isinstance(association, Association) else association
     parts = [(np.zeros(0), np.zeros(0)), *(_squares(scene, one) for one in scans)]

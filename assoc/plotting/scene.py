@@ -9,6 +9,7 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._types import Array
+from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, colour, marker
 from assoc.plotting.ellipses import ellipses, place_covariances
@@ -46,6 +47,8 @@ def plot_scene(
     -------
     Axes
     """
+    if gates and not 0.0 < gate_probability < 1.0:
+        raise InvalidInputError(f"gate_probability: expected a number between 0 and 1, got {gate_probability!r}")
     ax = axes_or_new(ax)
     chosen = [scene.scan(scan)] if scan is not None else [scene.scan(k) for k in range(scene.num_scans)]
     middle = float(scene.region[2].mean())

@@ -44,12 +44,14 @@ def plot_solution(
     Raises
     ------
     InvalidInputError
-        The association has no positions, or no such target.
+        The association has no positions, or no such target; or the probability is none.
     """
     if association.positions is None or association.covariances is None:
         raise InvalidInputError("association: has no positions, expected one made from a scene")
     if target is not None and not 0 <= target < len(association.targets):
         raise InvalidInputError(f"target: expected 0 to {len(association.targets) - 1}, got {target!r}")
+    if not 0.0 < probability < 1.0:
+        raise InvalidInputError(f"probability: expected a number between 0 and 1, got {probability!r}")
     ax = axes_or_new(ax)
     scan = scene.scan(association.scan)
     found = association.positions

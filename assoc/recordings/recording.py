@@ -101,8 +101,9 @@ class Recording(Shown):
             array = array.astype(np.bool_ if name == "garbled" else np.int64)
             array.setflags(write=False)
             put(self, name, array)
-        if (self.identities < 0).any():
-            raise InvalidInputError(f"identities must be 0 or more, got {self.identities.min()}")
+        for name in ("identities", "addresses"):
+            if (getattr(self, name) < 0).any():
+                raise InvalidInputError(f"{name} must be 0 or more, got {getattr(self, name).min()}")
         put(self, "notes", dict(self.notes))
 
     def __len__(self) -> int:

@@ -91,9 +91,10 @@ def _sectors(recording: Recording, turn: float, edges: Array) -> Array:
     """Azimuths from which to which an antenna looked between the edges, (K, 2)."""
     times = recording.times
     phase = running_phase(times, times / turn - recording.bearings / FULL_TURN, turn)
-    # bearings go clockwise from north, azimuths from +x towards +y
-    ahead = edges / turn - np.interp(edges, times, phase)
-    azimuth = math.pi / 2 - FULL_TURN * np.mod(ahead, 1.0)
-    swept = np.clip(np.minimum(edges[1:], times[-1]) - np.maximum(edges[:-1], times[0]), 0.0, None)
-    low = wrap_angle(azimuth[1:])
+    # a recording may end within a scan
+    ends = np.minimum(edges[1:], times[-1])
+    # bearings go clockwise from north, azimuths from +x towards +y: the lowest is that of the end
+    ahead = ends / turn - np.interp(ends, times, phase)
+    low = wrap_angle(math.pi / 2 - FULL_TURN * np.mod(ahead, 1.0))
+    swept = np.clip(ends - np.maximum(edges[:-1], times[0]), 0.0, None)
     return np.stack([low, low + np.minimum(FULL_TURN * swept / turn, FULL_TURN)], axis=1)

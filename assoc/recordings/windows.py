@@ -105,8 +105,9 @@ def clustering_time_window(
     turn = estimate_rotation(recording) if rotation is None else rotation
     if isinstance(turn, bool) or not isinstance(turn, (int, float)) or not 0 < turn < math.inf:
         raise InvalidInputError(f"rotation: expected seconds > 0, got {rotation!r}")
-    if not (recording.times[-1] - recording.times[0]) / turn < _MOST_TURNS:
-        raise InvalidInputError(f"rotation: {turn:g} s is too short for a recording of {recording.times[-1]:g} s")
+    span = float(recording.times[-1] - recording.times[0])
+    if not span / turn < _MOST_TURNS:
+        raise InvalidInputError(f"rotation: {turn:g} s is too short for a recording of {span:g} s")
     numbers = _by_time(recording.times, turn) if by == "time" else _by_antenna(recording, turn)
     return windows_of(recording, numbers)
 

@@ -11,7 +11,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.registration.terms import AXES, Term
 from assoc.scene.scene import Scene
-from assoc.sensors import PositionSensor, Sensor
+from assoc.sensors import BearingSensor, PositionSensor, Sensor
 from assoc.sensors.base import wrap_angle
 
 
@@ -35,6 +35,7 @@ def corrected_measurements(
     biases: Mapping[str, float],
     velocities: Array | None = None,
     late: Array | float = 0.0,
+    places: Array | None = None,
 ) -> Array:
     """Measurements without the sensor's biases, and at the time at which they are wanted.
 
@@ -48,6 +49,8 @@ def corrected_measurements(
         Of the targets, m/s; NaN where they are not known: the clock's bias is then left in.
     late : array (n,) or float
         By how much a measurement's own time is before the time wanted, seconds.
+    places : array (n, 3), optional
+        Where the targets are at the time wanted, metres: a bearing does not tell, and stays of its own time without.
 
     Returns
     -------
@@ -60,14 +63,20 @@ def corrected_measurements(
         if sensor.angular[i]:
             z[:, i] = wrap_angle(z[:, i])
     shift = np.broadcast_to(np.asarray(late, dtype=np.float64) + biases.get("time", 0.0), (len(z),))
-    if velocities is None or not len(z) or not shift.any():
+    blind = isinstance(sensor, BearingSensor)
+    if velocities is None or not len(z) or not shift.any() or (blind and places is None):
         return z
     known = ~np.isnan(velocities[:, 0]) & (shift != 0.0)
     if known.any():
         located = corrected_sensor(sensor, biases).position_part
         d = located.dim
-        here = pointed_at(located, z[known, :d])
-        there = here + shift[known, None] * velocities[known]
+        path = shift[known, None] * velocities[known]
+        if blind and places is not None:
+            there = places[known]
+            here = there - path
+        else:
+            here = pointed_at(located, z[known, :d])
+            there = here + path
         moved = z[known]
         moved[:, :d] += located.residual(located.measure(there), located.measure(here))
         z[known] = moved

@@ -191,8 +191,9 @@ def tuple_arrays(scene: Scene, looks: Sequence[Looks], chosen: Chosen, clocks: A
                 late = np.where(
                     np.isnan(look.velocities[s][numbers, 0]), look.time - look.times[s][numbers] + clocks[s], 0.0
                 )
-                seen[part.start + mine, s] = (late == 0.0) | ~np.isnan(velocity[part.start + mine, 0])
-                measured = corrected_measurements(scene.sensors[s], measured, {}, velocity[part.start + mine], late)
+                speed, where = velocity[part.start + mine], at[part.start + mine]
+                seen[part.start + mine, s] = (late == 0.0) | ~np.isnan(speed[:, 0])
+                measured = corrected_measurements(scene.sensors[s], measured, {}, speed, late, where)
             z[part.start + mine, s, : measured.shape[1]] = measured
     return Tuples(z, seen, at, velocity)
 

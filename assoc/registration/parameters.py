@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from assoc._parameters import Parameters
@@ -49,7 +50,8 @@ class RegistrationParameters(Parameters):
     def __post_init__(self) -> None:
         for name in ("components", "reference"):
             value = getattr(self, name)
-            if isinstance(value, str) or not all(isinstance(one, str) for one in value):
+            many = isinstance(value, Iterable) and not isinstance(value, str)
+            if not many or not all(isinstance(one, str) for one in value):
                 raise InvalidInputError(f"{name}: expected names, got {value!r}")
             object.__setattr__(self, name, tuple(value))
         for one in self.components:

@@ -71,7 +71,7 @@ class Registration(Shown):
     skipped : int
         Scans passed over because they had too many candidate tuples.
     noise : float
-        Residuals after, as a multiple of what the sensors' noise makes expect.
+        Residuals after, as a multiple of what the sensors' noise makes expect; NaN without tuples.
     residuals : tuple over sensors of Residuals
     """
 
@@ -165,7 +165,7 @@ class Registration(Shown):
             "significant": self.significant,
             "tuples": self.tuples,
             "scans_passed_over": self.skipped,
-            "noise": self.noise,
+            "noise": self.noise if math.isfinite(self.noise) else None,
         }
 
     def to_json(self, path: str | os.PathLike[str]) -> None:

@@ -146,11 +146,8 @@ class Store:
                 write_text(self.folder / MANIFEST, json.dumps(manifest.to_dict(), indent=1) + "\n")
             self.settings: set[str] = set()
             self.done: set[RunKey] = set()
-            self.damaged = 0
-            for entry in read_log(self.folder):
-                if entry is None:
-                    self.damaged += 1
-                elif "setting_key" in entry:
+            for entry in filter(None, read_log(self.folder)):
+                if "setting_key" in entry:
                     self.settings.add(entry["setting_key"])
                 else:
                     self.done.update(run_keys(entry))

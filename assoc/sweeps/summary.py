@@ -10,6 +10,7 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._types import Floats
+from assoc.errors import InvalidInputError
 from assoc.sweeps.bootstrap import mean_interval, weighted_mean
 from assoc.sweeps.frame import RESULTS, load
 
@@ -67,6 +68,8 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
 
 def varied(frame: pd.DataFrame) -> list[str]:
     """Columns of the parameters of which a study has several values within one solver."""
+    if "repeat" not in frame.columns:
+        raise InvalidInputError("study: expected the runs of assoc.sweeps.load, got a table without 'repeat'")
     last = list(frame.columns).index("repeat")
     names = [str(name) for name in frame.columns[1:last] if name not in RESULTS]
     groups = [part for _, part in frame.groupby("solver")]

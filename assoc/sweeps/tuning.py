@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._parameters import is_whole
 from assoc._system.door import door
 from assoc._types import Floats
 from assoc.errors import InvalidInputError
@@ -121,9 +122,12 @@ def tune(
     InvalidInputError
         Nothing to tune, optuna is missing, or what `Study` refuses.
     """
-    optuna = _optuna()
     if target not in TARGETS:
         raise InvalidInputError(f"target: expected gap or time, got {target!r}")
+    for name, count in (("trials", trials), ("repeats", repeats)):
+        if not is_whole(count, 1):
+            raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
+    optuna = _optuna()
     ranges = dict(space) if space else default_space(solver)
     if not any(isinstance(one, Range) or len(one.values) > 1 for one in ranges.values()):
         raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")

@@ -63,6 +63,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     table = TrackTable(scene.origin)
     for track_id, found in rows.items():
         table.add(_track(tracker, scene, track_id, found), tracker.filter.motion.position)
+    table.name_targets(scene)
     return table
 
 

@@ -99,6 +99,11 @@ class TrackTable(Shown):
                 )  # fmt: skip
             )
 
+    def name_targets(self, scene: Scene) -> None:
+        """Find the target that each track followed most, where the truth of its scene has names."""
+        if scene.truth is not None and scene.truth.names:
+            self.targets = followed_targets(*self.arrays(), scene)
+
     def __len__(self) -> int:
         return len(self._rows)
 
@@ -180,6 +185,5 @@ def track_scene(
         table.add(
             (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position
         )
-    if scene.truth is not None and scene.truth.names:
-        table.targets = followed_targets(*table.arrays(), scene)
+    table.name_targets(scene)
     return table, [*decisions, *tracker.flush()]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from assoc._parameters import whole_seed
+from assoc._parameters import checked_time_limit, is_whole, whole_seed
 from assoc._system.door import doors
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
@@ -115,18 +115,24 @@ class Tracker(Checkpoint):
             raise InvalidInputError(f"filter must be a filter of assoc.filters, got {type(filter).__name__}")
         for sensor in self.sensors:
             self.filter.observe(sensor)
-        self.life_cycle = life_cycle or LifeCycle()
-        self.initiation = initiation or Initiation()
+        self.life_cycle = LifeCycle() if life_cycle is None else life_cycle
+        if not isinstance(self.life_cycle, LifeCycle):
+            raise InvalidInputError(f"life_cycle must be a LifeCycle, got {type(life_cycle).__name__}")
+        self.initiation = Initiation() if initiation is None else initiation
+        if not isinstance(self.initiation, Initiation):
+            raise InvalidInputError(f"initiation must be an Initiation, got {type(initiation).__name__}")
         self.solver = solver
         self.solver_parameters = dict(solver_parameters or {})
         make_parameters(solver, self.solver_parameters)
         self.seed = whole_seed(seed)
-        self.time_limit = time_limit
+        self.time_limit = checked_time_limit(time_limit)
         good = isinstance(gate_probability, (int, float, np.floating)) and not isinstance(gate_probability, bool)
         if not good or not 0 < gate_probability < 1:
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {gate_probability!r}")
         self.gate_probability = float(gate_probability)
-        self.max_tuples = max_tuples
+        if not is_whole(max_tuples, 1):
+            raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
+        self.max_tuples = int(max_tuples)
         if registration == "online":
             registration = OnlineRegistration(self.sensors, self._place.region)
         if not (registration is None or isinstance(registration, OnlineRegistration)):

@@ -202,6 +202,9 @@ def test_refusals():
         InteractingMultipleModel([ekf, ekf], [[0.9, 0.2], [0.1, 0.9]])
     with pytest.raises(InvalidInputError, match="size must be"):
         EnsembleKalmanFilter(MOTION, 1)
+    for wrong in (-1, 0.5, "one", None):
+        with pytest.raises(InvalidInputError, match="rng must be a Generator or a seed"):
+            EnsembleKalmanFilter(MOTION, 20, wrong)
     with pytest.raises(InvalidInputError, match="window must be"):
         FuzzyAdaptiveEKF(MOTION, paper_rules(), window=0)
     # a covariance that a user's own computing has ruined

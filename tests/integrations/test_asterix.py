@@ -172,6 +172,8 @@ def test_hostile_files(file, tmp_path):
             assert "\n" not in str(error)
     with pytest.raises(InvalidInputError, match="cannot be read"):
         read_asterix(tmp_path / "none.ast")
+    with pytest.raises(InvalidInputError, match=r"origin: latitude must be within .* \(degrees\?\)"):
+        read_asterix(file, origin=(52.0, 13.0, 40.0))
 
 
 def packet(payload, port=8600):
@@ -202,6 +204,13 @@ def test_bad_arguments(plots, tmp_path):
     far = Recording([0.0], [1e6], [0.0])
     with pytest.raises(InvalidInputError, match="256 nmi"):
         write_plots(tmp_path / "x.ast", far)
+    # 7700 as digits of a CSV file: 12 bits would make 3604 of it
+    digits = Recording([0.0], [1e4], [0.0], identities=[7700])
+    with pytest.raises(InvalidInputError, match="identities of category 048 have 12 bits, got 7700"):
+        write_plots(tmp_path / "x.ast", digits)
+    wide = Recording([0.0], [1e4], [0.0], addresses=[2**24])
+    with pytest.raises(InvalidInputError, match="addresses of category 048 have 24 bits, got 16777216"):
+        write_plots(tmp_path / "x.ast", wide)
     assert not (tmp_path / "x.ast").exists()
 
 

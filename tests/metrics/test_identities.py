@@ -229,6 +229,10 @@ def test_rmse():
     overall, by_target = track_rmse(truth, tracks, 100.0)
     assert overall == pytest.approx(30.0)
     assert by_target == pytest.approx({0: 30.0, 1: 30.0})
+    # one instant, whose stamps rounding has told apart
+    truth = Trajectories([0.1 + 0.2, 0.3], [1, 2], [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]])
+    tracks = Trajectories([0.3, 0.3], [5, 6], [[0.0, 3.0, 0.0], [50.0, 4.0, 0.0]])
+    assert track_rmse(truth, tracks, 10.0)[1] == pytest.approx({1: 3.0, 2: 4.0})
 
 
 def test_the_truth_of_a_scene():

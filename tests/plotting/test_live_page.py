@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import io
+import threading
 import time
 
 import numpy as np
@@ -84,6 +85,20 @@ def test_the_picture_moves(browser, scene, film, pictures, size, dark):
     finally:
         page.close()
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_a_browser_that_reads_no_more_does_not_hold_up_the_end(scene, film):
+    page = LivePage(scene)
+    reader = page.join_reader()
+    for one in film * 3:
+        page.show(one)
+    assert reader.full()
+    end = threading.Thread(target=page.close, daemon=True)
+    end.start()
+    end.join(20.0)
+    assert not end.is_alive()
+    last = [reader.get_nowait() for _ in range(reader.qsize())][-2:]
+    assert last[0].startswith("event: end") and last[1] is None
 
 
 def test_only_this_machine_is_served(scene):

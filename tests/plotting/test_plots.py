@@ -136,6 +136,13 @@ def test_solution(scene, association, ax):
     assert np.diff(near.get_xlim())[0] < 1500 and near.get_xlabel() == "x (m)"
     with pytest.raises(assoc.InvalidInputError, match="target: expected 0 to"):
         plotting.plot_solution(scene, one, target=99, ax=ax)
+    for wrong in (0.0, 1.0, -0.5, np.nan):
+        with pytest.raises(assoc.InvalidInputError, match="probability: expected a number between 0 and 1"):
+            plotting.plot_solution(scene, one, probability=wrong, ax=ax)
+        with pytest.raises(assoc.InvalidInputError, match="gate_probability: expected a number between 0 and 1"):
+            plotting.plot_scene(scene, 0, gates=True, gate_probability=wrong, ax=ax)
+    with pytest.raises(assoc.InvalidInputError, match="bins: expected a whole number >= 1, got 0"):
+        plotting.plot_gates(scene, association, bins=0, ax=ax)
 
 
 def test_costs(scene, association, ax):
@@ -168,6 +175,8 @@ def test_convergence(ax):
         known = bound[~np.isnan(bound[:, 1]), 1]
         assert (np.diff(known) >= 0).all() and known[-1] <= solution.cost + 1e-9
     assert_units(plotting.plot_convergence(found["lagrangian"], over="time", ax=new_figure().subplots()))
+    with pytest.raises(assoc.InvalidInputError, match="solutions: expected at least one, got none"):
+        plotting.plot_convergence({}, ax=ax)
 
 
 def test_pheromone_gathers_on_what_is_chosen(ax):
@@ -210,6 +219,8 @@ def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):
     _, _, middle, low, high = cells(frame.assign(half=frame["rho"] > 0.5), "iterations", "alpha", "half")
     halves = frame.groupby([frame["rho"] > 0.5, "alpha"])["iterations"].mean().to_numpy().reshape(2, 2)
     assert middle == pytest.approx(halves) and (low <= middle).all() and (middle <= high).all()
+    with pytest.raises(assoc.InvalidInputError, match="study: expected the runs of assoc.sweeps.load"):
+        plotting.plot_heat_map(frame[["alpha", "rho"]], ax=ax)
     with pytest.raises(assoc.InvalidInputError, match="needs two that vary"):
         plotting.plot_heat_map(frame[frame["rho"] == 0.3], ax=ax)
 

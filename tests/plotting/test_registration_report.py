@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting import plot_residuals
 from assoc.plotting.report import write_registration_report
 from assoc.registration import register
-from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
 from tests.registration.common import biased_scene, radars, scene_of
 
@@ -49,6 +51,12 @@ def test_what_cannot_be_observed_is_named(tmp_path):
     assert data_of(tmp_path / "alone.html")["residuals"][0]["sensors"][0]["before"] == []
 
 
+def test_tables_are_made_to_sort_once():
+    """Where two listen to the same heading, the second undoes what the first has done."""
+    scripts = {one.name: one.read_text() for one in (files("assoc.plotting.report") / "static").iterdir()}
+    assert [name for name, text in scripts.items() if "makeSortable" in text] == ["core.js"]
+
+
 def test_picture(found):
     ax = plot_residuals(found, "azimuth")
     assert ax.get_ylabel() == "residual of azimuth (deg)"
@@ -65,5 +73,8 @@ def test_it_works_in_a_browser(browser, page, pictures, size):
     assert browser.execute_script("return document.documentElement.scrollWidth") == size[0]
     names = browser.execute_script("return document.getElementById('residuals-range').data.map((t) => t.name)")
     assert names == ["before", "after"]
+    press(browser, browser.find_elements("css selector", "#bias-table th button")[3])
+    sorted_by = "return document.querySelectorAll('#bias-table th')[3].getAttribute('aria-sort')"
+    assert browser.execute_script(sorted_by) == "ascending"
     screenshot(browser, pictures / f"registration-{size[0]}.png")
     assert complaints(browser) == []

@@ -59,6 +59,18 @@ def test_metric_lives_and_paths(page, scene):
     assert sum(tag == "script" for tag, _ in parsed(page).tags) == 3
 
 
+def test_every_row_stands_at_an_instant_of_the_slider(tmp_path):
+    """Times of thirds of a second are rounded alike wherever they stand; a score that is not known is not shown."""
+    scene = simulate("three-radar", 2, scans=5, interval=1.0 / 3.0)
+    write_tracking_report(tmp_path / "thirds.html", tracks_of(scene).assign(score=np.nan), scene)
+    data = data_of(tmp_path / "thirds.html")
+    assert len(data["instants"]) == 5
+    for one in [*data["tracks"], *data["truth"]]:
+        assert {*one["t"]} <= {*data["instants"]}
+    assert [one["t"] for one in data["measured"]] == data["instants"]
+    assert "score" not in " ".join(parsed(tmp_path / "thirds.html").text)
+
+
 def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
     frame = tracks_of(scene)[["track_id", "time", "x", "y"]]
     write_tracking_report(tmp_path / "one.html", frame, name="plots.csv")
@@ -69,6 +81,9 @@ def test_tracks_without_truth_and_no_tracks(tmp_path, scene):
     assert "No track was made" in " ".join(parsed(tmp_path / "none.html").text)
     with pytest.raises(InvalidInputError, match="'y' is missing"):
         write_tracking_report(tmp_path / "bad.html", frame.drop(columns="y"))
+    for column, value in (("time", np.nan), ("x", np.inf), ("track_id", "first")):
+        with pytest.raises(InvalidInputError, match=f"'{column}' must hold finite numbers"):
+            write_tracking_report(tmp_path / "bad.html", frame.assign(**{column: value}))
     assert not (tmp_path / "bad.html").exists()
 
 

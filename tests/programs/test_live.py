@@ -101,9 +101,10 @@ def test_the_default_filter_suits_the_turns(tmp_path, monkeypatch, capsys):
         assert track.main(words) == 0
         assert {described(one.filter) for one in made} == {expected}
     made.clear()
-    assert track.main([*words, "--turns", "9,10,12"]) == 0
+    assert " steps; a step takes " in capsys.readouterr().err
+    assert track.main([*words, "--turns", "9,10,12", "-q"]) == 0
     assert {described(one.filter) for one in made} == {described(two_speeds(manoeuvre_noise(9.0)))}
-    capsys.readouterr()
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.slow
@@ -135,6 +136,10 @@ def test_bad_options(scene_file, tmp_path, capsys):
         (["--live", "--udp", "0", "--replay", "1"], "--udp and --replay: expected one of them"),
         (["--live", "--replay", "-1"], "--replay: expected a number >= 0"),
         (["--live", "--window", "ctw"], "--window: is not for --live"),
+        (["--live", "--map", tmp_path / "x.geojson"], "--map: is not for --live"),
+        (["--live", "--origin", "52,13"], "--origin: is not for --live"),
+        (["--live", "--radar", "1/2"], "--radar: is not for --live"),
+        (["--live", "--all"], "--all: is not for --live"),
         (["--page", "0", "-o", tmp_path / "x.csv"], "--page: is only for --live"),
         ([], "the following arguments are required: -o/--output"),
     ]:
@@ -152,6 +157,7 @@ def test_bad_options(scene_file, tmp_path, capsys):
     [
         "radar 1", "a,b,c", "1,2,3,x", "{", "[1]", '{"sensor": 1}', '{"sensor": 1, "time": "x", "values": []}',
         "{" * 9_000, '{"sensor": 1, "time": 1, "values": 3}', '{"sensor": 1, "time": 1, "values": ["a"]}',
+        f'{{"sensor": 1, "time": 1{"0" * 400}, "values": []}}', f'{{"sensor": 1, "time": 1, "values": [1{"0" * 400}]}}',
     ],
 )  # fmt: skip
 def test_lines_that_are_none_are_refused_in_one_line(scene_file, line):

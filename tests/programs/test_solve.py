@@ -100,6 +100,13 @@ def test_parameters_from_options_and_from_a_file(run, scene_file, tmp_path):
     assert (chosen["ants"], chosen["alpha"], chosen["rho"], chosen["beta"]) == (9, 2.0, 0.3, 1.0)
 
 
+def test_a_density_in_a_file_may_be_text(tmp_path):
+    from assoc import solve
+
+    (tmp_path / "c.toml").write_text('target-density = "1e-12"\n')
+    assert solve._read_config(str(tmp_path / "c.toml")) == {"target_density": 1e-12}
+
+
 def test_help_is_silent_and_quick(run):
     done = run("assoc.solve", "--help")
     assert (done.returncode, done.stderr) == (0, "")

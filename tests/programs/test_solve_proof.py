@@ -2,6 +2,9 @@
 
 import pytest
 
+import assoc
+from assoc import solve
+
 
 @pytest.fixture
 def folder(run, tmp_path):
@@ -30,3 +33,21 @@ def test_bad_input(run, folder, words, message):
     assert done.returncode == 2
     assert message in done.stderr and done.stderr.count("\n") == 1
     assert not list(folder.glob("p*"))
+
+
+def test_the_problem_beside_a_proof_overwrites_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1]).save("p.txt")
+    before = (tmp_path / "p.txt").read_text()
+    for words, message in [
+        (["--proof", "p.json"], "p.txt: is given twice, or would overwrite an input file"),
+        (["--proof", "q.json", "--csv", "q.txt"], "q.txt: is given twice"),
+        (["--proof", "-"], "--proof: -: expected the name of a file"),
+        (["--proof", "/dev/null"], "--proof: /dev/null: expected the name of a file"),
+    ]:
+        assert solve.main(["p.txt", *words]) == 2
+        said = capsys.readouterr().err
+        assert message in said and said.count("\n") == 1
+    assert {one.name for one in tmp_path.iterdir()} == {"p.txt"} and (tmp_path / "p.txt").read_text() == before
+    assert solve.main(["p.txt", "--proof", "q.json", "-q"]) == 0
+    assert {one.name for one in tmp_path.iterdir()} == {"p.txt", "q.txt", "q.json"}

@@ -217,6 +217,8 @@ TOML = [
     ("repeats = 0", "expected a whole number >= 1"),
     ("repeats = true", "expected a whole number"),
     ("time_limit = -1", "expected seconds > 0"),
+    (f"time_limit = 1{'0' * 400}", "time_limit: expected a number within +-1.8e308"),
+    (f"[aco]\nalpha = 1{'0' * 400}", "aco.alpha: expected a number within +-1.8e308"),
 ]
 
 

@@ -1,6 +1,7 @@
 """`python -m assoc.track` as a program."""
 
 import inspect
+import os
 import re
 
 import numpy as np
@@ -35,6 +36,19 @@ def plots(path, turns=20):
             rows.append((10.0 * k + 10 * bearing / (2 * np.pi), rng.uniform(1e4, 1e5), np.pi / 2 - bearing, 0))
     times, ranges, azimuths, ids = np.array(sorted(rows)).T
     write_plots(path, Recording(times, ranges, azimuths, ids.astype(int)))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_what_comes_by_a_pipe_is_read_once(tmp_path):
+    pipe = tmp_path / "plots.csv"
+    os.mkfifo(pipe)
+    end = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+    try:
+        os.write(end, b"time,range,bearing\n")
+        assert not track._is_npz(str(pipe))
+        assert os.read(end, 100) == b"time,range,bearing\n"
+    finally:
+        os.close(end)
 
 
 def test_a_scene_as_a_program(run, scene_file, tmp_path):

@@ -210,6 +210,7 @@ def test_garbled_altitudes():
         ({"ranges": [1.0]}, "ranges must have shape"),
         ({"identities": [1.5, 2.0]}, "identities must be whole numbers"),
         ({"identities": [-1, 2]}, "identities must be 0 or more"),
+        ({"addresses": [-1, 2]}, "addresses must be 0 or more"),
         ({"altitudes": [np.inf, 1.0]}, "altitudes must be numbers or NaN"),
         ({"sources": [1]}, "sources must be whole numbers of shape"),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError
-from assoc.recordings import radar_of, scene_of_radars
+from assoc.recordings import Recording, radar_of, scene_of_radars
 from assoc.scene.own_times import looked_at
 from assoc.simulation import simulate_recording
 
@@ -39,6 +39,18 @@ def test_every_plot_is_in_the_scene_at_its_time_and_in_the_sector(recordings):
         assert inside > 0.98 * total
         widths = scene.sectors[5:-5, s, 1] - scene.sectors[5:-5, s, 0]
         np.testing.assert_allclose(widths, 2 * np.pi * 2.0 / turn, rtol=0.01)
+
+
+def test_a_recording_that_ends_within_a_scan_looked_until_its_last_plot():
+    """An antenna that turns in 4 s sees something every tenth of a second; the first radar for 40.5 s."""
+    ends = 40.5, 60.0
+    seen = [np.linspace(0.0, end, round(10 * end) + 1) for end in ends]
+    made = [Recording(t, np.full(len(t), 1e4), np.pi / 2 - 2 * np.pi * t / 4.0) for t in seen]
+    scene = scene_of_radars(made, radars(made), rotations=[4.0, 4.0])
+    # the antenna goes clockwise from north
+    np.testing.assert_allclose(scene.sectors[20, 0], [np.pi / 4, np.pi / 2], atol=1e-6)
+    np.testing.assert_allclose(scene.sectors[20, 1], [-np.pi / 2, np.pi / 2], atol=1e-6)
+    assert scene.sectors[21, 0, 0] == scene.sectors[21, 0, 1]
 
 
 def test_what_is_refused(recordings):

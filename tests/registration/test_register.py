@@ -141,6 +141,8 @@ def test_a_radar_alone():
     result = register(scene_of(radars(1), 1, 5))
     assert result.tuples == 0 and not result.observed.any() and not result.significant
     assert (result.biases == 0).all() and "no bias can be observed" in result.summary()
+    # nothing is known of the residuals
+    assert np.isnan(result.noise) and result.to_dict()["noise"] is None
 
 
 @pytest.mark.slow
@@ -217,6 +219,26 @@ def test_bearings_beside_radars():
     assert np.degrees(result.of(2)["azimuth"]) == pytest.approx(-0.3, abs=0.05)
 
 
+def test_bearings_with_times_of_their_own():
+    """They are moved to a look's time by where their tuples are, and how these fly."""
+    sensor = BearingSensor(position=[0.0, -60e3, 0.0], noise=np.array([2e-3]), name="bearings")
+    _, where, velocity = paths(1, 2)
+    before = sensor.measure(where[0] - 1.5 * velocity)
+    moved = corrected_measurements(sensor, before, {}, velocity, np.full(len(before), 1.5), where[0])
+    np.testing.assert_allclose(moved, sensor.measure(where[0]), rtol=1e-9)
+    assert np.abs(moved - before).max() > 1e-3
+    np.testing.assert_allclose(corrected_measurements(sensor, before, {}, velocity, 1.5), before, rtol=1e-12)
+    # and a whole registration goes through with them
+    plain = scene_of([*radars(2), sensor], 7, 4)
+    times = [
+        [np.full(len(z), time - 0.5 * (s == 2)) for s, z in enumerate(scan)]
+        for time, scan in zip(plain.times.tolist(), plain.measurements, strict=True)
+    ]
+    late = Scene(plain.sensors, plain.times, plain.measurements, REGION, measurement_times=times)
+    result = register(late)
+    assert result.tuples > 20 and np.isfinite(result.biases).all()
+
+
 @pytest.mark.slow
 def test_measurements_with_times_of_their_own():
     """Antennas that turn in 4, 5 and 5.5 s: looks are moved to one time by their targets' motion."""
@@ -251,6 +273,7 @@ def test_bad_input():
     scene = scene_of(radars(2), 1, 2)
     for values, match in (
         ({"components": "range"}, "components"),
+        ({"components": 3}, "components: expected names, got 3"),
         ({"components": ("height",)}, "components: unknown 'height'"),
         ({"components": ("time",), "reference": ("1", "2")}, "no sensor has a bias"),
         ({"reference": ("nobody",)}, "reference: no sensor 'nobody'; there are radar 1, radar 2"),

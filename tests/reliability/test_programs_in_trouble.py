@@ -117,6 +117,10 @@ def test_closed_streams(work):
         assert (done.returncode, done.stderr) == (0, b"")
         assert Path("o.json").read_bytes().startswith(b'{"format"')
         Path("o.json").unlink()
+    # without stdin no plot comes
+    words = ["assoc.track", "scene.npz", "--live", "-o", "t.csv"]
+    done = subprocess.run([*PYTHON, *words], stderr=subprocess.PIPE, timeout=300, preexec_fn=closed(0))
+    assert done.returncode == 0 and b"0 plots in 0 steps" in done.stderr and b"Traceback" not in done.stderr
 
 
 def test_nobody_reads_the_list_of_programs():

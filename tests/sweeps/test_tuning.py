@@ -29,6 +29,13 @@ def test_scores():
     assert scores(cost, bound, time, "time", 2.0).tolist() == [0.1, 20.0, 20.0]
 
 
+@pytest.mark.parametrize(("name", "count"), [("trials", 0), ("trials", 2.0), ("repeats", 0), ("repeats", True)])
+def test_counts_that_are_none(tmp_path, name, count):
+    with pytest.raises(InvalidInputError, match=f"{name}: expected a whole number >= 1, got {count}"):
+        tune(tmp_path / "t", [], "aco", **{name: count})
+    assert not (tmp_path / "t").exists()
+
+
 def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_path):
     # one ant cannot disagree with itself: it stops after the greedy cycle, with a gap
     space = {"mode": Values(("paper",)), "ants": Range(1, 20, whole=True), "iterations": Values((1,))}

@@ -104,8 +104,10 @@ def test_late_plots_are_put_in_their_place(scene):
     assert tracker.counts["late"] > 20 and not told and tracker.counts["plots"] == len(plots)
     # with patience for them none is late
     patient, _ = live(scene, wait=11.0)
-    fed(patient, [plots[k] for k in order])
+    pictures = fed(patient, [plots[k] for k in order])
     assert patient.counts["late"] == 0
+    # nor is any lost for which an interval still waits when the plots end
+    assert sum(len(one.plots) for one in pictures) == len(plots)
 
 
 def test_a_clock_that_jumps_for_all_is_believed(scene):
@@ -116,6 +118,8 @@ def test_a_clock_that_jumps_for_all_is_believed(scene):
         moved = [plot._replace(time=plot.time + jump) for plot in plots[half:]]
         pictures = fed(tracker, plots[:half] + moved)
         assert sum(words in line for line in told) == 1
+        # no plot is lost that still waited
+        assert sum(len(one.plots) for one in pictures) == tracker.counts["plots"]
         assert pictures[-1].time == pytest.approx(scene.times[-1] + jump, abs=1.5)
         assert len(pictures[-1].tracks) >= 3
         # tracks begin anew, with ids that were not used before
@@ -148,10 +152,21 @@ def test_what_is_refused(scene):
         ({"turns": [4.0]}, "turns: expected one for each of 3 sensors"),
         ({"turns": [4.0, 5.0, 0.5]}, "turns: must not be shorter than the interval"),
         ({"interval": 0.0}, "interval"),
+        ({"interval": 1e-9}, "interval: expected at least 0.001 s"),
         ({"horizon": -1.0}, "horizon"),
     ]:
         with pytest.raises(InvalidInputError, match=words):
             live(scene, **options)
+
+
+def test_times_that_are_no_seconds_are_left_out(scene):
+    """Of microseconds since 1970 a tenth is less than a number can tell."""
+    tracker, told = live(scene, interval=0.1)
+    plot = next(replayed(scene, 0.0))
+    for time in (1.7e15, 1.7e15 + 1.0, -math.inf):
+        assert tracker.take("1", time, plot.values) == []
+    assert tracker.counts["unusable"] == 3 and "its time is 1.7e+15, expected seconds" in told[0]
+    assert tracker.finish() == []
 
 
 def partition(tracks):

@@ -1,5 +1,7 @@
 """Smoothed tracks against one large linear system, and against the truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,4 +64,10 @@ def test_smoothing_brings_tracks_nearer_to_the_truth():
     def off(one):
         return mean_gospa(gospa_over_time(truth, Trajectories(*one.arrays()), 500.0)[1])["localisation"]
 
-    assert off(smoothed(tracker, scene, decisions)) < 0.85 * off(table)
+    later = smoothed(tracker, scene, decisions)
+    assert off(later) < 0.85 * off(table) and not later.targets
+    # where the truth has names, smoothed tracks say whom they followed, as others do
+    names = {int(i): f"target {i}" for i in np.unique(np.concatenate(scene.truth.target_ids))}
+    told = smoothed(tracker, replace(scene, truth=replace(scene.truth, names=names)), decisions)
+    assert told.targets and {*told.targets.values()} <= {*names.values()}
+    assert "target" in told.to_frame().columns

@@ -267,6 +267,21 @@ class TestBadInput:
         with pytest.raises(InvalidInputError, match="filter must be a filter"):
             MultiSensorTracker.for_scene(scene(), "ekf")
 
+    @pytest.mark.parametrize(
+        ("wrong", "message"),
+        [
+            ({"life_cycle": {"m": 3}}, "life_cycle must be a LifeCycle, got dict"),
+            ({"initiation": 0.1}, "initiation must be an Initiation, got float"),
+            ({"time_limit": -1.0}, "time_limit: expected seconds > 0, got -1.0"),
+            ({"max_tuples": 0}, "max_tuples must be a whole number above 0, got 0"),
+            ({"max_tuples": 1e6}, "max_tuples must be a whole number above 0, got 1000000.0"),
+        ],
+    )
+    def test_settings_that_are_none(self, wrong, message):
+        """They are refused at once, not in a later scan."""
+        with pytest.raises(InvalidInputError, match=message):
+            MultiSensorTracker.for_scene(scene(), **wrong)
+
     def test_saved_by_another(self, tracker, tmp_path):
         tracker.save(tmp_path / "state.npz")
         other = MultiSensorTracker.for_scene(scene(), gate_probability=0.99)

@@ -20,8 +20,8 @@ from assoc.tracking.filter_choice import pace_of
 
 def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
     """Track plots as they come, until they end or a signal ends the program."""
-    for flag in ("report", "rates", "window", "rotation", "registration", *RADAR):
-        if parsed[flag] is not None:
+    for flag in ("report", "map", "origin", "rates", "window", "rotation", "radar", "registration", "all", *RADAR):
+        if parsed[flag] not in (None, False):
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
     if parsed["smooth"]:
         raise InvalidInputError("--smooth: is for finished tracks, not for --live")
@@ -46,6 +46,10 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
     def tell(line: str) -> None:
         print(f"assoc.track: {printable(line)}", file=sys.stderr, flush=True)
 
+    def say(line: str) -> None:
+        if not parsed["quiet"]:
+            tell(line)
+
     def make() -> Tracker:
         return make_tracker(parsed["tracker"] or "multi-sensor", scene.sensors, parsed, settings, scene.region, pace)
 
@@ -56,10 +60,10 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
         from assoc.plotting.live import LivePage
 
         page = LivePage(scene, ports["page"], scene.name)
-        tell(f"page: {page.address}")
+        say(f"page: {page.address}")
     lines = None if speed is not None else Lines(ports["udp"])
     if lines is not None and lines.port is not None:
-        tell(f"plots: udp 127.0.0.1:{lines.port}")
+        say(f"plots: udp 127.0.0.1:{lines.port}")
     kept = parsed["output"] not in (None, "-")
     stream = open(parsed["output"], "w", encoding="utf-8", newline="\n") if kept else sys.stdout
     writer = TrackWriter(stream, tracker.positions)
@@ -78,7 +82,7 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
             stream.close()
         if lines is not None and lines.lost:
             tell(f"{lines.lost} lines lost: they came quicker than tracks can be made")
-        tell(tracker.summary())
+        say(tracker.summary())
 
     ignored = parsed["identity"] == "ignore"
     with interruption.reported(end):

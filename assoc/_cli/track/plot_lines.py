@@ -123,7 +123,7 @@ def _from_json(text: str, scene: Scene) -> Plot:
             values = [found[name] for name in names]
         identity = _identity(found.get("mode3"), found.get("address"))
         return Plot(sensor, time, [float(one) for one in values], identity)
-    except (ValueError, TypeError, KeyError, RecursionError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError, AttributeError, OverflowError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None
 
@@ -209,7 +209,6 @@ class TrackWriter:
     def __init__(self, stream: IO[str], positions: Sequence[int]) -> None:
         self._stream, self._positions = stream, list(positions)
         self._known: dict[int, Any] = {}
-        self.rows = 0
         stream.write(",".join(COLUMNS) + "\n")
         stream.flush()
 
@@ -234,4 +233,3 @@ class TrackWriter:
         rest = [track.score, track.hits, track.started, track.last_detection, *sigma]
         row = [track.track_id, *(f"{one:.10g}" for one in numbers), event, *(f"{one:.10g}" for one in rest)]
         self._stream.write(",".join(map(str, row)) + "\n")
-        self.rows += 1

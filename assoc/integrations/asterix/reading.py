@@ -17,7 +17,7 @@ from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, 
 from assoc.recordings.altitude import garbled_altitudes
 from assoc.recordings.columns import DAY, FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
-from assoc.scene.geodesy import east_north_up
+from assoc.scene.geodesy import checked_origin, east_north_up
 
 SECOND = 1.0 / 128.0
 """Step of times of day."""
@@ -120,10 +120,11 @@ def read_asterix(
     Raises
     ------
     InvalidInputError
-        The file cannot be read, or holds no plot and no report.
+        The file cannot be read, or holds no plot and no report; or the origin is no place in radians and metres.
     MissingExtraError
         libasterix is not installed.
     """
+    seen_from = None if origin is None else checked_origin(origin)
     content = read_bytes(path)
     notes: dict[str, int] = {}
     plots: dict[Source, SourceRows] = {}
@@ -159,7 +160,6 @@ def read_asterix(
             f"{os.fspath(path)}: holds no ASTERIX plots (048) or reports (021){': ' + said if said else ''}"
         )
     name = os.path.basename(os.fspath(path))
-    seen_from = origin
     if seen_from is None:
         first = next((rows.rows[0] for rows in reports.values() if rows.rows), None)
         seen_from = None if first is None else (first[1], first[2], 0.0)

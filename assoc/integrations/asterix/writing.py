@@ -48,14 +48,14 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     ----------
     path : path-like
     recording : Recording
-        Ranges below 256 nmi.
+        Ranges below 256 nmi, identities of 12 bits, addresses of 24.
     source : (int, int)
         System area code and system identification code of the radar.
 
     Raises
     ------
     InvalidInputError
-        A plot is too far for the category, or the file cannot be written.
+        A plot is too far for the category, an identity or address too large, or the file cannot be written.
     MissingExtraError
         libasterix is not installed.
     """
@@ -64,6 +64,11 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     rho = np.round(recording.ranges / RANGE_STEP).astype(np.int64)
     if len(rho) and rho.max() > 65535:
         raise InvalidInputError(f"recording: a plot at {recording.ranges.max():g} m, expected less than 256 nmi")
+    # one that is too large would be read as another aircraft's
+    for name, bits in (("identities", 12), ("addresses", 24)):
+        most = int(getattr(recording, name).max(initial=0))
+        if most >> bits:
+            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}")
     theta = np.round((math.pi / 2 - recording.azimuths) / ANGLE_STEP).astype(np.int64) % 65536
     levels = np.round(recording.altitudes / LEVEL_STEP)
     contents = []
@@ -74,7 +79,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
             "040": (("RHO", int(rho[k])), ("THETA", int(theta[k]))),
         }
         if recording.identities[k] != UNDECODED:
-            content["070"] = (0, 0, 0, 0, ("MODE3A", int(recording.identities[k]) & 0o7777))
+            content["070"] = (0, 0, 0, 0, ("MODE3A", int(recording.identities[k])))
         if not math.isnan(levels[k]):
             content["090"] = (0, int(recording.garbled[k]), ("FL", int(np.clip(levels[k], -8192, 8191)) & 0x3FFF))
         if recording.addresses[k]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import queue
 import threading
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -97,12 +98,7 @@ class LivePage:
             self._last = event
             readers = list(self._readers)
         for one in readers:
-            try:
-                one.put_nowait(event)
-            except queue.Full:
-                # the newest picture is worth more than the oldest
-                one.get_nowait()
-                one.put_nowait(event)
+            _put(one, event)
 
     def close(self) -> None:
         """Tell the browsers that no more comes, and stop; a second time does nothing."""
@@ -113,7 +109,7 @@ class LivePage:
         with self._lock:
             readers = list(self._readers)
         for one in readers:
-            one.put(None)
+            _put(one, None)
         self._server.shutdown()
         self._server.server_close()
 
@@ -131,6 +127,16 @@ class LivePage:
         """Forget a browser that has gone."""
         with self._lock:
             self._readers.discard(mine)
+
+
+def _put(reader: queue.Queue[str | None], event: str | None) -> None:
+    """Hand a browser an event, without waiting for one that is too slow: the newest is worth more than the oldest."""
+    while True:
+        with suppress(queue.Full):
+            reader.put_nowait(event)
+            return
+        with suppress(queue.Empty):
+            reader.get_nowait()
 
 
 def _event(name: str, content: Any) -> str:

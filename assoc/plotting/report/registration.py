@@ -69,11 +69,12 @@ def write_registration_report(
 
 def _summary(registration: Registration) -> str:
     observed = int(registration.observed.sum())
+    noise = "-" if np.isnan(registration.noise) else f"{registration.noise:.3g}"
     found = cards(
         {
             "Biases": (f"{observed} of {len(registration.terms)}", "observed: known to less than half their spread"),
             "Significant": ("yes" if registration.significant else "no", "else measurements stay as they are"),
-            "Residuals after": (f"{registration.noise:.3g}", "of what the sensors' noise makes expect"),
+            "Residuals after": (noise, "of what the sensors' noise makes expect"),
         }
     )
     items = "".join(f"<li>{escape(one)}</li>" for one in registration.open)

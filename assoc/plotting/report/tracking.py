@@ -18,7 +18,7 @@ from assoc.plotting.places import places
 from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
 from assoc.plotting.report.plots import plot_data
-from assoc.plotting.report.views import plain_numbers
+from assoc.plotting.report.views import number, plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
@@ -90,12 +90,19 @@ def write_tracking_report(
     MissingExtraError
         plotly is not installed; an ImportError that names the command.
     InvalidInputError
-        A column is missing, or the file cannot be written.
+        A column is missing or holds what is no finite number, or the file cannot be written.
     """
     check_report()
     missing = [column for column in _NEEDED if column not in tracks.columns]
     if missing:
         raise InvalidInputError(f"tracks: the column {missing[0]!r} is missing")
+    for column in _NEEDED:
+        try:
+            finite = bool(np.isfinite(tracks[column].to_numpy(dtype=float)).all())
+        except (TypeError, ValueError):
+            finite = False
+        if not finite:
+            raise InvalidInputError(f"tracks: the column {column!r} must hold finite numbers")
     frame = tracks.sort_values(["track_id", "time"], kind="stable")
     if "z" not in frame.columns:
         frame = frame.assign(z=0.0)
@@ -156,17 +163,16 @@ def _data(
         if "target" in part and str(part["target"].iloc[0]):
             path["target"] = str(part["target"].iloc[0])
         paths.append(path)
-    if scene is not None and scene.num_scans <= _INSTANTS:
-        instants = np.unique(scene.times)
-    elif plots is not None and len(plots.ends) <= _INSTANTS:
-        # as many decimals as the tracks' own times, so that both mean the same instant
-        instants = np.unique(np.round(plots.ends, _DECIMALS))
+    ends = scene.times if scene is not None else np.zeros(0) if plots is None else plots.ends
+    if 0 < len(ends) <= _INSTANTS:
+        instants = ends
     elif len(frame):
         instants = np.linspace(frame["time"].min(), frame["time"].max(), min(_INSTANTS, len(frame)))
     else:
-        instants = np.zeros(0) if scene is None else scene.times[:: max(1, scene.num_scans // _INSTANTS)]
+        instants = ends[:: max(1, len(ends) // _INSTANTS)]
     return {
-        "instants": plain_numbers(instants, 6),
+        # as many decimals as the rows' times, so that both mean the same instant
+        "instants": np.unique(np.round(instants, _DECIMALS)).tolist(),
         "tracks": paths,
         "truth": _truth(scene, truth, decimals),
         "measured": _measured(scene, decimals),
@@ -215,7 +221,7 @@ def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
         return []
     middle = float(scene.region[2].mean())
     found = []
-    for time, scan in zip(scene.times, scene.measurements, strict=True):
+    for time, scan in zip(np.round(scene.times, _DECIMALS), scene.measurements, strict=True):
         at = np.concatenate([places(scene.sensors[s], scan[s], middle, 0.0)[:, :2] for s in named])
         found.append({"t": float(time), "at": plain_numbers(at, decimals)})
     return found
@@ -236,7 +242,7 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         life["started"] = float(track["started"].iloc[0]) if "started" in track else began
         life["detected"] = float(track["last_detection"].iloc[-1]) if "last_detection" in track else None
         life["hits"] = int(track["hits"].iloc[-1]) if "hits" in track else None
-        life["score"] = float(track["score"].iloc[-1]) if "score" in track else None
+        life["score"] = number(float(track["score"].iloc[-1])) if "score" in track else None
         life["speed"] = length / (ended - began) if ended > began else None
         life["heading"] = float(track["heading"].iloc[-1]) if "heading" in track else None
         told = track["altitude"].dropna().to_numpy(dtype=float) if "altitude" in track else np.zeros(0)

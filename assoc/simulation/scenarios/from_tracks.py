@@ -172,9 +172,6 @@ def _paths(recording: Reports, reports: Array, speeds: Array, max_gap: float) ->
     return paths
 
 
-
-
-
 def _middle(angles: Array) -> float:
     """Middle of the smallest interval around angles that do not go around the earth (rad)."""
     reference = float(angles[0])

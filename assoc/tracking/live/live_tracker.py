@@ -15,6 +15,7 @@ from assoc._system.door import doors
 from assoc.costs.positions import single_positions
 from assoc.errors import AssocError, InvalidInputError
 from assoc.scene.scene import Scene
+from assoc.sensors.base import LARGEST
 from assoc.tracking.checking import checked
 from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.live.kept_identities import KeptIdentities
@@ -27,6 +28,8 @@ JUMP = 60.0
 """Seconds ahead of all others from which a plot's time is doubted."""
 _AGREE = 10
 """So many doubtful plots in a row, of one time, are believed: the clock has jumped."""
+SHORTEST = 1e-3
+"""Seconds that an interval has at the least."""
 SILENCE = 15.0
 """Seconds, or three turns, without a plot after which a sensor is taken not to look."""
 # the antenna's phase is a mean over about this many turns, with this weight for a plot, and known after so many
@@ -49,7 +52,7 @@ class LiveTracker:
     make : callable () -> Tracker
         A new tracker for them.
     interval : float
-        Seconds of plots that are taken in together.
+        Seconds of plots that are taken in together, at least a millisecond.
     turns : sequence of float, optional
         Seconds for a turn of each sensor's antenna (clockwise), at least `interval`: misses are charged where it
         pointed, by the azimuths and times of its plots. Left out, a sensor looks everywhere in an interval in which it
@@ -75,6 +78,8 @@ class LiveTracker:
     ) -> None:
         self._scene, self._make, self._tell = scene, make, tell
         self.interval, self.horizon = positive(interval, "interval"), positive(horizon, "horizon")
+        if self.interval < SHORTEST:
+            raise InvalidInputError(f"interval: expected at least {SHORTEST:g} s, got {self.interval:g}")
         self.wait = positive(wait, "wait", zero=True)
         count = len(scene.sensors)
         self.turns = None if turns is None else [positive(one, "turns") for one in turns]
@@ -163,8 +168,8 @@ class LiveTracker:
         except (AssocError, TypeError, ValueError) as error:
             self.leave_out("unusable", f"plot of {where} left out: {error}")
             return []
-        if not math.isfinite(time):
-            self.leave_out("unusable", f"plot of {where} left out: its time is {time}")
+        if not abs(time) <= LARGEST:
+            self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds")
             return []
         plot = SoundPlot(s, time, z, known)
         if plot.key in self._recent:
@@ -189,8 +194,9 @@ class LiveTracker:
             self._behind += 1
             if self._behind >= _AGREE:
                 self._tell(f"the clock went back from {self._newest:g} s to {time:g} s: tracks begin anew")
+                pictures = self.finish()
                 self._restart()
-                return self._timed(plot)
+                return [*pictures, *self._timed(plot)]
             return []
         if self._ahead:
             self._drop_ahead()
@@ -206,7 +212,14 @@ class LiveTracker:
         """Take in what still waits; for the end of the plots."""
         if self._ahead:
             self._drop_ahead()
-        return [self._step()] if self._pending else []
+        return self._rest()
+
+    def _rest(self) -> list[Picture]:
+        """Take in the plots that are there; an interval that waits for others may have some of later ones."""
+        pictures = []
+        while self._pending:
+            pictures.append(self._step())
+        return pictures
 
     def _begin(self, time: float) -> None:
         self._end = self.interval * (math.floor(time / self.interval) + 1)
@@ -231,7 +244,7 @@ class LiveTracker:
         plots, self._ahead = self._ahead, []
         first = min(plot.time for plot in plots)
         self._tell(f"the clock jumped from {self._newest:g} s to {first:g} s: tracks begin anew")
-        pictures = [self._step()] if self._pending else []
+        pictures = self._rest()
         self._restart()
         for plot in sorted(plots, key=lambda one: one.time):
             pictures += self._timed(plot)

@@ -1,4 +1,4 @@
-// The report of a registration: a table that sorts, and boxes of residuals before and after.
+// The report of a registration: boxes of residuals before and after.
 const drawResiduals = ({ component, unit, sensors }) => {
   const traces = [['before', 1], ['after', 0]].map(([name, colour]) => ({
     type: 'box', name, x: sensors.flatMap((one) => one[name].map(() => plain(one.name))), y: sensors.flatMap((one) => one[name]),
@@ -9,7 +9,6 @@ const drawResiduals = ({ component, unit, sensors }) => {
   Plotly.react(`residuals-${component}`, traces, layoutOf('', `${component} (${unit})`, { boxmode: 'group', shapes }), CONFIG);
 };
 try {
-  makeSortable(byId('bias-table'));
   data.residuals.forEach(drawResiduals);
   document.documentElement.dataset.ready = 'yes';
 } catch (error) {
