@@ -81,6 +81,8 @@ def assign(
         Unknown solver or parameter, a value out of range, or a start that is no solution of this problem.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
+    LimitExceededError
+        The solver would need more memory than there is.
 
     Warns
     -----

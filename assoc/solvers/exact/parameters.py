@@ -17,8 +17,8 @@ class ExactParameters(Parameters):
         Nodes of branch and bound at the most; what is then open keeps its gap.
     patience : int
         Iterations of tabu search and breeding without improvement on an open component of 150 measurements and more,
-        for every 60 of them, before branching starts; while it is branched on, one more iteration follows every three
-        turns.
+        for every 60 of them, before branching starts. While it is branched on, one more iteration follows every three
+        turns, and less often, down to every 30 turns, where they bring nothing.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
