@@ -21,7 +21,7 @@ from assoc.tracking.filter_choice import pace_of
 def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
     """Track plots as they come, until they end or a signal ends the program."""
     for flag in ("report", "map", "origin", "rates", "window", "rotation", "radar", "registration", "all", *RADAR):
-        if parsed[flag] not in (None, False):
+        if parsed[flag] is not None and parsed[flag] is not False:
             raise InvalidInputError(f"{flag_of(flag)}: is not for --live")
     if parsed["smooth"]:
         raise InvalidInputError("--smooth: is for finished tracks, not for --live")
