@@ -9,7 +9,8 @@ columns with only one of them, *apart* those with both.
 A search that is meant to go to the end makes several *passes*. Each looks for solutions below an *aim*, near the root's
 bound at first, as if it were the incumbent's weight: few columns are left and few nodes, whatever the incumbent. Where
 there is none, that is proved, and the next aim is farther off. What a pass finds is better than anything left, and what
-the passes before the last one cost is little, as trees grow fast with the gap.
+the passes before the last one cost is little, as trees grow fast with the gap. Where they take many nodes all the same,
+the root is split on counts (counts.py), and further passes go through its parts, the least bound first.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, search_njit
 from assoc._system.interpreted import interpreted_only
 from assoc._types import Floats
+from assoc.packing.branching.counts import Leaf, most_counts, split_on_counts, with_counts
 from assoc.packing.branching.node import (
     Work,
     allowed_at,
@@ -48,6 +50,8 @@ from assoc.packing.simplex.program import Allowed
 
 # the first aim and the last one, as shares of the way from the root's bound to the incumbent, and how they grow
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
+# nodes of passes after which the root is split on counts: most searches have ended before
+_HARD = 200
 
 
 class Limits(NamedTuple):
@@ -118,13 +122,18 @@ class BranchAndBound:
         self._root = plain_root(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
+        # the parts of the root: all of them, and those that this pass has still to search, the least bound last
+        self._leaves: list[Leaf] = []
+        self._waiting: list[Leaf] = []
+        self._split = False
         # this pass looks for solutions below the aim; those before have shown that none is below the floor
         self._aim, self._floor = np.inf, floor
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to search: the incumbent is optimal to within the tolerance, or memory is short."""
-        return self._open.count == 0 and (self._aim >= self.weight - self.tolerance or self._open.given_up < np.inf)
+        over = self._open.count == 0 and self._least_waiting >= min(self._aim, self.weight - self.tolerance)
+        return over and (self._aim >= self.weight - self.tolerance or self._open.given_up < np.inf)
 
     @property
     def out_of_memory(self) -> bool:
@@ -134,7 +143,7 @@ class BranchAndBound:
     @property
     def lower_bound(self) -> float:
         """No solution weighs less."""
-        searched = max(self._floor, min(self._aim, self._open.least_bound))
+        searched = max(self._floor, min(self._aim, self._open.least_bound, self._least_waiting))
         if searched < self.weight - self.tolerance:
             return searched
         # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
@@ -158,13 +167,17 @@ class BranchAndBound:
             if not self.done and self.nodes < target and not is_over(self.deadline):
                 if self._open.count:
                     self._open.grow(self._memory_allows)
+                elif self._least_waiting < min(self._aim, self.weight - self.tolerance):
+                    self._next_leaf()
                 else:
                     self._next_pass()
 
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
-        rows, columns = self._packing.num_rows, self._packing.num_columns
-        if not self._memory_allows(work_memory(MOST_ROWS * rows if self._to_the_end else rows, columns)):
+        rows, columns = float(self._packing.num_rows), self._packing.num_columns
+        if self._to_the_end:
+            rows = MOST_ROWS * rows + 2 * most_counts(self._packing)
+        if not self._memory_allows(work_memory(rows, columns)):
             self._open.give_up()
             return False
         root = self._root
@@ -176,15 +189,59 @@ class BranchAndBound:
         self._work = new_work(self._packing.arrays, root.program, root.slack)
         return True
 
+    @property
+    def _least_waiting(self) -> float:
+        """No solution of the parts that this pass has still to search weighs less."""
+        return self._waiting[-1].bound if self._waiting else np.inf
+
     def _next_pass(self) -> None:
-        """Begin anew at the root, with an aim that is farther off."""
+        """Begin anew at the root or its parts, with an aim that is farther off."""
         self._floor = max(self._floor, self._aim)
-        self._open = OpenNodes(self._root)
+        if self.nodes >= _HARD and not self._split and self.weight < np.inf:
+            self._split_root()
+            if self._split and not self._leaves:
+                # no part holds anything better
+                self._aim = np.inf
+                return
+        if self._leaves:
+            self._waiting = self._leaves.copy()
+            self._next_leaf()
+        else:
+            self._open = OpenNodes(self._root)
         self._set_aim()
+
+    def _split_root(self) -> None:
+        """Split the root on counts, where that pays."""
+        rows = MOST_ROWS * self._packing.num_rows + 2 * most_counts(self._packing)
+        # the room of the search so far and that of another one
+        if not self._memory_allows(2.0 * work_memory(rows, self._packing.num_columns)):
+            return
+        self._split = True
+        leaves = split_on_counts(self._packing, self._root, self.weight - self.tolerance, self.deadline)
+        self._leaves = sorted(leaves, key=lambda leaf: -leaf.bound)
+
+    def _next_leaf(self) -> None:
+        """Begin with the part of the least bound that this pass has not searched yet."""
+        leaf = self._waiting.pop()
+        given_up = self._open.given_up
+        self._open = OpenNodes(leaf.root)
+        self._open.arrays.bound[0] = leaf.bound
+        self._open.given_up = given_up
+        program, work = leaf.root.program, self._work
+        if work is None or work.program.sides.size != program.sides.size:
+            new = new_work(with_counts(self._packing.arrays, program), program, leaf.root.slack)
+            if work is not None:
+                # what is known of pairs stays true
+                new = new._replace(trials=new.trials._replace(gain=work.trials.gain, tried=work.trials.tried))
+            work = new
+        # programs of parts differ in their right-hand sides alone
+        self._work = work._replace(program=program)
 
     def _set_aim(self) -> None:
         """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""
         root = float(self._root.program.sides @ self._root.duals)
+        if self._leaves:
+            root = max(root, min(leaf.bound for leaf in self._leaves))
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
         # without an incumbent there is nothing to go by

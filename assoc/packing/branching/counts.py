@@ -1,0 +1,246 @@
+"""The root of a branch and bound split on counts: how many columns have q rows, how many rows are left uncovered.
+
+Where the linear program's bound is far from the optimum it mixes solutions of different kinds: 38.8 targets seen by all
+sensors, say. No pair of measurements says much about that number, but *at most 38* and *at least 39* raise the bound at
+once, each in a program of its own. What is split so are the *leaves*, each of which is then searched as a root. A tree
+grows about like the sixth power of the gap between bound and incumbent, so that it can be told which split pays.
+
+The linear program gets two rows and one column for a count c, which is to be within l .. h:
+
+    c + z = h,     z + s = h - l,     z >= 0, s >= 0.
+
+All coefficients are whole and none is negative, as everywhere in the program; only the right-hand sides differ from leaf
+to leaf. The column z has no row of measurements and weighs nothing: greedy solutions and pairs pass it over.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.clock import is_over
+from assoc._types import Floats
+from assoc.packing.branching.root import Root, basis_of
+from assoc.packing.packing import Packing, PackingArrays
+from assoc.packing.simplex.basis import primal_values
+from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
+from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, weight_limit
+
+# leaves at the most; the power of the gap by which trees grow; the share of its tree at which a leaf is split
+_LEAVES = 16
+_POWER = 6.0
+_PAYS = 0.9
+# an LP value this near to a whole number is one
+_WHOLE = 1e-6
+
+
+class Leaf(NamedTuple):
+    """One part of the solutions.
+
+    Attributes
+    ----------
+    root : Root
+        Its linear program, and where its search begins.
+    bound : float
+        No solution of this part weighs less.
+    """
+
+    root: Root
+    bound: float
+
+
+class _Counts(NamedTuple):
+    """Counts and the range of each.
+
+    Attributes
+    ----------
+    times : int8 array, shape (C, N)
+        What each column adds to each count.
+    least, most : int64 arrays, shape (C,)
+        The range, both ends included.
+    """
+
+    times: NDArray[np.int8]
+    least: NDArray[np.int64]
+    most: NDArray[np.int64]
+
+    def within(self, k: int, least: int, most: int) -> _Counts:
+        """These with another range of count k."""
+        least_of, most_of = self.least.copy(), self.most.copy()
+        least_of[k], most_of[k] = least, most
+        return self._replace(least=least_of, most=most_of)
+
+    def sides(self) -> Floats:
+        """Right-hand sides of their rows."""
+        return np.concatenate([self.most, self.most - self.least]).astype(np.float64)
+
+
+class _Part(NamedTuple):
+    """A leaf, the ranges that it is, and the LP's values of the counts (none where it is not solved)."""
+
+    leaf: Leaf
+    counts: _Counts
+    values: Floats | None
+
+
+def split_on_counts(packing: Packing, root: Root, cutoff: float, deadline: float) -> list[Leaf]:
+    """Parts of the solutions that hold every one below the cutoff, each with a program of its own.
+
+    Parameters
+    ----------
+    packing : Packing
+        One component.
+    root : Root
+        Of all solutions.
+    cutoff : float
+        Nothing that weighs as much is looked for.
+    deadline : float
+        When time is over (clock.py).
+
+    Returns
+    -------
+    list of Leaf
+        Those whose bound is below the cutoff; programs differ in their right-hand sides alone. A split that does not
+        pay leaves one, of all solutions, with the program as it was.
+    """
+    everything = _counts_of(packing)
+    parts = _split(_Counted(root, everything, cutoff, deadline), everything)
+    ranges = [part.counts for part in parts]
+    used = np.zeros(len(everything.times), dtype=np.bool_)
+    for one in ranges:
+        used |= (one.least > everything.least) | (one.most < everything.most)
+    # the rows of counts that no leaf is about would only make programs larger
+    counted = _Counted(root, _Counts(*(array[used] for array in everything)), cutoff, deadline)
+    solved = [counted.part(_Counts(*(array[used] for array in one))).leaf for one in ranges]
+    # a second solution may stop short of the first one's bound
+    leaves = [new._replace(bound=max(new.bound, part.leaf.bound)) for new, part in zip(solved, parts, strict=True)]
+    return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
+
+
+def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
+    """The packing with the further columns of a program: they have no rows and weigh nothing."""
+    more = program.weights.size - arrays.weights.size
+    return arrays._replace(
+        cols=np.concatenate([arrays.cols, np.full((more, arrays.cols.shape[1]), -1, dtype=np.int32)]),
+        weights=np.concatenate([arrays.weights, np.zeros(more)]),
+    )
+
+
+def most_counts(packing: Packing) -> int:
+    """Counts at the most."""
+    return packing.cols.shape[1] + 1
+
+
+def _counts_of(packing: Packing) -> _Counts:
+    """Columns with q rows, for every q of two and more, columns with two and more, rows that are covered."""
+    sizes = (packing.cols >= 0).sum(axis=1)
+    rows = packing.num_rows
+    present = [int(q) for q in np.unique(sizes) if q >= 2]
+    times = [sizes == q for q in present]
+    most = [rows // q for q in present]
+    if len(present) > 1:
+        times.append(sizes >= 2)
+        most.append(rows // 2)
+    times.append(sizes)
+    most.append(rows)
+    return _Counts(np.array(times, dtype=np.int8), np.zeros(len(most), dtype=np.int64), np.array(most, dtype=np.int64))
+
+
+class _Counted:
+    """The program of a root with rows for counts, solved for any ranges of these."""
+
+    def __init__(self, root: Root, counts: _Counts, cutoff: float, deadline: float) -> None:
+        self._sets = root.sets
+        self._times = counts.times
+        self._size = root.slack.size
+        self._program = _with_rows(root.program, counts)
+        self._slack = np.concatenate([root.slack, np.repeat([False, True], len(counts.times))])
+        self._variable = _with_basis(root, len(counts.times))
+        self._duals = np.concatenate([root.duals, np.zeros(2 * len(counts.times))])
+        self.effort = Effort(
+            min(cutoff, float(weight_limit(self._program))), int(most_exchanges(self._program)), deadline
+        )
+
+    def part(self, counts: _Counts, start: _Part | None = None) -> _Part:
+        """Solve the program for these ranges, from the basis of another part."""
+        sides = np.concatenate([self._program.sides[: self._size], counts.sides()])
+        program = self._program._replace(sides=sides)
+        allowed = all_allowed(program, self._slack)
+        variable = self._variable if start is None else start.leaf.root.variable
+        basis = basis_of(program, allowed, variable, self._duals if start is None else start.leaf.root.duals)
+        status, _ = solve_dual(program, allowed, basis, self.effort)
+        duals = basis.duals.copy()
+        make_feasible(program, allowed, duals)
+        bound = float(certified(program, allowed, duals))
+        values = None
+        if status == OPTIMAL:
+            primal = np.empty(program.weights.size)
+            primal_values(program, basis, primal)
+            values = self._times @ primal[: self._times.shape[1]]
+        leaf = Leaf(Root(program, self._slack, basis.variable, basis.duals, self._sets), bound)
+        return _Part(leaf, counts, values)
+
+
+def _split(counted: _Counted, counts: _Counts) -> list[_Part]:
+    """Split the least bound again and again, as long as that pays."""
+    waiting, settled = [counted.part(counts)], []
+    while waiting and len(waiting) + len(settled) < _LEAVES and not is_over(counted.effort.deadline):
+        part = waiting.pop(min(range(len(waiting)), key=lambda i: waiting[i].leaf.bound))
+        sides = _best_split(counted, part)
+        if sides is None:
+            settled.append(part)
+        else:
+            waiting += [side for side in sides if side.leaf.bound < counted.effort.cutoff]
+    return waiting + settled
+
+
+def _best_split(counted: _Counted, part: _Part) -> list[_Part] | None:
+    """Both sides of the count that leaves the smallest trees; None: no split pays."""
+    cutoff, bound = counted.effort.cutoff, part.leaf.bound
+    if part.values is None or bound >= cutoff:
+        return None
+    best, chosen = _PAYS, None
+    for k, value in enumerate(part.values):
+        below = int(np.floor(value))
+        least, most = int(part.counts.least[k]), int(part.counts.most[k])
+        if not (_WHOLE < value - below < 1.0 - _WHOLE and least <= below < most):
+            continue
+        ranges = part.counts.within(k, least, below), part.counts.within(k, below + 1, most)
+        sides = [counted.part(one, part) for one in ranges]
+        trees = sum(max((cutoff - side.leaf.bound) / (cutoff - bound), 0.0) ** _POWER for side in sides)
+        if trees < best:
+            best, chosen = trees, sides
+    return chosen
+
+
+def _with_rows(program: Program, counts: _Counts) -> Program:
+    """The program with two rows and a column for each count."""
+    number, size, num = len(counts.times), program.sides.size, program.weights.size
+    column = [np.repeat(np.arange(num), np.diff(program.start))]
+    row = [program.rows.astype(np.int64)]
+    for k, times in enumerate(counts.times):
+        column += [np.repeat(np.arange(num), times), np.array([num + k, num + k])]
+        row += [np.full(int(times.sum(dtype=np.int64)), size + k), np.array([size + k, size + number + k])]
+    columns = np.concatenate(column)
+    order = np.argsort(columns, kind="stable")
+    start = np.zeros(num + number + 1, dtype=np.int64)
+    np.cumsum(np.bincount(columns, minlength=num + number), out=start[1:])
+    return Program(
+        np.concatenate([program.weights, np.zeros(number)]),
+        start,
+        np.concatenate(row)[order].astype(np.int32),
+        np.concatenate([program.sides, counts.sides()]),
+        program.width,
+    )
+
+
+def _with_basis(root: Root, number: int) -> NDArray[np.int32]:
+    """The root's basis, with z and s of each count in the places of its rows."""
+    num, size = root.program.weights.size, root.slack.size
+    kind, row = np.divmod(root.variable - num, size)
+    renumbered = num + number + kind * (size + 2 * number) + row
+    old = np.where(root.variable < num, root.variable, renumbered)
+    each = np.arange(number)
+    return np.concatenate([old, num + each, num + number + size + number + each]).astype(np.int32)
