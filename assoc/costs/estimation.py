@@ -197,12 +197,14 @@ def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[fl
     """
     # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
     full_ones = tall_ones = located_ones = slant_ones = 0
+    # out of the tuples first: a field read in the loop costs a reference count each time
+    owner, fulls, code = scan.owner, sensors.full, sensors.code
     for n in members:
-        s = scan.owner[n]
-        full_ones += 1 if sensors.full[s] else 0
-        tall_ones += 1 if sensors.full[s] or sensors.code[s] == RADAR2D else 0
-        located_ones += 1 if sensors.code[s] != BEARING else 0
-        slant_ones += 1 if sensors.code[s] == RADAR2D else 0
+        s = owner[n]
+        full_ones += 1 if fulls[s] else 0
+        tall_ones += 1 if fulls[s] or code[s] == RADAR2D else 0
+        located_ones += 1 if code[s] != BEARING else 0
+        slant_ones += 1 if code[s] == RADAR2D else 0
     full, flat = full_ones > 0, tall_ones == 0
     at = ahead = (0.0, 0.0, 0.0)
     if located_ones == 0:

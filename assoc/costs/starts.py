@@ -22,15 +22,19 @@ def mean_start(sensors: SensorArrays, scan: ScanArrays, members: Array, full: bo
     """Where to begin: the mean of the converted measurements, weighted by their information."""
     b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
     last = members[0]
+    # out of the tuples first: a field read in the loop costs a reference count each time
+    owner, code, fulls, information, centre = scan.owner, sensors.code, sensors.full, scan.information, scan.centre
     for n in members:
-        s = scan.owner[n]
-        if sensors.code[s] == BEARING or (full and not sensors.full[s]):
+        s = owner[n]
+        if code[s] == BEARING or (full and not fulls[s]):
             continue
-        i, c = scan.information[n], scan.centre[n]
-        a0, a1, a2, a3, a4, a5 = a0 + i[0], a1 + i[1], a2 + i[2], a3 + i[3], a4 + i[4], a5 + i[5]
-        b0 += i[0] * c[0] + i[1] * c[1] + i[2] * c[2]
-        b1 += i[1] * c[0] + i[3] * c[1] + i[4] * c[2]
-        b2 += i[2] * c[0] + i[4] * c[1] + i[5] * c[2]
+        i0, i1, i2 = information[n, 0], information[n, 1], information[n, 2]
+        i3, i4, i5 = information[n, 3], information[n, 4], information[n, 5]
+        c0, c1, c2 = centre[n, 0], centre[n, 1], centre[n, 2]
+        a0, a1, a2, a3, a4, a5 = a0 + i0, a1 + i1, a2 + i2, a3 + i3, a4 + i4, a5 + i5
+        b0 += i0 * c0 + i1 * c1 + i2 * c2
+        b1 += i1 * c0 + i3 * c1 + i4 * c2
+        b2 += i2 * c0 + i4 * c1 + i5 * c2
         last = n
     ok, x, y, z = solve((a0, a1, a2, a3, a4, a5), b0, b1, b2)
     if not ok:
@@ -111,10 +115,13 @@ def singular_start(
     bearing's ray passes `near`, on the right side of its sensor. Chi-square (infinite if there is none) and place.
     """
     least, at = math.inf, (0.0, 0.0, 0.0)
+    owner, code = scan.owner, sensors.code
     for n in members:
-        s = scan.owner[n]
+        s = owner[n]
+        if code[s] != RADAR3D and code[s] != BEARING:
+            continue
         x, y, z = sensors.place[s, 0], sensors.place[s, 1], sensors.place[s, 2]
-        if sensors.code[s] == RADAR3D:
+        if code[s] == RADAR3D:
             spread = math.sqrt(sensors.covariance[s, 2, 2])
             off = 0.5 * math.pi - abs(scan.z[n, 2])
             if off > _NEAR_ZENITH * spread:
@@ -131,7 +138,7 @@ def singular_start(
                 chi = normal(sensors, scan, members, there[0], there[1], there[2])[0]
                 if chi < least:
                     least, at = chi, there
-        elif sensors.code[s] == BEARING:
+        else:
             cos, sin = math.cos(scan.z[n, 0]), math.sin(scan.z[n, 0])
             along = (near[0] - x) * cos + (near[1] - y) * sin
             across = abs((near[1] - y) * cos - (near[0] - x) * sin)
