@@ -243,7 +243,7 @@ class BranchAndBound:
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
         # without an incumbent there is nothing to go by
-        self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf
+        self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf
 
 
 @njit
