@@ -176,12 +176,17 @@ def test_further_columns_have_no_rows_and_weigh_nothing():
 
 
 def test_fewer_nodes_are_needed_where_the_gap_is_wide(monkeypatch):
-    packing, duals, bound = ghosts(20, 2033)
-    nodes = []
-    for hard in (10**9, search._HARD):
+    packing, duals, bound = ghosts(20, 2018)
+    weight, nodes = np.inf, []
+    usual = search._HARD
+    for hard in (10**9, 10**9, usual):
         monkeypatch.setattr(search, "_HARD", hard)
-        one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True)
+        # the second and the third from the same incumbent, a little above the optimum
+        incumbent = min(0.95 * bound, weight + 1e-3 * abs(weight)) if nodes else 0.95 * bound
+        one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
         while not one.done:
             one.run(1000)
-        nodes.append((one.nodes, one.weight))
-    assert nodes[1][0] < 0.7 * nodes[0][0] and nodes[1][1] == pytest.approx(nodes[0][1], abs=1e-8)
+        assert not nodes or one.weight == pytest.approx(weight, abs=1e-8)
+        weight = one.weight
+        nodes.append(one.nodes)
+    assert nodes[2] < 0.7 * nodes[1]

@@ -214,9 +214,10 @@ class BranchAndBound:
         # the room of the search so far and that of another one
         if not self._memory_allows(2.0 * work_memory(rows, self._packing.num_columns)):
             return
-        self._split = True
         leaves = split_on_counts(self._packing, self._root, self.weight - self.tolerance, self.deadline)
         self._leaves = sorted(leaves, key=lambda leaf: -leaf.bound)
+        # where no split paid, one may with a better incumbent
+        self._split = len(leaves) != 1 or leaves[0].root.program.sides.size > self._root.program.sides.size
 
     def _next_leaf(self) -> None:
         """Begin with the part of the least bound that this pass has not searched yet."""
