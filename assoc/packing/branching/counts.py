@@ -9,8 +9,8 @@ The linear program gets two rows and one column for a count c, which is to be wi
 
     c + z = h,     z + s = h - l,     z >= 0, s >= 0.
 
-All coefficients are whole and none is negative, as everywhere in the program; only the right-hand sides differ from leaf
-to leaf. The column z has no row of measurements and weighs nothing: greedy solutions and pairs pass it over.
+All coefficients are whole and none is negative, as everywhere in the program; only the right-hand sides differ from
+leaf to leaf. The column z has no row of measurements and weighs nothing: greedy solutions and pairs pass it over.
 """
 
 from __future__ import annotations
@@ -72,6 +72,10 @@ class _Counts(NamedTuple):
         least_of[k], most_of[k] = least, most
         return self._replace(least=least_of, most=most_of)
 
+    def only(self, which: NDArray[np.bool_]) -> _Counts:
+        """Some of them."""
+        return _Counts(self.times[which], self.least[which], self.most[which])
+
     def sides(self) -> Floats:
         """Right-hand sides of their rows."""
         return np.concatenate([self.most, self.most - self.least]).astype(np.float64)
@@ -112,8 +116,8 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, deadline: float
     for one in ranges:
         used |= (one.least > everything.least) | (one.most < everything.most)
     # the rows of counts that no leaf is about would only make programs larger
-    counted = _Counted(root, _Counts(*(array[used] for array in everything)), cutoff, deadline)
-    solved = [counted.part(_Counts(*(array[used] for array in one))).leaf for one in ranges]
+    counted = _Counted(root, everything.only(used), cutoff, deadline)
+    solved = [counted.part(one.only(used)).leaf for one in ranges]
     # a second solution may stop short of the first one's bound
     leaves = [new._replace(bound=max(new.bound, part.leaf.bound)) for new, part in zip(solved, parts, strict=True)]
     return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
@@ -185,7 +189,8 @@ class _Counted:
 
 def _split(counted: _Counted, counts: _Counts) -> list[_Part]:
     """Split the least bound again and again, as long as that pays."""
-    waiting, settled = [counted.part(counts)], []
+    waiting = [counted.part(counts)]
+    settled: list[_Part] = []
     while waiting and len(waiting) + len(settled) < _LEAVES and not is_over(counted.effort.deadline):
         part = waiting.pop(min(range(len(waiting)), key=lambda i: waiting[i].leaf.bound))
         sides = _best_split(counted, part)

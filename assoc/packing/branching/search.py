@@ -216,9 +216,10 @@ class BranchAndBound:
         # the room of the search so far and that of another one
         if not self._memory_allows(2.0 * work_memory(rows, self._packing.num_columns)):
             return
-        self._split = True
         leaves = split_on_counts(self._packing, self._root, self.weight - self.tolerance, self.deadline)
         self._leaves = sorted(leaves, key=lambda leaf: -leaf.bound)
+        # where no split paid, one may with a better incumbent
+        self._split = len(leaves) != 1 or leaves[0].root.program.sides.size > self._root.program.sides.size
 
     def _next_leaf(self) -> None:
         """Begin with the part of the least bound that this pass has not searched yet."""
@@ -245,7 +246,7 @@ class BranchAndBound:
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
         # without an incumbent there is nothing to go by
-        self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf
+        self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf
 
 
 @inner_njit

@@ -1,0 +1,192 @@
+"""The root split on counts: its parts hold all solutions, and their bounds hold."""
+
+import numpy as np
+import pytest
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import counts, search
+from assoc.packing.branching.counts import split_on_counts, with_counts
+from assoc.packing.branching.root import plain_root, root_with_cuts
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.packing import assemble
+from assoc.packing.prepare import prepare
+from assoc.packing.simplex.program import weight_limit
+from experiments.common.instances.synthetic import axial_random
+from experiments.common.oracles import small_problems
+from tests.packing.test_branching import covers
+from tests.packing.test_passes import ghosts
+
+
+def random_packing(seed, rigid=0.0):
+    """Three sensors with three rows each, a third of all columns; a share of the rows must be covered."""
+    rng = np.random.default_rng(seed)
+    ids = np.stack(np.meshgrid(*[np.arange(-1, 3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    ids = ids[((ids >= 0).sum(axis=1) >= 1) & (rng.random(len(ids)) < 0.35)]
+    cols = np.where(ids >= 0, ids + 3 * np.arange(3), -1).astype(np.int32)
+    weights = 0.5 - (cols >= 0).sum(axis=1) - 0.3 * rng.random(len(cols))
+    packing = assemble(cols, weights, rng.random(9) >= rigid, np.arange(len(cols), dtype=np.int32))
+    return packing.component(0)
+
+
+def solutions(packing):
+    """All sets of columns that are a solution."""
+    found = []
+
+    def choose(row, taken, columns):
+        while row < packing.num_rows and taken[row]:
+            row += 1
+        if row == packing.num_rows:
+            found.append(columns)
+            return
+        if packing.slack[row]:
+            choose(row + 1, taken, columns)
+        for j in packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]:
+            rows = packing.cols[j][packing.cols[j] >= 0]
+            # the rows before are taken or left uncovered
+            if (rows >= row).all() and not taken[rows].any():
+                now = taken.copy()
+                now[rows] = True
+                choose(row + 1, now, [*columns, int(j)])
+
+    choose(0, np.zeros(packing.num_rows, dtype=bool), [])
+    return found
+
+
+def inside(leaf, size, used):
+    """Which solutions are of this part; ``used``: what columns each has, shape (solutions, N)."""
+    program = leaf.root.program
+    half = (program.sides.size - size) // 2
+    times = np.zeros((used.shape[1], program.sides.size))
+    for j in range(used.shape[1]):
+        np.add.at(times[j], program.rows[program.start[j] : program.start[j + 1]], 1.0)
+    value = used @ times[:, size : size + half]
+    most = program.sides[size : size + half]
+    return ((value <= most) & (value >= most - program.sides[size + half :])).all(axis=1)
+
+
+@pytest.fixture
+def always(monkeypatch):
+    """Every split is made, and at once."""
+    monkeypatch.setattr(counts, "_PAYS", np.inf)
+    monkeypatch.setattr(search, "_HARD", 0)
+
+
+@pytest.mark.parametrize("rigid", [0.0, 0.3])
+def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(always, rigid):
+    split = dropped = 0
+    for seed in range(24):
+        packing = random_packing(seed, rigid)
+        root = plain_root(packing, dual_bound(packing))
+        every = solutions(packing)
+        if not every:
+            continue
+        used = np.zeros((len(every), packing.num_columns), dtype=np.int64)
+        for row, one in zip(used, every, strict=True):
+            row[one] = 1
+        weights = used @ packing.weights
+        for cutoff in (np.inf, weights.min() + 0.8, weights.min()):
+            leaves = split_on_counts(packing, root, cutoff, np.inf)
+            split += len(leaves) > 1
+            times = np.zeros(len(every), dtype=np.int64)
+            for leaf in leaves:
+                part = inside(leaf, packing.num_rows, used)
+                times += part
+                assert (weights[part] >= leaf.bound - 1e-9).all()
+            assert times.max() <= 1 and (weights[times == 0] >= cutoff - 1e-9).all()
+            dropped += int((times == 0).sum())
+    assert split > 8 and dropped > 0
+
+
+@pytest.mark.parametrize("rigid", [0.0, 0.3])
+def test_a_search_of_parts_ends_at_the_optimum(always, rigid):
+    for seed in range(20):
+        packing = random_packing(seed, rigid)
+        every = solutions(packing)
+        best = min((packing.weights[one].sum() for one in every), default=np.inf)
+        for incumbent in (np.inf, -1.0, best - 0.5, best + 0.3):
+            one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True)
+            while not one.done:
+                one.run(1)
+                assert one.lower_bound <= max(best, min(best, incumbent)) + 1e-8
+            assert one.weight == pytest.approx(min(best, incumbent), abs=1e-9)
+            if one.columns is not None:
+                assert covers(packing, one.columns)
+                assert packing.weights[one.columns].sum() == pytest.approx(best, abs=1e-9)
+
+
+def test_bounds_of_parts_hold_and_rise(always):
+    """Looked at after every node, from incumbents near and far, with cuts."""
+    made = 0
+    for seed in (16, 24, 31, 37):
+        packing, duals, bound = ghosts(10, seed)
+        whole = BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))
+        while not whole.done:
+            whole.run(1000)
+        best = whole.weight
+        for incumbent in (0.95 * bound, best + 1e-3 * abs(best)):
+            one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
+            bounds = []
+            while not one.done:
+                one.run(1)
+                bounds.append(one.lower_bound)
+            made += len(one._leaves) > 1
+            assert one.weight == pytest.approx(best, abs=1e-8) and bounds[-1] == pytest.approx(best, abs=1e-6)
+            assert (np.diff(bounds) >= 0.0).all() and bounds[-1] <= best + 1e-9
+    assert made > 2
+
+
+def test_axial_packings_and_problems_without_dummies(always):
+    """All columns of one size leave nothing to split; of several sizes, with rows that must be covered, they do."""
+    for seed in range(4):
+        packing = prepare(axial_random(10, seed)).packing
+        root = root_with_cuts(packing, dual_bound(packing), np.inf, np.inf)
+        leaves = split_on_counts(packing, root, np.inf, np.inf)
+        assert len(leaves) == 1 and leaves[0].root.program.sides.size == root.program.sides.size
+    for problem in small_problems(40, 91):
+        packing = prepare(problem).packing
+        found = []
+        for to_the_end in (False, True):
+            one = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9, to_the_end=to_the_end)
+            while not one.done:
+                one.run(5)
+            found.append(one.weight)
+        assert found[0] == pytest.approx(found[1], abs=1e-9)
+
+
+def test_a_range_without_a_solution_is_left_out():
+    packing = random_packing(3)
+    everything = counts._counts_of(packing)
+    counted = counts._Counted(plain_root(packing, dual_bound(packing)), everything, np.inf, np.inf)
+    # three columns of three rows and one more of two: eleven rows of nine
+    two, three = 0, 1
+    assert (everything.most == [4, 3, 4, 9]).all()
+    none = everything.within(three, 3, 3).within(two, 1, 4)
+    part = counted.part(none)
+    assert part.leaf.bound >= weight_limit(part.leaf.root.program) - 1e-6 and part.values is None
+    assert counted.part(everything.within(three, 0, 2)).leaf.bound >= counted.part(everything).leaf.bound - 1e-9
+
+
+def test_further_columns_have_no_rows_and_weigh_nothing():
+    packing = random_packing(5)
+    everything = counts._counts_of(packing)
+    part = counts._Counted(plain_root(packing, dual_bound(packing)), everything, np.inf, np.inf).part(everything)
+    arrays = with_counts(packing.arrays, part.leaf.root.program)
+    assert (arrays.cols[packing.num_columns :] == -1).all() and len(arrays.cols) == packing.num_columns + 4
+    assert (arrays.weights[packing.num_columns :] == 0.0).all()
+
+
+def test_fewer_nodes_are_needed_where_the_gap_is_wide(monkeypatch):
+    packing, duals, bound = ghosts(20, 2018)
+    weight, nodes = np.inf, []
+    usual = search._HARD
+    for hard in (10**9, 10**9, usual):
+        monkeypatch.setattr(search, "_HARD", hard)
+        # the second and the third from the same incumbent, a little above the optimum
+        incumbent = min(0.95 * bound, weight + 1e-3 * abs(weight)) if nodes else 0.95 * bound
+        one = BranchAndBound(packing, duals, incumbent, 1e-9 * abs(bound), to_the_end=True)
+        while not one.done:
+            one.run(1000)
+        assert not nodes or one.weight == pytest.approx(weight, abs=1e-8)
+        weight = one.weight
+        nodes.append(one.nodes)
+    assert nodes[2] < 0.7 * nodes[1]
