@@ -35,8 +35,10 @@ def call(rows):
 def run(code: str, cache: Path | None, switch: str = "1") -> subprocess.CompletedProcess[str]:
     """Run code in a process of its own, with its own cache of kernels or the usual one."""
     environment = {**os.environ, "ASSOC_INTERPRET": switch, **({"NUMBA_CACHE_DIR": str(cache)} if cache else {})}
+    # the process that compiles may still be at a kernel when this one ends
+    warnings = ("-W", "error", "-W", "ignore::ResourceWarning")
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, env=environment, timeout=300
+        [sys.executable, *warnings, "-c", code], capture_output=True, text=True, env=environment, timeout=300
     )
     assert (done.returncode, done.stderr) == (0, "")
     return done
