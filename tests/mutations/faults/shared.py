@@ -180,7 +180,7 @@ FAULTS = (
     Fault(
         "branch and bound makes no passes",
         _BRANCHING,
-        "self._aim = aim if gap < np.inf and aim < root + _LAST * gap else np.inf",
+        "self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf",
         "self._aim = np.inf",
         _OF_PASSES,
     ),
