@@ -19,14 +19,19 @@ def ghosts(targets, seed):
     return packing, duals, certified_bound(packing, duals)
 
 
+def optimum(packing, duals, tolerance):
+    """Weight of the best solution, by one search without passes."""
+    search = BranchAndBound(packing, duals, np.inf, tolerance)
+    while not search.done:
+        search.run(1000)
+    return search.weight
+
+
 def test_bounds_of_passes_hold_and_rise():
     """From poor incumbents, looked at after every node: never a bound above the optimum, and never one that falls."""
     for seed in (16, 24, 31, 37):
         packing, duals, bound = ghosts(10, seed)
-        whole = BranchAndBound(packing, duals, np.inf, 1e-9 * abs(bound))
-        while not whole.done:
-            whole.run(1000)
-        best = whole.weight
+        best = optimum(packing, duals, 1e-9 * abs(bound))
         for floor in (-np.inf, best - 0.5 * (best - bound)):
             search = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True, floor=floor)
             bounds = []

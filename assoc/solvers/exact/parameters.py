@@ -18,7 +18,8 @@ class ExactParameters(Parameters):
     patience : int
         Iterations of tabu search and breeding without improvement on an open component of 150 measurements and more,
         for every 60 of them, before branching starts. While it is branched on, one more iteration follows every three
-        turns, and less often, down to every 30 turns, where they bring nothing.
+        turns, and less often, down to every 30 turns, where they bring nothing. Smaller components are branched on
+        alone for a hundred turns.
     """
 
     nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})

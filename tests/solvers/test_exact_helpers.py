@@ -1,0 +1,25 @@
+"""When `exact` lets metaheuristics help its branching."""
+
+import pytest
+
+from assoc import assign
+from assoc.costs import build_problem
+from assoc.solvers.exact import proof
+from experiments.common.instances.scenes import ghost
+
+
+@pytest.mark.parametrize("alone", [3, 10**9])
+def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
+    """After so many turns of branching, and not before; the optimum is the same."""
+    joined = []
+    usual = proof._search_better
+
+    def noted(task, run):
+        joined.append(task.age)
+        return usual(task, run)
+
+    monkeypatch.setattr(proof, "_ALONE", alone)
+    monkeypatch.setattr(proof, "_search_better", noted)
+    solution = assign(build_problem(ghost(20, 2018), 0), "exact")
+    assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
+    assert bool(joined) == (alone == 3) and all(age >= alone for age in joined)
