@@ -187,3 +187,15 @@ def test_fewer_nodes_are_needed_where_the_gap_is_wide(monkeypatch):
         weight = one.weight
         nodes.append(one.nodes)
     assert nodes[2] < 0.7 * nodes[1]
+
+
+def test_what_a_pass_has_not_searched_yet_bounds_the_whole(always):
+    """Between two parts, whatever the aim."""
+    packing, duals, bound = ghosts(10, 16)
+    one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True)
+    one._begin()
+    leaves = split_on_counts(packing, one._root, np.inf, np.inf)
+    one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
+    one._open.count, one._aim = 0, np.inf
+    assert len(leaves) > 1 and not one.done
+    assert one.lower_bound == min(leaf.bound for leaf in leaves)
