@@ -69,6 +69,7 @@ def always(monkeypatch):
     """Every split is made, and at once."""
     monkeypatch.setattr(counts, "_PAYS", np.inf)
     monkeypatch.setattr(search, "_HARD", 0)
+    monkeypatch.setattr(search, "_RAISED", -np.inf)
 
 
 @pytest.mark.parametrize("rigid", [0.0, 0.3])
@@ -85,7 +86,7 @@ def test_every_solution_is_of_one_part_and_weighs_no_less_than_its_bound(always,
             row[one] = 1
         weights = used @ packing.weights
         for cutoff in (np.inf, weights.min() + 0.8, weights.min()):
-            leaves = split_on_counts(packing, root, cutoff, np.inf)
+            leaves = split_on_counts(packing, root, cutoff, cutoff, np.inf)
             split += len(leaves) > 1
             times = np.zeros(len(every), dtype=np.int64)
             for leaf in leaves:
@@ -137,7 +138,7 @@ def test_axial_packings_and_problems_without_dummies(always):
     for seed in range(4):
         packing = prepare(axial_random(10, seed)).packing
         root = root_with_cuts(packing, dual_bound(packing), np.inf, np.inf)
-        leaves = split_on_counts(packing, root, np.inf, np.inf)
+        leaves = split_on_counts(packing, root, np.inf, np.inf, np.inf)
         assert len(leaves) == 1 and leaves[0].root.program.sides.size == root.program.sides.size
     for problem in small_problems(40, 91):
         packing = prepare(problem).packing
@@ -194,8 +195,24 @@ def test_what_a_pass_has_not_searched_yet_bounds_the_whole(always):
     packing, duals, bound = ghosts(10, 16)
     one = BranchAndBound(packing, duals, 0.95 * bound, 1e-9 * abs(bound), to_the_end=True)
     one._begin()
-    leaves = split_on_counts(packing, one._root, np.inf, np.inf)
+    leaves = split_on_counts(packing, one._root, np.inf, np.inf, np.inf)
     one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
     one._open.count, one._aim = 0, np.inf
     assert len(leaves) > 1 and not one.done
     assert one.lower_bound == min(leaf.bound for leaf in leaves)
+
+
+def test_a_long_first_pass_is_split_before_it_ends(monkeypatch):
+    """From a poor incumbent the first aim is so far off that its pass alone would take hundreds of nodes."""
+    packing, duals, bound = ghosts(20, 4048)
+    nodes = []
+    for hard in (10**9, search._HARD):
+        monkeypatch.setattr(search, "_HARD", hard)
+        one = BranchAndBound(packing, duals, 0.5 * bound, 1e-9 * abs(bound), to_the_end=True)
+        bounds = []
+        while not one.done:
+            one.run(10)
+            bounds.append(one.lower_bound)
+        assert (np.diff(bounds) >= 0.0).all() and bounds[-1] == pytest.approx(one.weight, abs=1e-6)
+        nodes.append(one.nodes)
+    assert nodes[1] < 0.2 * nodes[0]

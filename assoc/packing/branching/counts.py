@@ -3,7 +3,7 @@
 Where the linear program's bound is far from the optimum it mixes solutions of different kinds: 38.8 targets seen by all
 sensors, say. No pair of measurements says much about that number, but *at most 38* and *at least 39* raise the bound at
 once, each in a program of its own. What is split so are the *leaves*, each of which is then searched as a root. A tree
-grows about like the sixth power of the gap between bound and incumbent, so that it can be told which split pays.
+grows about like the sixth power of the gap between bound and aim, so that it can be told which split pays.
 
 The linear program gets two rows and one column for a count c, which is to be within l .. h:
 
@@ -89,7 +89,7 @@ class _Part(NamedTuple):
     values: Floats | None
 
 
-def split_on_counts(packing: Packing, root: Root, cutoff: float, deadline: float) -> list[Leaf]:
+def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, deadline: float) -> list[Leaf]:
     """Parts of the solutions that hold every one below the cutoff, each with a program of its own.
 
     Parameters
@@ -100,6 +100,8 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, deadline: float
         Of all solutions.
     cutoff : float
         Nothing that weighs as much is looked for.
+    goal : float
+        What is to be shown first is that nothing weighs less; a split pays that makes this easier.
     deadline : float
         When time is over (clock.py).
 
@@ -110,7 +112,8 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, deadline: float
         pay leaves one, of all solutions, with the program as it was.
     """
     everything = _counts_of(packing)
-    parts = _split(_Counted(root, everything, cutoff, deadline), everything)
+    counted = _Counted(root, everything, cutoff, deadline)
+    parts = _split(counted, everything, min(goal, counted.effort.cutoff))
     ranges = [part.counts for part in parts]
     used = np.zeros(len(everything.times), dtype=np.bool_)
     for one in ranges:
@@ -187,13 +190,13 @@ class _Counted:
         return _Part(leaf, counts, values)
 
 
-def _split(counted: _Counted, counts: _Counts) -> list[_Part]:
+def _split(counted: _Counted, counts: _Counts, goal: float) -> list[_Part]:
     """Split the least bound again and again, as long as that pays."""
     waiting = [counted.part(counts)]
     settled: list[_Part] = []
     while waiting and len(waiting) + len(settled) < _LEAVES and not is_over(counted.effort.deadline):
         part = waiting.pop(min(range(len(waiting)), key=lambda i: waiting[i].leaf.bound))
-        sides = _best_split(counted, part)
+        sides = _best_split(counted, part, goal)
         if sides is None:
             settled.append(part)
         else:
@@ -201,10 +204,10 @@ def _split(counted: _Counted, counts: _Counts) -> list[_Part]:
     return waiting + settled
 
 
-def _best_split(counted: _Counted, part: _Part) -> list[_Part] | None:
+def _best_split(counted: _Counted, part: _Part, goal: float) -> list[_Part] | None:
     """Both sides of the count that leaves the smallest trees; None: no split pays."""
-    cutoff, bound = counted.effort.cutoff, part.leaf.bound
-    if part.values is None or bound >= cutoff:
+    bound = part.leaf.bound
+    if part.values is None or bound >= goal:
         return None
     best, chosen = _PAYS, None
     for k, value in enumerate(part.values):
@@ -214,7 +217,7 @@ def _best_split(counted: _Counted, part: _Part) -> list[_Part] | None:
             continue
         ranges = part.counts.within(k, least, below), part.counts.within(k, below + 1, most)
         sides = [counted.part(one, part) for one in ranges]
-        trees = sum(max((cutoff - side.leaf.bound) / (cutoff - bound), 0.0) ** _POWER for side in sides)
+        trees = sum(max((goal - side.leaf.bound) / (goal - bound), 0.0) ** _POWER for side in sides)
         if trees < best:
             best, chosen = trees, sides
     return chosen

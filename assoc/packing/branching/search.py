@@ -9,8 +9,8 @@ columns with only one of them, *apart* those with both.
 A search that is meant to go to the end makes several *passes*. Each looks for solutions below an *aim*, near the root's
 bound at first, as if it were the incumbent's weight: few columns are left and few nodes, whatever the incumbent. Where
 there is none, that is proved, and the next aim is farther off. What a pass finds is better than anything left, and what
-the passes before the last one cost is little, as trees grow fast with the gap. Where they take many nodes all the same,
-the root is split on counts (counts.py), and further passes go through its parts, the least bound first.
+the passes before the last one cost is little, as trees grow fast with the gap. Where they take more than some nodes,
+the root is split on counts (counts.py), if that pays, and passes go through its parts, the least bound first.
 """
 
 from __future__ import annotations
@@ -50,8 +50,12 @@ from assoc.packing.simplex.program import Allowed
 
 # the first aim and the last one, as shares of the way from the root's bound to the incumbent, and how they grow
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
-# nodes of passes after which the root is split on counts: most searches have ended before
-_HARD = 200
+# nodes after which a split of the root on counts is tried, and again whenever they have doubled: most searches have
+# ended before
+_HARD = 40
+# a split is judged by what it saves passes that aim so many times as far; it is made if it raises the bound by this
+# share of the way there
+_FARTHER, _RAISED = 3.0, 0.02
 
 
 class Limits(NamedTuple):
@@ -125,13 +129,15 @@ class BranchAndBound:
         # the parts of the root: all of them, and those that this pass has still to search, the least bound last
         self._leaves: list[Leaf] = []
         self._waiting: list[Leaf] = []
-        self._split = False
+        self._split_at = _HARD
         # this pass looks for solutions below the aim; those before have shown that none is below the floor
         self._aim, self._floor = np.inf, floor
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to search: the incumbent is optimal to within the tolerance, or memory is short."""
+        if self._floor >= self.weight - self.tolerance:
+            return True
         over = self._open.count == 0 and self._least_waiting >= min(self._aim, self.weight - self.tolerance)
         return over and (self._aim >= self.weight - self.tolerance or self._open.given_up < np.inf)
 
@@ -143,9 +149,8 @@ class BranchAndBound:
     @property
     def lower_bound(self) -> float:
         """No solution weighs less."""
-        searched = max(self._floor, min(self._aim, self._open.least_bound, self._least_waiting))
-        if searched < self.weight - self.tolerance:
-            return searched
+        if self._searched < self.weight - self.tolerance:
+            return self._searched
         # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
         whole = self.tolerance < self._packing.granularity
         return self.weight if whole else self.weight - self.tolerance
@@ -156,6 +161,11 @@ class BranchAndBound:
         while not self.done and self.nodes < target and not is_over(self.deadline):
             if self._work is None and not self._begin():
                 return
+            if self._open.count and self._splits():
+                # what this pass has shown stays; the rest of it goes through the parts
+                self._floor = self._searched
+                self._begin_pass()
+                continue
             limits = Limits(self.tolerance, self._aim, target - self.nodes, self.deadline)
             self._open.count, self.weight, count, done = _search(
                 self._work, self._open.arrays, self._open.count, self.weight, limits
@@ -194,15 +204,25 @@ class BranchAndBound:
         """No solution of the parts that this pass has still to search weighs less."""
         return self._waiting[-1].bound if self._waiting else np.inf
 
+    @property
+    def _searched(self) -> float:
+        """No solution weighs less, unless it is the incumbent."""
+        return max(self._floor, min(self._aim, self._open.least_bound, self._least_waiting))
+
+    @property
+    def _root_bound(self) -> float:
+        """The bound from which aims are set: that of the root, or the least of its parts."""
+        root = float(self._root.program.sides @ self._root.duals)
+        return max(root, min((leaf.bound for leaf in self._leaves), default=root))
+
     def _next_pass(self) -> None:
         """Begin anew at the root or its parts, with an aim that is farther off."""
         self._floor = max(self._floor, self._aim)
-        if self.nodes >= _HARD and not self._split and self.weight < np.inf:
-            self._split_root()
-            if self._split and not self._leaves:
-                # no part holds anything better
-                self._aim = np.inf
-                return
+        self._splits()
+        self._begin_pass()
+
+    def _begin_pass(self) -> None:
+        """Begin at the root or its parts."""
         if self._leaves:
             self._waiting = self._leaves.copy()
             self._next_leaf()
@@ -210,16 +230,26 @@ class BranchAndBound:
             self._open = OpenNodes(self._root)
         self._set_aim()
 
-    def _split_root(self) -> None:
-        """Split the root on counts, where that pays."""
+    def _splits(self) -> bool:
+        """Split the root on counts, where a search is long and that pays; whether the parts are new."""
+        known = self._to_the_end and self.weight < np.inf and self._open.given_up == np.inf
+        if not known or self.nodes < self._split_at:
+            return False
+        # where no split pays, one may with a better incumbent or another aim
+        self._split_at = 2 * self.nodes
         rows = MOST_ROWS * self._packing.num_rows + 2 * most_counts(self._packing)
         # the room of the search so far and that of another one
         if not self._memory_allows(2.0 * work_memory(rows, self._packing.num_columns)):
-            return
-        leaves = split_on_counts(self._packing, self._root, self.weight - self.tolerance, self.deadline)
+            return False
+        cutoff, bound = self.weight - self.tolerance, self._root_bound
+        goal = min(bound + _FARTHER * (self._aim - bound), cutoff)
+        leaves = split_on_counts(self._packing, self._root, cutoff, goal, self.deadline)
+        least = min((leaf.bound for leaf in leaves), default=cutoff)
+        if least < bound + _RAISED * (goal - bound):
+            return False
+        self._floor = max(self._floor, least)
         self._leaves = sorted(leaves, key=lambda leaf: -leaf.bound)
-        # where no split paid, one may with a better incumbent
-        self._split = len(leaves) != 1 or leaves[0].root.program.sides.size > self._root.program.sides.size
+        return True
 
     def _next_leaf(self) -> None:
         """Begin with the part of the least bound that this pass has not searched yet."""
@@ -229,20 +259,18 @@ class BranchAndBound:
         self._open.arrays.bound[0] = leaf.bound
         self._open.given_up = given_up
         program, work = leaf.root.program, self._work
-        if work is None or work.program.sides.size != program.sides.size:
+        if work is None or work.program.rows is not program.rows:
             new = new_work(with_counts(self._packing.arrays, program), program, leaf.root.slack)
             if work is not None:
                 # what is known of pairs stays true
                 new = new._replace(trials=new.trials._replace(gain=work.trials.gain, tried=work.trials.tried))
             work = new
-        # programs of parts differ in their right-hand sides alone
+        # the programs of one split differ in their right-hand sides alone
         self._work = work._replace(program=program)
 
     def _set_aim(self) -> None:
         """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""
-        root = float(self._root.program.sides @ self._root.duals)
-        if self._leaves:
-            root = max(root, min(leaf.bound for leaf in self._leaves))
+        root = self._root_bound
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
         # without an incumbent there is nothing to go by

@@ -32,7 +32,7 @@ _TURNS = 3
 _WORTH = 0.02
 # columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 2000
-_SHORT = 50
+_SHORT = 20
 # columns from which a problem may be hard enough for its branching to be compiled beforehand
 _HARD = 500
 
