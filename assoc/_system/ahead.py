@@ -15,6 +15,8 @@ from assoc._system import compile_time, interpreted
 from assoc._system.compiled import is_kept
 
 _under_way: list[subprocess.Popen[bytes]] = []
+# kernels that are known to be compiled: looking for their code takes longer than a small problem
+_kept: set[Any] = set()
 
 
 def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> None:
@@ -28,7 +30,10 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
     anyway : bool
         Also where this thread interprets nothing: all that it needs is to be compiled.
     """
-    if _under_way or not (anyway or interpreted.may_use_processes()) or is_kept(kernel):
+    if _under_way or kernel in _kept or not (anyway or interpreted.may_use_processes()):
+        return
+    if is_kept(kernel):
+        _kept.add(kernel)
         return
     words = [sys.executable, "-m", __name__, prepare.__module__, prepare.__qualname__]
     quiet = subprocess.DEVNULL

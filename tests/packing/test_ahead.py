@@ -8,9 +8,13 @@ import sys
 
 import pytest
 
+from assoc._system import ahead
+
 _SEARCH = """
 import numpy as np
 import pytest
+
+from assoc._system import ahead
 import assoc
 from numba.core import event
 from assoc._system.interpreted import compiled_only
@@ -76,3 +80,14 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     code = "from prepares import prepare_clock\n" + _AHEAD
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_what_is_compiled_is_looked_for_once(monkeypatch):
+    """To look takes longer than to solve most problems."""
+    looked = []
+    monkeypatch.setattr(ahead.interpreted, "may_use_processes", lambda: True)
+    monkeypatch.setattr(ahead, "is_kept", lambda kernel: looked.append(kernel) or True)
+    monkeypatch.setattr(ahead, "_kept", set())
+    for _ in range(3):
+        ahead.compile_ahead("a kernel", print)
+    assert looked == ["a kernel"]
