@@ -68,7 +68,7 @@ def inside(leaf, size, used):
 def always(monkeypatch):
     """Every split is made, and at once."""
     monkeypatch.setattr(counts, "_PAYS", np.inf)
-    monkeypatch.setattr(search, "_HARD", 0)
+    monkeypatch.setattr(search, "_HARD", 1)
     monkeypatch.setattr(search, "_RAISED", -np.inf)
 
 

@@ -4,6 +4,7 @@ import pytest
 
 from assoc import assign
 from assoc.costs import build_problem
+from assoc.packing.branching import search
 from assoc.solvers.exact import proof
 from experiments.common.instances.scenes import ghost
 
@@ -19,6 +20,8 @@ def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
         return usual(task, run)
 
     monkeypatch.setattr(proof, "_ALONE", alone)
+    # not split on counts: then it is over at once
+    monkeypatch.setattr(search, "_HARD", 10**9)
     monkeypatch.setattr(proof, "_search_better", noted)
     solution = assign(build_problem(ghost(20, 2018), 0), "exact")
     assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
