@@ -19,7 +19,7 @@ _under_way: list[subprocess.Popen[bytes]] = []
 _kept: set[Any] = set()
 
 
-def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> None:
+def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> bool:
     """Let another process call ``prepare``, if no compiled code of the kernel that it is for is on disk.
 
     Parameters
@@ -29,12 +29,17 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
         A function at the top level of a module, which calls the kernel.
     anyway : bool
         Also where this thread interprets nothing: all that it needs is to be compiled.
+
+    Returns
+    -------
+    bool
+        Whether another process has begun to.
     """
     if _under_way or kernel in _kept or not (anyway or interpreted.may_use_processes()):
-        return
+        return False
     if is_kept(kernel):
         _kept.add(kernel)
-        return
+        return False
     words = [sys.executable, "-m", __name__, prepare.__module__, prepare.__qualname__]
     quiet = subprocess.DEVNULL
     try:
@@ -42,7 +47,8 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
         _under_way.append(subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True))
     except OSError:
         # no process to be had: this one compiles
-        return
+        return False
+    return True
 
 
 def wait_for_kernels() -> None:

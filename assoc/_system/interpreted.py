@@ -31,6 +31,8 @@ import numpy as np
 SMALL, SMALL_SEARCH = 6000, 4000
 # processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
 PATIENCE = 6.0
+# how far the process that compiles beside stands back
+_NICE = 10
 # seconds between two looks whether the kernel has come into the cache
 _LOOK = 0.5
 
@@ -197,6 +199,9 @@ def _compile_beside(function: Any, kinds: Any) -> None:
 
 def _serve() -> None:
     """Compile what the lines of standard input ask for, as long as the process that asks is there."""
+    if hasattr(os, "nice"):
+        # nobody waits for this process, so that it leaves the cores to those that somebody waits for
+        os.nice(_NICE)
     parent = os.getppid()
     for line in sys.stdin.buffer:
         if os.getppid() != parent:

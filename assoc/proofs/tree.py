@@ -10,18 +10,19 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.compiled import njit
 from assoc._types import Floats
-from assoc.packing.branching.pairs import answer, any_open_pair, decide, doubtful_pairs, new_trials
+from assoc.packing.branching.pairs import Trials, answer, any_open_pair, decide, doubtful_pairs, new_trials
 from assoc.packing.branching.root import basis_of, root_with_cuts
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
-from assoc.packing.simplex.program import Allowed, all_allowed, all_reduced_costs, certified, make_feasible
+from assoc.packing.simplex.program import Allowed, Program, all_allowed, all_reduced_costs, certified, make_feasible
 
 # a share of the target that is rounding
 _ROUNDING = 1e-9
@@ -170,14 +171,9 @@ class _Search:
 
     def _question(self, allowed: Allowed, basis: Basis) -> tuple[int, int] | None:
         """The pair of rows on which to divide; None where there is none."""
-        cols, trials = self._component.cols, self._trials
-        count = doubtful_pairs(cols, basis, trials)
-        if count:
-            effort = Effort(self._aim.enough, 0, self._aim.deadline)
-            which, _ = decide(self._program, cols, allowed, basis, trials, count, effort)
-            one, two = trials.pairs[which]
-        else:
-            one, two = any_open_pair(cols, allowed, np.empty(self._component.num_rows, np.int32))
+        effort = Effort(self._aim.enough, 0, self._aim.deadline)
+        counts = np.empty(self._component.num_rows, np.int32)
+        one, two = _pair(self._program, self._component.cols, allowed, basis, self._trials, counts, effort)
         return None if one < 0 else (int(one), int(two))
 
     def _shorten(self, node: Node, allowed: Allowed) -> None:
@@ -188,3 +184,15 @@ class _Search:
             if bound >= self._aim.enough:
                 node.duals, node.bound = short, bound
                 return
+
+
+@njit
+def _pair(
+    program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any, effort: Effort
+) -> Any:
+    """The pair that branch and bound would choose, or any that is open; -1, -1: there is none."""
+    count = doubtful_pairs(cols, basis, trials)
+    if count > 0:
+        which, _ = decide(program, cols, allowed, basis, trials, count, effort)
+        return int(trials.pairs[which, 0]), int(trials.pairs[which, 1])
+    return any_open_pair(cols, allowed, counts)

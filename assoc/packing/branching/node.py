@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Floats
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
@@ -114,7 +114,7 @@ def allowed_at(work: Work, num: int) -> Allowed:
     return Allowed(work.node.active[:num], work.node.columns, work.node.slack)
 
 
-@njit
+@inner_njit
 def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
     """Make the node at ``top`` the one at work, unless its basis is at hand; how many columns it has."""
     basis = work.basis
@@ -148,7 +148,7 @@ def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
     return num
 
 
-@njit
+@inner_njit
 def branch(work: Work, stack: Stack, top: int, num: int, pair: Any, likely: bool, lower: float) -> int:
     """Put both sides of the node at work on the stack, the likelier one last: searched first; the open nodes."""
     side = work.trials.side

@@ -81,7 +81,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
     )  # fmt: skip
 
 
-@njit
+@inner_njit
 def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
     """Whether column j is no longer allowed where two rows are together (no column may have only one) or apart."""
     uses = 0
@@ -110,7 +110,7 @@ def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) 
     return count
 
 
-@njit
+@inner_njit
 def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
     """Find the pairs of rows whose answer is most in doubt in the LP's solution; how many there are."""
     mass, pairs, values = trials.mass, trials.pairs, trials.values
@@ -170,7 +170,7 @@ def _try(
     return status, bound_of(program, trials.trial.basis)
 
 
-@njit
+@inner_njit
 def decide(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
@@ -214,7 +214,7 @@ def decide(
     return pick, NEITHER
 
 
-@njit
+@inner_njit
 def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
     """Return two rows that one column has together and another one not; -1, -1: there are none.
 
@@ -238,7 +238,7 @@ def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
     return -1, -1
 
 
-@njit
+@inner_njit
 def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any) -> int:
     """Find pairs that the LP's solution, in whole numbers, has together: those in most other columns; how many."""
     pairs, values = trials.pairs, trials.values
@@ -278,7 +278,7 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
     return found
 
 
-@njit
+@inner_njit
 def part_certain(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:

@@ -408,12 +408,17 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
 
 
 def compile_branching_ahead() -> None:
-    """Have the search compiled by another process, where it is not compiled yet."""
-    compile_ahead(_search, compile_branching)
+    """Have the search compiled by another process, where it is not compiled yet, and its trials of pairs by this one.
+
+    The other process takes longer than what this one has to compile before its first search, and comes to the trials
+    when they are in the cache.
+    """
+    if compile_ahead(_search, compile_branching):
+        _compile_trials()
 
 
 def compile_all_branching_ahead() -> None:
-    """The same, with what searches to the end need besides, and also where nothing is to be interpreted."""
+    """Have it compiled with what searches to the end need besides, and also where nothing is to be interpreted."""
     compile_ahead(_search, compile_all_branching, anyway=True)
 
 
@@ -428,8 +433,20 @@ def compile_all_branching() -> None:
     _on_three(to_the_end=True)
 
 
+def _compile_trials() -> None:
+    packing = _three()
+    root = plain_root(packing, np.zeros(packing.num_rows))
+    work = new_work(packing.arrays, root.program, root.slack)
+    arguments = (work.program, work.cols, work.node, work.basis, work.trials, 1, Effort(0.0, 0, np.inf))
+    decide.compile(tuple(map(decide.typeof_pyval, arguments)))
+
+
 def _on_three(to_the_end: bool) -> None:
+    packing = _three()
+    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9, to_the_end=to_the_end).run(10)
+
+
+def _three() -> Packing:
     with interpreted_only():
         rows = np.array([[0, 1, -1], [0, -1, 2], [-1, 1, 2]], np.int32)
-        packing = assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)
-    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9, to_the_end=to_the_end).run(10)
+        return assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)

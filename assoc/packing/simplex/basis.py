@@ -272,7 +272,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
         basis.duals[r] = total
 
 
-@njit
+@inner_njit
 def residual(program: Program, basis: Basis) -> float:
     """How far the values in the basis are from satisfying the rows."""
     num, size = program.weights.size, program.sides.size

@@ -73,7 +73,7 @@ def cost_tolerance(program: Program, allowed: Allowed) -> float:
     return _COST * max(scale, 1e-300)
 
 
-@njit
+@inner_njit
 def bound_of(program: Program, basis: Basis) -> float:
     """The bound of the multipliers, as they are."""
     sides, duals = program.sides, basis.duals

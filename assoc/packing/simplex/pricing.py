@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.program import Allowed, Program
@@ -63,7 +63,7 @@ def new_pricing(program: Program) -> Pricing:
     )  # fmt: skip
 
 
-@njit
+@inner_njit
 def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
     """List the allowed columns."""
     codes, columns, positions = pricing.codes, pricing.column, pricing.position
@@ -91,7 +91,7 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
     pricing.listed[1] = extra
 
 
-@njit
+@inner_njit
 def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
     """Add to ``sums``, by position, the terms of the rows of each column."""
     copy_to(pricing.terms[: terms.size], terms)
@@ -104,7 +104,7 @@ def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
         sums[position[e]] += padded[row[e]]
 
 
-@njit
+@inner_njit
 def price(program: Program, duals: Floats, place: NDArray[np.int32], pricing: Pricing) -> float:
     """Compute the reduced costs of the listed columns; the least of those that are not in the basis."""
     reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import inner_njit, njit
+from assoc._system.compiled import inner_njit
 from assoc._types import Floats
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import SMALL_PIVOT, Basis, basis_without, coordinates, copy_without_inverse, enter
@@ -79,7 +79,7 @@ def new_trial(program: Program, exchanges: int) -> Trial:
     )  # fmt: skip
 
 
-@njit
+@inner_njit
 def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) -> None:
     """Note the basis from which trials are to start, and what it allows."""
     pricing = trial.basis.pricing
@@ -157,7 +157,7 @@ def _exchange(trial: Trial, done: int, p: int) -> None:
     norms[p] = max(own / (pivot * pivot), _LEAST)
 
 
-@njit
+@inner_njit
 def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effort: Effort) -> int:
     """Take some steps from the optimal basis that was noted, after ``allowed`` has become less; how that ended.
 
