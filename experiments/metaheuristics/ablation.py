@@ -31,6 +31,8 @@ from experiments.metaheuristics.running import log, run
 
 NAME = "metaheuristics.ablation"
 TITLE = "What the parts of the metaheuristics contribute"
+WORKERS = ", workers"
+"""How the name of a group of claims ends that is about workers."""
 
 
 def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]) -> dict[tuple[str, str], Floats]:
@@ -67,6 +69,9 @@ def _warm_up(name: str, number: int, chosen: Sequence[parts.Part]) -> None:
 def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -> list[Claim]:
     """The claims of one problem's costs."""
     group = prefix(name, seconds)
+    if any(words == parts.TWO_WORKERS.words for _, words in costs):
+        # measured apart from the parts, and published apart
+        group += WORKERS
     best = np.min(list(costs.values()), axis=0)
     bases = {part.words: part.base for part in (*parts.PARTS, parts.TWO_WORKERS)}
     found = [Claim(f"{group}: problems", "", None, len(best))]

@@ -100,6 +100,12 @@ def test_figures_are_differences_from_the_whole():
     assert part.ours == pytest.approx(0.0, abs=1e-12) and part.interval == pytest.approx((-1.0, 1.0))
 
 
+def test_workers_are_published_apart_from_the_parts():
+    costs = {("aco", parts.WHOLE): np.array([-100.0, -50.0]), ("aco", parts.TWO_WORKERS.words): np.array([-101.0, -50.0])}
+    names = [claim.quantity for claim in ablation.claims_of("ghosts 40", 2.0, costs)]
+    assert len(names) == 3 and all(name.startswith("ghosts 40, 2 s, workers: ") for name in names)
+
+
 def test_published_results_of_other_problems_stay(tmp_path, monkeypatch):
     path = tmp_path / "file.json"
     monkeypatch.setattr(ablation, "result_file", lambda name: path)
