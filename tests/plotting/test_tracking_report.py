@@ -80,6 +80,8 @@ def test_scans_of_one_time_are_one_instant_of_the_metric(tmp_path, scene):
     write_tracking_report(tmp_path / "twice.html", pd.concat([frame, frame]), twice, cutoff=100.0)
     write_tracking_report(tmp_path / "once.html", frame, scene, cutoff=100.0)
     assert data_of(tmp_path / "twice.html")["gospa"] == data_of(tmp_path / "once.html")["gospa"]
+    # each track still follows its target at all of its instants
+    assert "100%" in " ".join(parsed(tmp_path / "twice.html").text)
 
 
 def test_tracks_without_truth_and_no_tracks(tmp_path, scene):

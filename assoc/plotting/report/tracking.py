@@ -254,7 +254,7 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
-            share = times_paired / len(track)
+            share = times_paired / len(np.unique(times))
         lives.append({**life, "target": target, "share": share})
     return lives
 
