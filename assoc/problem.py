@@ -51,7 +51,8 @@ class AssignmentProblem:
     Raises
     ------
     InvalidInputError
-        Wrong shape, an index out of range, the all-dummy tuple, or a cost that is NaN or -inf.
+        Wrong shape, an index out of range, the all-dummy tuple, a cost that is NaN or -inf, or a `dummy` that is
+        neither True nor False.
     LimitExceededError
         More measurements than there should be memory for (ten million of four sensors, say), or more tuples
         than there is memory for.
@@ -70,6 +71,9 @@ class AssignmentProblem:
     dummy: bool
 
     def __init__(self, tuples: ArrayLike, costs: ArrayLike, sizes: ArrayLike, *, dummy: bool = True) -> None:
+        if not isinstance(dummy, (bool, np.bool_)):
+            found = repr(dummy) if isinstance(dummy, (str, int, float)) else type(dummy).__name__
+            raise InvalidInputError(f"dummy: expected True or False, got {found}")
         sizes_ = _integers(sizes, "sizes", 1)
         if sizes_.size == 0:
             raise InvalidInputError("sizes: expected at least one sensor, got none")

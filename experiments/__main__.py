@@ -58,9 +58,9 @@ EXPERIMENTS = (
     ),
     Experiment(
         "pages",
-        "nothing: writes the tables of eight pages from the result files",
-        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/sweeps.md, docs/solvers.md, docs/ant_colony.md, "
-        "docs/concepts.md, docs/tracking.md",
+        "nothing: writes the tables of eleven pages from the result files",
+        "docs/papers.md, docs/filters.md, docs/recordings.md, docs/start.md, docs/dependencies.md, docs/sweeps.md, "
+        "docs/solvers.md, docs/ant_colony.md, docs/concepts.md, docs/tracking.md, docs/registration.md",
     ),
     Experiment(
         "papers.ant_colony",

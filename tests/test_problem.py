@@ -44,6 +44,9 @@ BAD_INPUTS = [
     ([[1, 1]], ["1"], [2, 2], True, "costs: expected real numbers"),
     ([[1, 1]], [1j], [2, 2], True, "costs: expected real numbers, got complex128"),
     ([[1, 1]], [None], [2, 2], True, "costs: expected real numbers, got object"),
+    ([[1, 1]], [1.0], [2, 2], "no", "dummy: expected True or False, got 'no'"),
+    ([[1, 1]], [1.0], [2, 2], 0, "dummy: expected True or False, got 0"),
+    ([[1, 1]], [1.0], [2, 2], [False], "dummy: expected True or False, got list"),
 ]
 
 
@@ -65,6 +68,7 @@ def test_bad_input_is_one_clear_line(tuples, costs, sizes, dummy, message):
         (np.full((2, 2), -INF), False, "costs: row 0 is -inf"),
         ([[1.0], [1.0, 2.0]], True, "tensor: "),
         ([["a"]], True, "tensor: expected real numbers"),
+        (np.zeros((2, 2)), "no", "dummy: expected True or False, got 'no'"),
     ],
 )
 def test_bad_tensors(tensor, dummy, message):

@@ -70,7 +70,7 @@ class Trajectories(Shown):
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Trajectories:
-        """Take the truth of a scene.
+        """Take the truth of a scene; of scans of one time, the last that each target is in.
 
         Raises
         ------
@@ -81,9 +81,9 @@ class Trajectories(Shown):
         if truth is None:
             raise InvalidInputError("the scene has no truth to compare with")
         counts = [len(ids) for ids in truth.target_ids]
-        return cls(
-            np.repeat(scene.times, counts), np.concatenate(truth.target_ids), np.concatenate(truth.positions)
-        )
+        times, ids = np.repeat(scene.times, counts), np.concatenate(truth.target_ids)
+        kept = last_at_each_instant(times, ids)
+        return cls(times[kept], ids[kept], np.concatenate(truth.positions)[kept])
 
     @property
     def dim(self) -> int:
@@ -106,6 +106,28 @@ def _numbers(value: object, name: str) -> Array:
     if not np.isfinite(array).all():
         raise InvalidInputError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
     return array
+
+
+def last_at_each_instant(times: Array, ids: Array) -> Array:
+    """Rows that are the last of their identity at their instant, in the order given.
+
+    Several scans may be of one time, as of sensors that report one after the other: targets and tracks are listed in
+    each of them, and count once.
+
+    Parameters
+    ----------
+    times, ids : arrays (n,)
+
+    Returns
+    -------
+    int array
+        Row numbers, ascending.
+    """
+    ticks = np.round(np.asarray(times, dtype=np.float64) / SAME_TIME)
+    order = np.lexsort((ids, ticks))
+    again = (np.diff(ticks[order]) == 0) & (np.diff(np.asarray(ids)[order]) == 0)
+    # a row is the last of its kind where the next one is of another
+    return np.sort(order[np.append(~again, True)[: len(order)]])
 
 
 def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, Array, Array]]:

@@ -38,8 +38,8 @@ class Scene:
     sensors : sequence of Sensor
         At least one.
     times : array_like (K,)
-        Time stamps in seconds, not decreasing; at least one scan. Dates (datetime, datetime64, pandas) become
-        seconds since 1970-01-01 UTC.
+        Time stamps in seconds, not decreasing; at least one scan. Several scans may be of one time, as of sensors that
+        report one after the other. Dates (datetime, datetime64, pandas) become seconds since 1970-01-01 UTC.
     measurements : sequence over scans of sequences over sensors of arrays (n, d_s)
         What each sensor reported; n may be 0.
     region : array_like (3, 2), optional

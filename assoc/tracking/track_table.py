@@ -12,6 +12,7 @@ import numpy as np
 from assoc._system.door import door, doors
 from assoc._text.shown import Shown
 from assoc._types import Array
+from assoc.metrics.trajectories import last_at_each_instant
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
 from assoc.tracking.maps import coordinates, followed_targets
@@ -149,11 +150,16 @@ class TrackTable(Shown):
         write_atomically(path, lambda file: frame.to_parquet(file, index=False))
 
     def arrays(self, *, confirmed: bool = True) -> tuple[Array, Array, Array]:
-        """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take."""
+        """Times (n,), track ids (n,) and positions (n, 3), of confirmed tracks or of all: what metrics take.
+
+        Where several scans are of one time, the last row of each track.
+        """
         rows = [row for row in self._rows if row[8] or not confirmed]
         times = np.array([row[1] for row in rows], dtype=np.float64)
         ids = np.array([row[0] for row in rows], dtype=np.int64)
-        return times, ids, np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
+        positions = np.array([row[2:5] for row in rows], dtype=np.float64).reshape(-1, 3)
+        kept = last_at_each_instant(times, ids)
+        return times[kept], ids[kept], positions[kept]
 
 
 @door

@@ -21,6 +21,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "filters.md": measured.FILTERS,
     "recordings.md": measured.RECORDINGS,
     "start.md": measured.START,
+    "dependencies.md": measured.DEPENDENCIES,
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
     "ant_colony.md": metaheuristics.ANT_COLONY,

@@ -1,4 +1,4 @@
-"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers, and concepts."""
+"""Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from experiments.common.claims import Claim
 from experiments.common.results import Results, number, result_file, table
 
 SCENARIOS = tuple("CDEFGH")
+# packages of so many MB have a row of their own
+_LARGE = 5.0
+# ortools, and what is installed for it alone
+_FOR_MILP = ("ortools", "absl-py", "immutabledict", "protobuf", "typing_extensions")
 
 
 def _judged(claim: Claim, digits: int = 3) -> str:
@@ -166,6 +170,26 @@ def first_call() -> str:
     return table(["first scan / all, s", "fresh clone", "wheel", "again", "clone, CPU time", "goal, clone"], rows)
 
 
+def sizes() -> str:
+    """What an installation takes on the disk, package by package."""
+    found = Results("cold_start").claims if result_file("cold_start").exists() else []
+    weights = {
+        c.quantity.removeprefix("installed, "): c.ours for c in found if c.quantity.startswith("installed, ")
+    }
+    if not weights:
+        return "`python -m experiments.cold_start --wheel FILE` weighs the packages on your machine."
+    whole = weights.pop("all")
+    small = [size for size in weights.values() if size < _LARGE]
+    spared = [size for name, size in weights.items() if name.split()[0] in _FOR_MILP]
+    rows = [[name, number(size)] for name, size in weights.items() if size >= _LARGE]
+    rows += [
+        [f"{len(small)} others", number(sum(small))],
+        ["all", number(whole)],
+        [f"all but ortools and the {len(spared) - 1} that only it needs", number(whole - sum(spared))],
+    ]
+    return table(["package", "on disk, MB"], rows)
+
+
 def traffic() -> str:
     """CT, MT and IT by grouping, clock and tracker."""
     r = Results("papers.clustering_time_window")
@@ -282,5 +306,6 @@ FILTERS = {
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
 START = {"first-call": first_call}
+DEPENDENCIES = {"sizes": sizes}
 CONCEPTS = {"prior": prior}
 TRACKING = {"warm-starts": warm_starts}

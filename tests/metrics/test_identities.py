@@ -26,6 +26,7 @@ from assoc.metrics import (
     track_rmse,
     tracks_of_one_identity,
 )
+from assoc.metrics.trajectories import last_at_each_instant
 
 
 def along_lines(spans):
@@ -248,6 +249,25 @@ def test_the_truth_of_a_scene():
     assert summarise(truth, truth, 10.0).gospa == 0.0
     with pytest.raises(InvalidInputError, match="no truth"):
         Trajectories.from_scene(assoc.Scene(_sensors(), [0.0], [[np.zeros((0, 3))]]))
+
+
+def test_targets_in_several_scans_of_one_time_count_once():
+    """Sensors may report one after the other at one time; the last scan of an instant says where a target is."""
+    from assoc.scene import Truth
+
+    ids = [np.array([1, 2]), np.array([2, 1]), np.array([1])]
+    truth = Truth(ids, [np.zeros((2, 3)), np.ones((2, 3)), np.zeros((1, 3))])
+    scene = assoc.Scene(_sensors(), [5.0, 5.0 + 1e-9, 6.0], [[np.zeros((0, 3))]] * 3, truth=truth)
+    found = Trajectories.from_scene(scene)
+    assert found.ids.tolist() == [1, 2, 1]
+    assert found.positions.tolist() == [[1.0] * 3, [1.0] * 3, [0.0] * 3]
+
+
+def test_the_last_row_at_each_instant():
+    times, ids = np.array([0.0, 0.0, 1.0, 0.0, 1.0]), np.array([3, 4, 3, 3, 4])
+    assert last_at_each_instant(times, ids).tolist() == [1, 2, 3, 4]
+    assert last_at_each_instant(np.zeros(0), np.zeros(0, dtype=np.int64)).tolist() == []
+    assert last_at_each_instant(np.zeros(1), np.array([7])).tolist() == [0]
 
 
 def _sensors():

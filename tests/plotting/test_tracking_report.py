@@ -12,7 +12,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.plotting.report import write_tracking_report
-from assoc.scene import Scene
+from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
 from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
@@ -69,6 +69,19 @@ def test_every_row_stands_at_an_instant_of_the_slider(tmp_path):
         assert {*one["t"]} <= {*data["instants"]}
     assert [one["t"] for one in data["measured"]] == data["instants"]
     assert "score" not in " ".join(parsed(tmp_path / "thirds.html").text)
+
+
+def test_scans_of_one_time_are_one_instant_of_the_metric(tmp_path, scene):
+    twice = Scene(
+        scene.sensors, np.repeat(scene.times, 2), [one for one in scene.measurements for _ in range(2)], scene.region,
+        Truth(*([one for one in part for _ in range(2)] for part in (scene.truth.target_ids, scene.truth.positions))),
+    )  # fmt: skip
+    frame = tracks_of(scene)
+    write_tracking_report(tmp_path / "twice.html", pd.concat([frame, frame]), twice, cutoff=100.0)
+    write_tracking_report(tmp_path / "once.html", frame, scene, cutoff=100.0)
+    assert data_of(tmp_path / "twice.html")["gospa"] == data_of(tmp_path / "once.html")["gospa"]
+    # each track still follows its target at all of its instants
+    assert "100%" in " ".join(parsed(tmp_path / "twice.html").text)
 
 
 def test_tracks_without_truth_and_no_tracks(tmp_path, scene):

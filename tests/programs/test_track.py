@@ -11,7 +11,8 @@ import pytest
 from assoc import track
 from assoc._cli.track import options as track_options
 from assoc.recordings import Recording, write_plots
-from assoc.scene import Scene
+from assoc.scene import Scene, Truth
+from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, MultiSensorTracker
 from assoc.tracking.filter_choice import make_filter
 
@@ -114,6 +115,35 @@ def test_smoothed_tracks(scene_file, tmp_path):
     # from the first detection on, and later detections have their say
     assert (table.groupby("track_id").time.min() < table.time.max() / 2).all()
     assert table.confirmed.all()
+
+
+@pytest.mark.parametrize("name", list(TRACKERS))
+def test_scans_of_one_time(name, tmp_path, capsys):
+    """Two radars that report one after the other at one time are legal; targets and tracks then count once."""
+    whole = simulate("three-radar", 2, scans=6)
+    truth = whole.truth
+    nothing = [z[:0] for z in whole.measurements[0]]
+    first = [(scan[0], nothing[1], nothing[2]) for scan in whole.measurements]
+    second = [(nothing[0], scan[1], scan[2]) for scan in whole.measurements]
+    scene = Scene(
+        whole.sensors,
+        np.repeat(whole.times, 2),
+        [scan for pair in zip(first, second, strict=True) for scan in pair],
+        whole.region,
+        # names: each track is also told whom it followed
+        Truth(
+            [ids for ids in truth.target_ids for _ in range(2)],
+            [places for places in truth.positions for _ in range(2)],
+            names={0: "a"},
+        ),
+    )
+    scene.save(tmp_path / "twice.npz")
+    out = tmp_path / "tracks.csv"
+    assert track.main([str(tmp_path / "twice.npz"), "--tracker", name, "-o", str(out), "--all"]) == 0
+    captured = capsys.readouterr()
+    assert "root mean square GOSPA" in captured.out and "12 scans" in captured.out and not captured.err
+    table = pd.read_csv(out)
+    assert {*table.time} <= {*whole.times} and table.groupby(["time", "track_id"]).size().max() == 2
 
 
 @pytest.mark.parametrize("name", ["kalman", "ukf", "modified-ekf", "enkf", "imm", "fuzzy", "ekf"])

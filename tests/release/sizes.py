@@ -2,8 +2,8 @@
 
     python -m tests.release.sizes      (needs a network, or an index that pip knows)
 
-downloads the newest packages that fit this Python and this system into a temporary folder, and prints the table of
-docs/dependencies.md.
+downloads the newest packages that fit this Python and this system into a temporary folder, and prints a table. What an
+installation takes, Python's bytecode included, stands in docs/dependencies.md.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from assoc._text.html import escape, warning_list
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics import Gospa, Trajectories, gospa_over_time, mean_gospa
+from assoc.metrics.trajectories import last_at_each_instant
 from assoc.plotting.places import places
 from assoc.plotting.report.page import Page, cards, controls, definitions, made_with, sortable_table
 from assoc.plotting.report.plotly_script import check_report
@@ -139,6 +140,9 @@ def write_tracking_report(
 
 
 def _gospa(frame: pd.DataFrame, scene: Scene, cutoff: float) -> tuple[Array, list[Gospa]]:
+    # by track and time: of scans of one time the last row of a track
+    times, ids = (frame[name].to_numpy(dtype=float) for name in ("time", "track_id"))
+    frame = frame.iloc[last_at_each_instant(times, ids)]
     found = Trajectories(*(frame[name].to_numpy() for name in ("time", "track_id", ["x", "y", "z"])))
     return gospa_over_time(Trajectories.from_scene(scene), found, cutoff)
 
@@ -250,7 +254,7 @@ def _lives(frame: pd.DataFrame, values: Sequence[Gospa]) -> list[dict[str, Any]]
         target, share = None, None
         if number_of in pairs:
             target, times_paired = pairs[number_of].most_common(1)[0]
-            share = times_paired / len(track)
+            share = times_paired / len(np.unique(times))
         lives.append({**life, "target": target, "share": share})
     return lives
 
