@@ -66,6 +66,19 @@ class Results:
         ]
         return min(times, default=math.inf)
 
+    def fastest_proof(self, family: str, size: str) -> tuple[float, str] | None:
+        """Return the median time of the fastest peer that proved every instance, and its name; None: none did."""
+        runs: dict[tuple[str, float], list[Row]] = {}
+        for row in self.of(family, size):
+            if row.solver in PROVING_PEERS:
+                runs.setdefault((row.solver, row.limit), []).append(row)
+        times = [
+            (median(row.seconds for row in rows), peer)
+            for (peer, _), rows in runs.items()
+            if all(row.status == "optimal" for row in rows)
+        ]
+        return min(times, default=None)
+
     def least_of_peers(self, row: Row, peers: Sequence[str]) -> float:
         """Return that time, or where none of them proved it the longest limit that one had: less it was not."""
         limits = [other.limit for other in self._same_instance(row) if other.peer and other.solver in peers]

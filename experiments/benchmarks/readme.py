@@ -28,7 +28,9 @@ TIMED = {
 """Family and size -> how the table of times calls it."""
 GHOSTS = ("20", "40", "60", "100")
 """Sizes of family ghost in the second table."""
-_SHORT, _LONG = 5.0, 60.0
+LONG = 60.0
+"""Seconds that peers have at the most in what is compared with ours."""
+_SHORT = 5.0
 _FAR = 1.0
 
 
@@ -67,16 +69,8 @@ def _timed(results: Results, family: str, size: str, name: str) -> str:
     mine = results.of(family, size, "exact")
     proved = all(row.status == "optimal" for row in mine)
     ours = as_time(median(row.seconds for row in mine)) if proved else "no proof"
-    runs: dict[tuple[str, float], list[Row]] = {}
-    for row in results.of(family, size):
-        if row.solver in PROVING_PEERS:
-            runs.setdefault((row.solver, row.limit), []).append(row)
-    times = [
-        (median(row.seconds for row in theirs), peer)
-        for (peer, _), theirs in runs.items()
-        if all(row.status == "optimal" for row in theirs)
-    ]
-    other = f"{as_time(min(times)[0])} ({PEERS[min(times)[1]]})" if times else "no proof"
+    fastest = results.fastest_proof(family, size)
+    other = "no proof" if fastest is None else f"{as_time(fastest[0])} ({PEERS[fastest[1]]})"
     return f"| {name} | {ours} | {other} | {_excess(results.of(family, size, 'sequential'))} |"
 
 
@@ -89,8 +83,8 @@ def _excess(rows: Sequence[Row]) -> str:
 
 def _ghosts(results: Results) -> list[str]:
     """Bearings only: what is reached in a short time, as the worst excess over the best cost known."""
-    limits = [row.limit for row in results.of("ghost") if row.solver in PROVING_PEERS and row.limit <= _LONG]
-    longest = max(limits, default=_LONG)
+    limits = [row.limit for row in results.of("ghost") if row.solver in PROVING_PEERS and row.limit <= LONG]
+    longest = max(limits, default=LONG)
     kinds = [*(f"`{name}`, {_SHORT:g} s" for name in HEURISTICS), f"best other solver, {longest:g} s"]
     lines = ["| bearings only | " + " | ".join(kinds) + " | optimum |", "|---|" + "---:|" * len(kinds) + "---|"]
     for size in GHOSTS:
@@ -100,7 +94,7 @@ def _ghosts(results: Results) -> list[str]:
         cells = [_worst([row for row in rows if row.solver == name]) for name in HEURISTICS]
         found = {}
         for row in rows:
-            if row.peer and row.limit <= _LONG:
+            if row.peer and row.limit <= LONG:
                 instance = row.seed, row.item
                 if instance not in found or row.cost < found[instance].cost:
                     found[instance] = row

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from assoc._files.output import write_text
-from experiments.pages import coverage, measured, metaheuristics, trackers
+from experiments.pages import benchmarks, coverage, measured, metaheuristics, trackers
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TABLES: dict[str, dict[str, Callable[[], str]]] = {
@@ -24,6 +24,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "dependencies.md": measured.DEPENDENCIES,
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
+    "which_solver.md": benchmarks.WHICH_SOLVER,
     "ant_colony.md": metaheuristics.ANT_COLONY,
     "concepts.md": measured.CONCEPTS,
     "tracking.md": {**measured.TRACKING, **trackers.TRACKING},

@@ -1,0 +1,112 @@
+"""Which solver where, and what was measured there: made from the rows of the benchmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+from experiments.benchmarks.families import HEURISTICS
+from experiments.benchmarks.goals import Results
+from experiments.benchmarks.markdown import as_percent, as_time
+from experiments.benchmarks.readme import LONG
+from experiments.benchmarks.rows import Row, load
+from experiments.common.results import table
+
+ROWS = Path(__file__).resolve().parents[2] / "docs" / "benchmarks.csv"
+"""What the benchmarks wrote."""
+
+
+class _Scene(NamedTuple):
+    """A family and size of the benchmarks, how the page calls it, and the solver to take there."""
+
+    family: str
+    size: str
+    words: str
+    take: str = "`exact`"
+
+
+SCENES = (
+    _Scene("paper", "3 radars", "3 radars, 3 targets (the ant colony paper)"),
+    _Scene("gated", "3x100", "gated, 3 sensors x 100"),
+    _Scene("gated", "3x300", "gated, 3 x 300"),
+    _Scene("gated", "3x1000", "gated, 3 x 1,000"),
+    _Scene("gated", "4x300", "gated, 4 x 300"),
+    _Scene("ghost", "20", "bearings only, 20 targets"),
+    _Scene("ghost", "40", "bearings only, 40 targets"),
+    _Scene("wide gap", "40", "the same where the linear program is 1 % off"),
+    _Scene("ghost", "60", "bearings only, 60 targets", "`exact`; with 5 s only, any of the three"),
+    _Scene("ghost", "100", "bearings only, 100 targets", "`tabu`, or `exact` with a time limit"),
+    _Scene("known optimum", "n=30", "axial, known optimum, n = 30"),
+    _Scene("random axial", "n=26", "axial, random costs, n = 26"),
+)
+
+
+def which_solver() -> str:
+    """What each solver needs on each kind of scene."""
+    results = Results(load(ROWS))
+    heads = ["scenes", "`exact`", "`aco`, `genetic`, `tabu`", "`lagrangian`", "best peer", "so take"]
+    return table(heads, [_row(results, scene) for scene in SCENES], lambda column: False)
+
+
+def _row(results: Results, scene: _Scene) -> list[str]:
+    def of(solver: str) -> list[Row]:
+        return results.of(scene.family, scene.size, solver)
+
+    heuristics = [of(solver) for solver in HEURISTICS]
+    return [
+        scene.words, _exact(of("exact")), _heuristics([rows for rows in heuristics if rows]),
+        _lagrangian(of("lagrangian@0.1%"), of("lagrangian")), _peer(results, scene), scene.take,
+    ]  # fmt: skip
+
+
+def _exact(rows: list[Row]) -> str:
+    proved = [row for row in rows if row.status == "optimal"]
+    limit = rows[0].limit
+    if not proved:
+        return f"not proved in {limit:g} s, gap {as_percent(median(row.gap for row in rows))} %"
+    if len(proved) < len(rows):
+        return f"proved in {len(proved)} of {len(rows)} within {limit:g} s"
+    longest = max(row.seconds for row in rows)
+    return f"{_middle(rows)}, proved" + (f" (at most {as_time(longest)})" if longest > 1.0 else "")
+
+
+def _heuristics(solvers: list[list[Row]]) -> str:
+    if not solvers:
+        return "-"
+    rows = [row for one in solvers for row in one]
+    if all(row.hit for row in rows):
+        times = sorted(median(row.seconds for row in one) for one in solvers)
+        return f"{as_time(times[0])} to {as_time(times[-1])}, optimal"
+    excess = [row.excess for row in rows]
+    return f"{rows[0].limit:g} s: {as_percent(median(excess))} %, at worst {as_percent(max(excess))} %"
+
+
+def _lagrangian(stopped: list[Row], whole: list[Row]) -> str:
+    if stopped:
+        return f"{_middle(stopped)} to a gap of 0.1 %"
+    if not whole:
+        return "-"
+    worst = max(row.excess for row in whole)
+    return f"{_middle(whole)}, " + ("optimal" if all(row.hit for row in whole) else f"at worst {as_percent(worst)} %")
+
+
+def _peer(results: Results, scene: _Scene) -> str:
+    fastest = results.fastest_proof(scene.family, scene.size)
+    if fastest is not None:
+        return as_time(fastest[0])
+    rows = [row for row in results.of(scene.family, scene.size) if row.peer and row.limit <= LONG]
+    instances = {(row.seed, row.item) for row in rows}
+    proved = {(row.seed, row.item) for row in rows if row.status == "optimal"}
+    best = [min(row.excess for row in rows if (row.seed, row.item) == one) for one in instances]
+    how = "proved by none" if not proved else f"proved in {len(proved)} of {len(instances)}"
+    limit = max(row.limit for row in rows)
+    return f"{limit:g} s: {as_percent(median(best))} %, at worst {as_percent(max(best))} %, {how}"
+
+
+def _middle(rows: list[Row]) -> str:
+    return as_time(median(row.seconds for row in rows))
+
+
+WHICH_SOLVER: dict[str, Callable[[], str]] = {"which-solver": which_solver}
