@@ -76,3 +76,22 @@ def test_another_process_compiles_what_is_not_on_disk(tmp_path):
     code = "from prepares import prepare_clock\n" + _AHEAD
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+_TRIALS = """
+from assoc._system.interpreted import compiled_only
+from assoc.packing.branching import pairs, search
+
+with compiled_only():
+    search._compile_trials()
+    search.compile_branching()
+print(search._search.stats.cache_misses != {}, len(pairs.decide.signatures))
+"""
+
+
+@pytest.mark.slow
+def test_the_first_process_compiles_those_trials_that_the_search_links(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    words = [sys.executable, "-c", _TRIALS]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=900, env=environment)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "True 1\n")
