@@ -91,3 +91,22 @@ def test_what_is_compiled_is_looked_for_once(monkeypatch):
     for _ in range(3):
         ahead.compile_ahead("a kernel", print)
     assert looked == ["a kernel"]
+
+
+_TRIALS = """
+from assoc._system.interpreted import compiled_only
+from assoc.packing.branching import pairs, search
+
+with compiled_only():
+    search._compile_trials()
+    search.compile_branching()
+print(search._search.stats.cache_misses != {}, len(pairs.decide.signatures))
+"""
+
+
+@pytest.mark.slow
+def test_the_first_process_compiles_those_trials_that_the_search_links(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    words = [sys.executable, "-c", _TRIALS]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=900, env=environment)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "True 1\n")

@@ -407,13 +407,13 @@ def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: L
     return num_open, incumbent, count_found, nodes
 
 
-def compile_branching_ahead() -> None:
-    """Have the search compiled by another process, where it is not compiled yet, and its trials of pairs by this one.
+def compile_branching_ahead(*, surely: bool) -> None:
+    """Have the search compiled by another process, where it is not compiled yet.
 
-    The other process takes longer than what this one has to compile before its first search, and comes to the trials
-    when they are in the cache.
+    Where it will surely be needed this process compiles the trials of pairs meanwhile: the other one takes longer than
+    what this one has to compile before its first search, and comes to the trials when they are in the cache.
     """
-    if compile_ahead(_search, compile_branching):
+    if compile_ahead(_search, compile_branching) and surely:
         _compile_trials()
 
 

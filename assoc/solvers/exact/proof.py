@@ -35,6 +35,8 @@ _SMALL = 2000
 _SHORT = 20
 # columns from which a problem may be hard enough for its branching to be compiled beforehand
 _HARD = 500
+# columns for each row from which it surely is
+_DENSE = 15
 
 
 @dataclass(slots=True)
@@ -81,7 +83,7 @@ class _Task:
 def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
     if packing.num_columns > _HARD:
-        compile_branching_ahead()
+        compile_branching_ahead(surely=packing.num_columns > _DENSE * packing.num_rows)
     reduction = Reduction(packing, run)
     components = reduction.reduce()
     columns, weight, bound = reduction.closed_columns, reduction.closed_weight, reduction.closed_bound

@@ -18,6 +18,8 @@ _TRIAL = "assoc/packing/simplex/trial.py"
 _BRANCHING = "assoc/packing/branching/search.py"
 _OF_TRIALS = "tests/packing/test_trial.py"
 _OF_PASSES = "tests/packing/test_passes.py"
+_COUNTS = "assoc/packing/branching/counts.py"
+_OF_COUNTS = "tests/packing/test_counts_small.py"
 
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
@@ -190,5 +192,33 @@ FAULTS = (
         "self._floor = max(self._floor, self._aim)",
         "self._floor = self.weight",
         _OF_PASSES,
+    ),
+    Fault(
+        "a split on counts leaves out the number between",
+        _COUNTS,
+        "part.counts.within(k, below + 1, most)",
+        "part.counts.within(k, below + 2, most)",
+        _OF_COUNTS,
+    ),
+    Fault(
+        "both sides of a split have the number between",
+        _COUNTS,
+        "part.counts.within(k, least, below), ",
+        "part.counts.within(k, least, below + 1), ",
+        _OF_COUNTS,
+    ),
+    Fault(
+        "parts that wait are forgotten",
+        _BRANCHING,
+        "return self._waiting[-1].bound if self._waiting else np.inf",
+        "return np.inf",
+        _OF_COUNTS,
+    ),
+    Fault(
+        "a pass is not split before it ends",
+        _BRANCHING,
+        "if self._open.count and self._splits():",
+        "if False:",
+        _OF_COUNTS,
     ),
 )

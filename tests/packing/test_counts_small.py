@@ -1,0 +1,70 @@
+"""Roots split on counts, on packings so small that the tests run uncompiled, too: `make mutants` does that."""
+
+import numpy as np
+import pytest
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import counts, search
+from assoc.packing.branching.counts import split_on_counts
+from assoc.packing.branching.root import plain_root
+from assoc.packing.branching.search import BranchAndBound
+from tests.packing.test_counts import inside, random_packing, solutions
+
+
+@pytest.fixture(params=[3, 26])
+def packing(request, monkeypatch):
+    """Split whenever it can be."""
+    monkeypatch.setattr(counts, "_PAYS", np.inf)
+    monkeypatch.setattr(search, "_HARD", 1)
+    monkeypatch.setattr(search, "_RAISED", -np.inf)
+    return random_packing(request.param)
+
+
+def split(packing, cutoff=np.inf):
+    leaves = split_on_counts(packing, plain_root(packing, dual_bound(packing)), cutoff, cutoff, np.inf)
+    assert len(leaves) > 1
+    return leaves
+
+
+def test_every_solution_is_of_one_part(packing):
+    every = solutions(packing)
+    used = np.zeros((len(every), packing.num_columns), dtype=np.int64)
+    for row, one in zip(used, every, strict=True):
+        row[one] = 1
+    weights = used @ packing.weights
+    times = np.zeros(len(every), dtype=np.int64)
+    for leaf in split(packing):
+        part = inside(leaf, packing.num_rows, used)
+        times += part
+        assert (weights[part] >= leaf.bound - 1e-9).all()
+    assert (times == 1).all()
+
+
+def test_a_search_in_parts_ends_at_the_optimum(packing):
+    best = min(packing.weights[one].sum() for one in solutions(packing))
+    for incumbent in (-1.0, best + 0.3):
+        one = BranchAndBound(packing, dual_bound(packing), incumbent, 1e-9, to_the_end=True)
+        while not one.done:
+            one.run(1)
+            assert one.lower_bound <= best + 1e-8
+        assert one.weight == pytest.approx(best, abs=1e-9)
+
+
+def test_the_least_bound_of_the_parts_bounds_the_whole(packing):
+    leaves = split(packing)
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True)
+    one._begin()
+    one._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
+    one._open.count, one._aim = 0, np.inf
+    assert not one.done and one.lower_bound == min(leaf.bound for leaf in leaves)
+
+
+@pytest.mark.parametrize("packing", [26], indirect=True)
+def test_a_pass_is_split_in_its_middle(packing):
+    """After one node, when others are open; what has been shown of them stays."""
+    one = BranchAndBound(packing, dual_bound(packing), 0.0, 1e-9, to_the_end=True)
+    one.run(1)
+    assert one._open.count and not one._leaves
+    shown = one.lower_bound
+    one.run(1)
+    assert len(one._leaves) > 1 and one.lower_bound >= shown
