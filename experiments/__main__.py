@@ -58,9 +58,10 @@ EXPERIMENTS = (
     ),
     Experiment(
         "pages",
-        "nothing: writes the tables of eleven pages from the result files",
+        "nothing: writes the tables of twelve pages from the result files",
         "docs/papers.md, docs/filters.md, docs/recordings.md, docs/start.md, docs/dependencies.md, docs/sweeps.md, "
-        "docs/solvers.md, docs/ant_colony.md, docs/concepts.md, docs/tracking.md, docs/registration.md",
+        "docs/solvers.md, docs/which_solver.md, docs/ant_colony.md, docs/concepts.md, docs/tracking.md, "
+        "docs/registration.md",
     ),
     Experiment(
         "papers.ant_colony",
