@@ -60,7 +60,7 @@ class Results:
     def fastest_peer(self, row: Row, peers: Sequence[str] = PROVING_PEERS) -> float:
         """Return the least time in which one of these peers proved the optimum of the row's instance."""
         times = [
-            other.seconds
+            other.taken
             for other in self._same_instance(row)
             if other.peer and other.solver in peers and other.status == "optimal"
         ]
@@ -73,7 +73,7 @@ class Results:
             if row.solver in PROVING_PEERS:
                 runs.setdefault((row.solver, row.limit), []).append(row)
         times = [
-            (median(row.seconds for row in rows), peer)
+            (median(row.taken for row in rows), peer)
             for (peer, _), rows in runs.items()
             if all(row.status == "optimal" for row in rows)
         ]
@@ -184,8 +184,8 @@ def _gated(results: Results) -> list[Verdict]:
 def _lagrangian_speed(results: Results, size: str) -> list[Verdict]:
     rows = results.of("gated", size, "lagrangian@0.1%")
     theirs = results.of("gated", size, "cp_sat") or results.of("gated", size, "cp_sat_1")
-    peer = {row.seed: row.seconds for row in theirs}
-    ratios = [peer[row.seed] / row.seconds for row in rows if row.seed in peer]
+    peer = {row.seed: row.taken for row in theirs}
+    ratios = [peer[row.seed] / row.taken for row in rows if row.seed in peer]
     if not ratios:
         return []
     text = f"worst gap {_percent(max(row.gap for row in rows))}, median 1/{median(ratios):.3g} of its time"
@@ -204,7 +204,7 @@ def _ahead(results: Results, exact: Sequence[Row], peers: Sequence[str] = PROVIN
     for row in exact:
         theirs = results.least_of_peers(row, peers)
         if math.isfinite(theirs):
-            ratios.append(theirs / row.seconds if row.status == "optimal" else 0.0)
+            ratios.append(theirs / row.taken if row.status == "optimal" else 0.0)
     if not ratios:
         return "not measured", 0.0, 0.0
     return f"median {median(ratios):.3g} times, least {min(ratios):.3g}", median(ratios), min(ratios)
@@ -236,7 +236,7 @@ def _ghost_proofs(results: Results, size: str, exact: Sequence[Row]) -> list[Ver
         ]
     if size == "40":
         speed, times, least = _ahead(results, exact, ("highs",))
-        near = [row.seconds if row.status == "optimal" else math.inf for row in exact if 0 < row.extra < 2e-3]
+        near = [row.taken if row.status == "optimal" else math.inf for row in exact if 0 < row.extra < 2e-3]
         longest = max(near, default=math.inf)
         most = f"at most {longest:.3g} s on the {len(near)} of gap below 0.2 %" if near else "no such scene measured"
         return [
@@ -248,7 +248,7 @@ def _ghost_proofs(results: Results, size: str, exact: Sequence[Row]) -> list[Ver
         ]
     gaps = [row.gap for row in exact]
     text += f"; gap median {_percent(median(gaps))}, worst {_percent(max(gaps))}"
-    slowest = max((row.seconds for row in proved), default=math.inf)
+    slowest = max((row.taken for row in proved), default=math.inf)
     if size == "60":
         return [
             verdict("proof in 60 s on 3 of 5", False, text, len(proved) >= 0.6 * len(exact)),
@@ -308,7 +308,7 @@ def _known_optimum(results: Results) -> list[Verdict]:
         exact = results.of(family, size, "exact")
         if exact:
             proved = sum(row.status == "optimal" for row in exact)
-            slowest = max(row.seconds for row in exact)
+            slowest = max(row.taken for row in exact)
             text = f"{proved} of {len(exact)}, at most {slowest:.3g} s"
             verdicts.append(Verdict(family, size, "exact: proof in 20 s", stretch, text, proved == len(exact)))
     return [
@@ -325,7 +325,7 @@ def _random_axial(results: Results) -> list[Verdict]:
     goal = "the optimum in 80 % of runs, 10 s"
     exact = results.of("random axial", solver="exact")
     proved = sum(row.status == "optimal" for row in exact)
-    largest = [row.seconds for row in exact if row.size == "n=26"]
+    largest = [row.taken for row in exact if row.size == "n=26"]
     times = f", n=26 median {median(largest):.3g} s" if largest else ""
     text = f"{proved} of {len(exact)}{times}"
     every = [Verdict("random axial", "all", "exact: proof in 60 s", False, text, proved == len(exact))] if exact else []

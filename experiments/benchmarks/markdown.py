@@ -46,7 +46,8 @@ Independent code checks the feasibility and cost of every answer.
 marked ~, the best cost that any solver found. *Excess* is relative to it. aco, genetic and tabu stop when they reach a
 known optimum, so their time is the time to it; `lagrangian@0.1%` stops at that gap. *Speed* is the median
 over instances of the fastest peer's time to a proven optimum divided by this solver's time; it is given if this
-solver found the reference in every run."""
+solver found the reference in every run. For it, and for the goals, a time is that of the processor where this is the
+shorter one, ours and theirs: what else ran on the machine does not count."""
 
 
 def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str | None = None) -> str:
@@ -165,7 +166,7 @@ def _ours_first(rows: Sequence[Row]) -> list[Row]:
 def _figures(results: Results, rows: Sequence[Row]) -> list[str]:
     excess = [row.excess if math.isfinite(row.cost) else math.inf for row in rows]
     found = f"{sum(row.hit for row in rows)}" + ("" if all(row.proven for row in rows) else "~")
-    speeds = [results.fastest_peer(row) / row.seconds for row in rows]
+    speeds = [results.fastest_peer(row) / row.taken for row in rows]
     speed = median(speeds)
     return [
         found,

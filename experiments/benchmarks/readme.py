@@ -68,7 +68,7 @@ def _timed(results: Results, family: str, size: str, name: str) -> str:
     """One instance family: median times to a proven optimum, and the excess cost of one sensor at a time."""
     mine = results.of(family, size, "exact")
     proved = all(row.status == "optimal" for row in mine)
-    ours = as_time(median(row.seconds for row in mine)) if proved else "no proof"
+    ours = as_time(median(row.taken for row in mine)) if proved else "no proof"
     fastest = results.fastest_proof(family, size)
     other = "no proof" if fastest is None else f"{as_time(fastest[0])} ({PEERS[fastest[1]]})"
     return f"| {name} | {ours} | {other} | {_excess(results.of(family, size, 'sequential'))} |"

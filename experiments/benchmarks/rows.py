@@ -68,6 +68,11 @@ class Row:
     cpu: float = 0.0
 
     @property
+    def taken(self) -> float:
+        """Seconds of wall time, or of processor time where these are fewer: others may have used the machine, too."""
+        return min(self.seconds, self.cpu) if self.cpu > 0.0 else self.seconds
+
+    @property
     def gap(self) -> float:
         """Cost less bound, relative to max(1, abs(cost))."""
         return (self.cost - self.bound) / max(1.0, abs(self.cost)) if math.isfinite(self.cost) else math.inf

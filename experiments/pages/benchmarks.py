@@ -68,7 +68,7 @@ def _exact(rows: list[Row]) -> str:
         return f"not proved in {limit:g} s, gap {as_percent(median(row.gap for row in rows))} %"
     if len(proved) < len(rows):
         return f"proved in {len(proved)} of {len(rows)} within {limit:g} s"
-    longest = max(row.seconds for row in rows)
+    longest = max(row.taken for row in rows)
     return f"{_middle(rows)}, proved" + (f" (at most {as_time(longest)})" if longest > 1.0 else "")
 
 
@@ -77,7 +77,7 @@ def _heuristics(solvers: list[list[Row]]) -> str:
         return "-"
     rows = [row for one in solvers for row in one]
     if all(row.hit for row in rows):
-        times = sorted(median(row.seconds for row in one) for one in solvers)
+        times = sorted(median(row.taken for row in one) for one in solvers)
         return f"{as_time(times[0])} to {as_time(times[-1])}, optimal"
     excess = [row.excess for row in rows]
     return f"{rows[0].limit:g} s: {as_percent(median(excess))} %, at worst {as_percent(max(excess))} %"
@@ -106,7 +106,7 @@ def _peer(results: Results, scene: _Scene) -> str:
 
 
 def _middle(rows: list[Row]) -> str:
-    return as_time(median(row.seconds for row in rows))
+    return as_time(median(row.taken for row in rows))
 
 
 WHICH_SOLVER: dict[str, Callable[[], str]] = {"which-solver": which_solver}
