@@ -257,7 +257,7 @@ def test_a_report_written_again_keeps_its_remark(tmp_path: Path) -> None:
 
 
 def test_time_that_others_took_does_not_count():
-    """A machine that is shared: 0.9 s on the clock, 0.1 s of the processor; several threads take more of it than that."""
+    """A machine that is shared: less of the processor than on the clock; several threads take more of it."""
     assert replace(ROW, seconds=0.9, cpu=0.1).taken == 0.1
     assert replace(ROW, seconds=0.9, cpu=1.7).taken == 0.9
     assert replace(ROW, seconds=0.9, cpu=0.0).taken == 0.9

@@ -101,7 +101,8 @@ def test_figures_are_differences_from_the_whole():
 
 
 def test_workers_are_published_apart_from_the_parts():
-    costs = {("aco", parts.WHOLE): np.array([-100.0, -50.0]), ("aco", parts.TWO_WORKERS.words): np.array([-101.0, -50.0])}
+    one, two = np.array([-100.0, -50.0]), np.array([-101.0, -50.0])
+    costs = {("aco", parts.WHOLE): one, ("aco", parts.TWO_WORKERS.words): two}
     names = [claim.quantity for claim in ablation.claims_of("ghosts 40", 2.0, costs)]
     assert len(names) == 3 and all(name.startswith("ghosts 40, 2 s, workers: ") for name in names)
 
