@@ -26,7 +26,7 @@ def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest:
     """Estimate the rotation time of the antenna.
 
     An antenna that turns once in T seconds points to the bearing b when t / T - b / (2 pi) + const is whole. The T
-    is taken at which the plots agree best on that constant: the maximum of |mean exp(i (2 pi t / T - b))|, taken
+    is taken at which the plots agree best on that constant: the maximum of ``|mean exp(i (2 pi t / T - b))|``, taken
     over stretches of five minutes and averaged. Where all traffic is in one direction, T / 2, T / 3 and so on
     agree nearly as well; the longest that agrees within 5 % is the answer.
 
