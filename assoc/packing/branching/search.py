@@ -223,8 +223,8 @@ class BranchAndBound:
 
     def _begin_pass(self) -> None:
         """Begin at the root or its parts."""
-        if self._leaves:
-            self._waiting = self._leaves.copy()
+        self._waiting = self._leaves.copy()
+        if self._waiting:
             self._next_leaf()
         else:
             self._open = OpenNodes(self._root)
