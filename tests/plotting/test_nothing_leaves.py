@@ -116,6 +116,28 @@ def click_all(browser):
     return names
 
 
+CLICKED_WHILE_IT_DRAWS = """
+const plot = document.getElementById('scene-plot');
+const click = () => plot.emit('plotly_click', {points: [{customdata: 1}]});
+const react = Plotly.react;
+window.drawn = 0;
+Plotly.react = (...all) => { if (all[0] === plot) { window.drawn += 1; click(); } return react(...all); };
+click();
+"""
+
+
+@pytest.mark.slow
+def test_a_target_clicked_in_space_is_drawn_once(browser, pages):
+    """Charts in space say that they were clicked in the middle of each drawing, while the button is down."""
+    show(browser, pages / "scene.html", PHONE)
+    press(browser, browser.find_element("id", "space"))
+    browser.execute_script(CLICKED_WHILE_IT_DRAWS)
+    assert in_time(lambda: "Target 2" in browser.find_element("id", "detail").text)
+    time.sleep(0.2)
+    assert browser.execute_script("return window.drawn") == 1
+    assert not [one for one in complaints(browser) if "RangeError" in one]
+
+
 @pytest.mark.slow
 def test_no_script_opens_a_window(browser, pages):
     """What plotly offers where there is no WebGL: a click that opens its help page."""

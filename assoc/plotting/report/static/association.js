@@ -32,7 +32,8 @@ const drawScene = () => {
     plot.dataset.listens = 'yes';
     plot.on('plotly_click', (event) => {
       const target = event.points[0].customdata;
-      if (typeof target === 'number') chooseTarget(target);
+      // a scene in space says "clicked" while it draws, and again in every drawing until the button is up
+      if (typeof target === 'number') window.setTimeout(() => { if (target !== state.chosen) chooseTarget(target); });
     });
   }
 };
