@@ -173,8 +173,9 @@ def _start() -> subprocess.Popen[bytes]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env={**os.environ, "ASSOC_INTERPRET": "0"},
-        # Ctrl-C is for the program, which then closes the pipe
-        start_new_session=True,
+        # Ctrl-C is for the program, which then closes the pipe; in a session of its own the process would get an equal
+        # share of the cores, whatever its nice value (sched(7), autogroups)
+        process_group=0,
     )
 
 
