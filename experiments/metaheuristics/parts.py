@@ -146,7 +146,6 @@ OWN = (
     Part("beta 0: visibility ignored", ("aco",), {"beta": 0.0}),
     Part("no pheromone laid", ("aco",), without=_replaced(max_min.Colony, "_deposit", lambda *_: None)),
     Part("no crossover", ("genetic",), without=_no_crossover),
-    Part("no mutation", ("genetic",), {"mutation": 0.0}),
     Part("no selection", ("genetic",), {"tournament": 1}),
     Part("selection inverted", ("genetic",), without=_inverted_selection),
     Part("no moves", ("tabu",), without=_no_moves),

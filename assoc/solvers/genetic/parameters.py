@@ -20,14 +20,11 @@ class GeneticParameters(SearchParameters):
         Children in a generation.
     tournament : int
         A parent is the best of so many drawn at random.
-    mutation : float
-        Share of a child's tuples that are given up before it is completed anew.
     """
 
     population: int = field(default=20, metadata={"help": "solutions that live at a time"})
     offspring: int = field(default=10, metadata={"help": "children in a generation"})
     tournament: int = field(default=2, metadata={"help": "a parent is the best of so many"})
-    mutation: float = field(default=0.05, metadata={"help": "share of a child's tuples that are given up"})
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -35,7 +32,6 @@ class GeneticParameters(SearchParameters):
         self._whole("offspring", most=100_000)
         good = is_whole(self.tournament, 1, self.population)
         self._require(good, "tournament", "a whole number from 1 to population")
-        self._number("mutation", least=0.0, most=1.0)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """The members in a list, and again as an array."""

@@ -1,9 +1,9 @@
 """Crossover that keeps tuples, repair, and survival of the fittest without duplicates.
 
 A child first takes the tuples that both parents have. The other tuples of both are then offered in an order
-drawn by their reduced costs, and taken where they fit; what mutation gives up and what then lies open is
-repaired by insertion with ejection (insertion.py) and exact sub-steps (cluster.py), or without refinement filled with
-what fits. A child replaces the worst member if it is better and no member costs the same.
+drawn by their reduced costs, and taken where they fit; what then lies open is repaired by insertion with ejection
+(insertion.py) and exact sub-steps (cluster.py), or without refinement filled with what fits. A child replaces the
+worst member if it is better and no member costs the same.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ class Breeding:
         return int(drawn[np.argmin(self.fitness[drawn])])
 
     def _child(self, component: Component, one: int, two: int, rng: np.random.Generator) -> NDArray[np.int32]:
-        mother, father, mutation = self.members[one], self.members[two], float(self.parameters.mutation)
-        owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, mutation, rng)
+        mother, father = self.members[one], self.members[two]
+        owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, rng)
         if component.inserts:
             rows = np.arange(owner.size, dtype=np.int32)
             insert_and_eject(component.arrays, owner, rows, component.deadline)
@@ -129,12 +129,10 @@ def _cross(
     mother: Any,
     father: Any,
     temperature: float,
-    mutation: float,
     rng: Any,
 ) -> Any:
-    """A child of two covers: what they share, then what fits of the rest; mutated."""
+    """A child of two covers: what they share, then what fits of the rest."""
     cols, slack = packing.cols, packing.slack
-    num_sensors = cols.shape[1]
     num_rows = slack.size
     owner = np.full(num_rows, -1, np.int32)
     rest = np.empty(2 * num_rows, np.int32)
@@ -155,10 +153,4 @@ def _cross(
         j = rest[i]
         if fits(cols, owner, j):
             own(cols, j, owner)
-    for r in range(num_rows):
-        j = owner[r]
-        if j >= 0 and rng.random() < mutation / num_sensors:
-            for s in range(num_sensors):
-                if cols[j, s] >= 0:
-                    owner[cols[j, s]] = -1
     return owner

@@ -30,7 +30,6 @@ FAULTS = (
         "",
         _OF_GENETIC,
     ),
-    Fault("no mutation", _BREEDING, "rng.random() < mutation / num_sensors", "rng.random() < 0.0", _OF_GENETIC),
     Fault(
         "selection is inverted",
         _BREEDING,
