@@ -39,7 +39,7 @@ from assoc.packing.packing import Packing, PackingArrays, assembled, find
 from assoc.packing.run import Run
 
 # passes at one temperature; the last temperatures get more, because by then few columns are left
-_PASSES = np.array([10, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
+_PASSES = np.array([7, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
 # visits of columns between two looks at the clock: about ten milliseconds
 _VISITS = 3_000_000
 # classes of reduced cost, by which columns are sorted before rounding
