@@ -21,7 +21,7 @@ from assoc._system.interpreted import compiled_only
 from assoc.errors import InfeasibleError
 from assoc.packing import prepare as packing_form
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.search import compile_all_branching_ahead
+from assoc.packing.branching.compiling import compile_all_branching_ahead
 from assoc.packing.components.splitting import split_components
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.run import Run

@@ -18,14 +18,14 @@ from assoc._system import ahead
 import assoc
 from numba.core import event
 from assoc._system.interpreted import compiled_only
-from assoc.packing.branching import search
+from assoc.packing.branching import compiling, search
 from assoc.packing.prepare import prepare
 from assoc.simulation import simulate
 
 problem = assoc.build_problem(simulate("bearing-only", 2, targets=12, scans=1), 0)
 packing = prepare(problem).packing.component(0)
 with compiled_only():
-    search.compile_branching()
+    compiling.compile_branching()
     seen = event.RecordingListener()
     event.register("numba:compiler_lock", seen)
     one = search.BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9)
@@ -95,12 +95,13 @@ def test_what_is_compiled_is_looked_for_once(monkeypatch):
 
 _TRIALS = """
 from assoc._system.interpreted import compiled_only
-from assoc.packing.branching import pairs, search
+from assoc.packing.branching import compiling, pairs
+from assoc.packing.branching.depth_first import search_depth_first
 
 with compiled_only():
-    search._compile_trials()
-    search.compile_branching()
-print(search._search.stats.cache_misses != {}, len(pairs.decide.signatures))
+    compiling._compile_trials()
+    compiling.compile_branching()
+print(search_depth_first.stats.cache_misses != {}, len(pairs.decide.signatures))
 """
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.feasibility import first_solution
 from assoc.packing.branching.node import branch, drop, new_work, open_node
 from assoc.packing.branching.open_nodes import OpenNodes
@@ -19,7 +20,7 @@ from assoc.packing.branching.pairs import (
     new_trials,
 )
 from assoc.packing.branching.root import plain_root
-from assoc.packing.branching.search import BranchAndBound, Limits, _search
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
@@ -117,7 +118,7 @@ def test_nodes_that_hold_nothing_better_need_no_room():
     stack.bound[:] = -7.0
     work = new_work(packing.arrays, root.program, root.slack)
     full = stack.first.size - 1
-    num_open, weight, count, nodes = _search(work, stack, full, -7.0, Limits(1e-9, np.inf, 10, np.inf))
+    num_open, weight, count, nodes = search_depth_first(work, stack, full, -7.0, Limits(1e-9, np.inf, 10, np.inf))
     assert (num_open, weight, count, nodes) == (0, -7.0, -1, 0)
 
 

@@ -16,37 +16,20 @@ the root is split on counts (counts.py), if that pays, and passes go through its
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.ahead import compile_ahead, wait_for_kernels
+from assoc._system.ahead import wait_for_kernels
 from assoc._system.clock import is_over
-from assoc._system.compiled import inner_njit, search_njit
-from assoc._system.interpreted import interpreted_only
 from assoc._types import Floats
 from assoc.packing.branching.counts import Leaf, most_counts, split_on_counts, with_counts
-from assoc.packing.branching.node import (
-    Work,
-    allowed_at,
-    branch,
-    drop,
-    keep_side,
-    new_work,
-    open_node,
-    relax,
-    work_memory,
-)
-from assoc.packing.branching.open_nodes import OpenNodes, Stack, has_room
-from assoc.packing.branching.pairs import NEITHER, TOGETHER, WHOLE, any_open_pair, decide, doubtful_pairs
+from assoc.packing.branching.depth_first import Limits, search_depth_first
+from assoc.packing.branching.node import Work, new_work, work_memory
+from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import MOST_ROWS, plain_root, root_with_cuts
-from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.sorting import order_of
-from assoc.packing.packing import Packing, assemble
+from assoc.packing.packing import Packing
 from assoc.packing.run import memory_allows
-from assoc.packing.simplex.dual import OPTIMAL, STOPPED, Effort
-from assoc.packing.simplex.program import Allowed
 
 # the first aim and the last one, as shares of the way from the root's bound to the incumbent, and how they grow
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
@@ -56,27 +39,6 @@ _HARD = 40
 # a split is judged by what it saves passes that aim so many times as far; it is made if it raises the bound by this
 # share of the way there
 _FARTHER, _RAISED = 3.0, 0.02
-
-
-class Limits(NamedTuple):
-    """What is looked for, and when a search stops.
-
-    Attributes
-    ----------
-    tolerance : float
-        How much better than the incumbent a solution must be.
-    aim : float
-        The weight below which it must be.
-    nodes : int
-        Nodes at the most.
-    deadline : float
-        When time is over, by the kernels' clock (clock.py).
-    """
-
-    tolerance: float
-    aim: float
-    nodes: int
-    deadline: float
 
 
 class BranchAndBound:
@@ -167,7 +129,7 @@ class BranchAndBound:
                 self._begin_pass()
                 continue
             limits = Limits(self.tolerance, self._aim, target - self.nodes, self.deadline)
-            self._open.count, self.weight, count, done = _search(
+            self._open.count, self.weight, count, done = search_depth_first(
                 self._work, self._open.arrays, self._open.count, self.weight, limits
             )
             self.nodes += done
@@ -275,178 +237,3 @@ class BranchAndBound:
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
         # without an incumbent there is nothing to go by
         self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf
-
-
-@inner_njit
-def _greedy(work: Work, allowed: Allowed) -> Any:
-    """Take columns by ``key`` while they fit; the weight (inf when a duty is left) and their number."""
-    cols, weights, trial, active, slack = work.cols, work.weights, work.trial, allowed.active, allowed.slack
-    covered = np.zeros(trial.size, np.bool_)
-    weight = 0.0
-    count = 0
-    for a in order_of(work.key[: active.size]):
-        j = active[a]
-        free = True
-        duty = False
-        for s in range(cols.shape[1]):
-            r = cols[j, s]
-            if r >= 0:
-                if covered[r]:
-                    free = False
-                    break
-                duty = duty or not slack[r]
-        if free and (weights[j] < 0.0 or duty):
-            weight += weights[j]
-            trial[count] = j
-            count += 1
-            for s in range(cols.shape[1]):
-                if cols[j, s] >= 0:
-                    covered[cols[j, s]] = True
-    for r in range(covered.size):
-        if not slack[r] and not covered[r]:
-            return np.inf, count
-    return weight, count
-
-
-@inner_njit
-def _by_values(work: Work, allowed: Allowed) -> bool:
-    """Lower the keys by the LP's values, so that these decide first; whether all of them are whole numbers."""
-    in_basis, values, active, key = work.basis.place, work.basis.values, allowed.active, work.key
-    whole = True
-    for a in range(active.size):
-        place = in_basis[active[a]]
-        if place >= 0:
-            value = values[place]
-            whole = whole and not WHOLE < value < 1.0 - WHOLE
-            key[a] -= value * work.limit
-    return whole
-
-
-@search_njit
-def _search(work: Work, stack: Stack, num_open: int, incumbent: float, limits: Limits) -> Any:
-    """Search depth first; the number of open nodes, the incumbent's weight, its number of columns, the nodes done.
-
-    Stops early with nodes open when there is no room left for two children, or time is over.
-    """
-    tolerance, aim, node_limit, deadline = limits
-    cols, program, basis, trials = work.cols, work.program, work.basis, work.trials
-    count_found = -1
-    nodes = 0
-    # the node whose basis is at work
-    at_work = -1
-    while num_open > 0 and nodes < node_limit:
-        top = num_open - 1
-        lower = stack.bound[top]
-        if lower >= min(incumbent - tolerance, aim):
-            num_open = top
-            continue
-        # what holds nothing better needs no room: given up for want of it, it would end the passes
-        if not has_room(stack, top):
-            break
-        num = open_node(work, stack, top, at_work)
-        at_work = -1
-        one, two, likely = -1, -1, 0.5
-        closed = False
-        late = False
-        while True:
-            cut = min(incumbent - tolerance, aim, work.limit)
-            # a little more than the cut, for what rounding takes off the bound
-            status, bound = relax(work, num, cut + 0.1 * tolerance, deadline)
-            if status == STOPPED and is_over(deadline):
-                late = True
-                break
-            lower = max(lower, bound)
-            if lower >= cut:
-                closed = True
-                break
-            num = drop(work, num, bound, cut)
-            allowed = allowed_at(work, num)
-            whole = status == OPTIMAL and _by_values(work, allowed)
-            weight, count = _greedy(work, allowed)
-            if weight < incumbent - 1e-3 * tolerance:
-                incumbent = weight
-                count_found = count
-                copy_to(work.found[:count], work.trial[:count])
-                cut = min(cut, incumbent - tolerance)
-                if lower >= cut:
-                    closed = True
-                    break
-                num = drop(work, num, bound, cut)
-                allowed = allowed_at(work, num)
-            in_doubt = 0
-            if status == OPTIMAL and not whole:
-                in_doubt = doubtful_pairs(cols, basis, trials)
-            if in_doubt == 0:
-                one, two = any_open_pair(cols, allowed, work.trial)
-                break
-            which, verdict = decide(program, cols, allowed, basis, trials, in_doubt, Effort(cut, 0, deadline))
-            one, two, likely = int(trials.pairs[which, 0]), int(trials.pairs[which, 1]), trials.values[which]
-            if verdict == NEITHER:
-                break
-            num = keep_side(work, num, (one, two), verdict == TOGETHER)
-        if late:
-            # the node is as it was on the stack
-            break
-        num_open = top
-        nodes += 1
-        if closed:
-            continue
-        if one < 0:
-            # columns that share a row are the same: the lightest of each kind
-            allowed = allowed_at(work, num)
-            for a in range(num):
-                work.key[a] = work.weights[work.node.active[a]]
-            weight, count = _greedy(work, allowed)
-            if weight < incumbent:
-                incumbent = weight
-                count_found = count
-                copy_to(work.found[:count], work.trial[:count])
-            continue
-        num_open = branch(work, stack, top, num, (one, two), likely >= 0.5, lower)
-        at_work = num_open - 1
-    return num_open, incumbent, count_found, nodes
-
-
-def compile_branching_ahead(*, surely: bool) -> None:
-    """Have the search compiled by another process, where it is not compiled yet.
-
-    Where it will surely be needed this process compiles the trials of pairs meanwhile: the other one takes longer than
-    what this one has to compile before its first search, and comes to the trials when they are in the cache.
-    """
-    if compile_ahead(_search, compile_branching) and surely:
-        _compile_trials()
-
-
-def compile_all_branching_ahead() -> None:
-    """Have it compiled with what searches to the end need besides, and also where nothing is to be interpreted."""
-    compile_ahead(_search, compile_all_branching, anyway=True)
-
-
-def compile_branching() -> None:
-    """Compile the search, on three measurements of which each two could be one target."""
-    _on_three(to_the_end=False)
-
-
-def compile_all_branching() -> None:
-    """Compile the search, and the cuts of its root: the three measurements are an odd set, of which one is cut off."""
-    compile_branching()
-    _on_three(to_the_end=True)
-
-
-def _compile_trials() -> None:
-    packing = _three()
-    root = plain_root(packing, np.zeros(packing.num_rows))
-    work = new_work(packing.arrays, root.program, root.slack)
-    arguments = (work.program, work.cols, work.node, work.basis, work.trials, 1, Effort(0.0, 0, np.inf))
-    decide.compile(tuple(map(decide.typeof_pyval, arguments)))
-
-
-def _on_three(to_the_end: bool) -> None:
-    packing = _three()
-    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9, to_the_end=to_the_end).run(10)
-
-
-def _three() -> Packing:
-    with interpreted_only():
-        rows = np.array([[0, 1, -1], [0, -1, 2], [-1, 1, 2]], np.int32)
-        return assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.compiling import compile_branching_ahead
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import BranchAndBound, compile_branching_ahead
+from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Component
 from assoc.packing.components.search import complete_greedily
 from assoc.packing.components.splitting import split_component

@@ -1,0 +1,60 @@
+"""What hard problems need of branch and bound, compiled before they need it, most of it by another process."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assoc._system.ahead import compile_ahead
+from assoc._system.interpreted import interpreted_only
+from assoc.packing.branching.depth_first import search_depth_first
+from assoc.packing.branching.node import new_work
+from assoc.packing.branching.pairs import decide
+from assoc.packing.branching.root import plain_root
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.packing import Packing, assemble
+from assoc.packing.simplex.dual import Effort
+
+
+def compile_branching_ahead(*, surely: bool) -> None:
+    """Have the search compiled by another process, where it is not compiled yet.
+
+    Where it will surely be needed this process compiles the trials of pairs meanwhile: the other one takes longer than
+    what this one has to compile before its first search, and comes to the trials when they are in the cache.
+    """
+    if compile_ahead(search_depth_first, compile_branching) and surely:
+        _compile_trials()
+
+
+def compile_all_branching_ahead() -> None:
+    """Have it compiled with what searches to the end need besides, and also where nothing is to be interpreted."""
+    compile_ahead(search_depth_first, compile_all_branching, anyway=True)
+
+
+def compile_branching() -> None:
+    """Compile the search, on three measurements of which each two could be one target."""
+    _on_three(to_the_end=False)
+
+
+def compile_all_branching() -> None:
+    """Compile the search, and the cuts of its root: the three measurements are an odd set, of which one is cut off."""
+    compile_branching()
+    _on_three(to_the_end=True)
+
+
+def _compile_trials() -> None:
+    packing = _three()
+    root = plain_root(packing, np.zeros(packing.num_rows))
+    work = new_work(packing.arrays, root.program, root.slack)
+    arguments = (work.program, work.cols, work.node, work.basis, work.trials, 1, Effort(0.0, 0, np.inf))
+    decide.compile(tuple(map(decide.typeof_pyval, arguments)))
+
+
+def _on_three(to_the_end: bool) -> None:
+    packing = _three()
+    BranchAndBound(packing, np.zeros(packing.num_rows), np.inf, 1e-9, to_the_end=to_the_end).run(10)
+
+
+def _three() -> Packing:
+    with interpreted_only():
+        rows = np.array([[0, 1, -1], [0, -1, 2], [-1, 1, 2]], np.int32)
+        return assemble(rows, np.full(3, -1.0), np.ones(3, np.bool_), np.arange(3, dtype=np.int32)).component(0)
