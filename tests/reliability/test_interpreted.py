@@ -5,11 +5,13 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 import assoc
+from assoc._system import interpreted
 from assoc.simulation import simulate
 from tests.sizes import sample
 
@@ -117,6 +119,23 @@ def doubtful_calls(function: ast.FunctionDef) -> list[str]:
             if unstable or name in _DIFFERENT or (owner == "np" and name in _ELEMENTARY):
                 found.append(f"{function.name}, line {call.lineno}: {ast.unparse(call)}")
     return found
+
+
+@pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no priorities on this system")
+def test_the_process_beside_leaves_the_cores_to_the_program():
+    """In a session of its own it would get an equal share, whatever its nice value (sched(7), autogroups)."""
+    process = interpreted._start()
+    try:
+        assert os.getsid(process.pid) == os.getsid(0)
+        # Ctrl-C is for the group of the program
+        assert os.getpgid(process.pid) != os.getpgrp()
+        last = time.monotonic() + 60.0
+        while os.getpriority(os.PRIO_PROCESS, process.pid) <= os.getpriority(os.PRIO_PROCESS, 0):
+            assert time.monotonic() < last
+            time.sleep(0.02)
+    finally:
+        process.stdin.close()
+        process.wait(60)
 
 
 def test_kernels_ask_for_nothing_that_numpy_does_otherwise():
