@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.components import search
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
+from assoc.packing.components.splitting import split_components
 from assoc.packing.components.team import Team
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
-from experiments.common.oracles import gated_problem
+from assoc.simulation import simulate
+from experiments.common.oracles import gated_problem, milp_optimum
 from tests.sizes import sample
 from tests.solvers.pieces import component, problems
 
@@ -35,6 +38,20 @@ class Idle:
 def unproven(monkeypatch):
     """Nothing is proven by branch and bound: it is not what is tested, and slow without a compiler."""
     monkeypatch.setattr(search, "bound_of_component", lambda component, run: component.bound)
+
+
+@pytest.fixture
+def ghosts():
+    """A component of 32 measurements that its multipliers do not close, with a greedy cover, and its least weight."""
+    problem = assoc.build_problem(simulate("bearing-only", 0, targets=10, scans=1), 0)
+    prepared = prepare(problem)
+    whole = prepared.packing
+    components = split_components(whole, dual_bound(whole), np.arange(whole.num_columns))
+    for one in components:
+        one.offer_greedy()
+    rest = sum(one.weight for one in components if one.closed)
+    (one,) = (one for one in components if not one.closed)
+    return one, milp_optimum(problem) - prepared.offset - rest
 
 
 def run_idle(**limits):
@@ -58,6 +75,29 @@ def test_the_best_cover_is_refined_by_refinement_full_alone(unproven):
     local = run_idle(refinement="local", patience=2)[2]
     full = run_idle(refinement="full", patience=2)[2]
     assert alone - 1.0 > local > full + 1.0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_branch_and_bound_beside_a_metaheuristic_finds_and_proves(workers, ghosts):
+    """A searcher that does nothing: what is found comes from branch and bound, and is proved to be the best."""
+    one, optimum = ghosts
+    one.refinement = "full"
+    assert one.weight > optimum + 0.1 and not one.closed
+    with ThreadPoolExecutor(workers) as pool:
+        team = Team(lambda *_: Idle(), one, Run(0), 0, workers, pool if workers > 1 else None)
+        for _ in range(100):
+            team.iterate()
+    assert one.closed and one.weight == pytest.approx(optimum, abs=1e-9)
+    assert optimum - 1e-6 < one.proven <= one.weight
+
+
+def test_branch_and_bound_beside_is_refinement_full(ghosts):
+    one, optimum = ghosts
+    one.refinement = "local"
+    team = Team(lambda *_: Idle(), one, Run(0), 0, 1, None)
+    for _ in range(100):
+        team.iterate()
+    assert one.weight > optimum + 0.1 and one.proven == -np.inf
 
 
 def test_what_is_worse_or_incomplete_is_not_kept():

@@ -1,4 +1,4 @@
-"""Bounds of what a metaheuristic leaves open."""
+"""Branch and bound beside a metaheuristic and after it: proofs, and the covers that it meets on the way."""
 
 from __future__ import annotations
 
@@ -14,7 +14,44 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
+# nodes of the proof of what a metaheuristic leaves open, and of the search beside it, after each of its iterations
 _PROOF_NODES = 2000
+_NODES = 10
+# rows for which the search beside it pays: fewer are bounded before, and with more it seldom ends in time
+_LEAST, _MOST = 30, 150
+
+
+class Branching:
+    """Branch and bound on one component, some nodes at a time; it takes over the best cover, and gives what it finds.
+
+    Parameters
+    ----------
+    component : Component
+    run : Run
+    """
+
+    def __init__(self, component: Component, run: Run) -> None:
+        self._component, self._run = component, run
+        self._search: BranchAndBound | None = None
+
+    @staticmethod
+    def pays(component: Component) -> bool:
+        """Whether a component is large enough for a search beside the metaheuristic, and small enough."""
+        return component.refinement == "full" and _LEAST <= component.packing.num_rows < _MOST
+
+    def advance(self) -> None:
+        """Do some nodes; what is known then is the component's."""
+        component = self._component
+        if component.best is None or component.closed or self._run.should_stop():
+            return
+        if self._search is None:
+            self._search = _search(component, self._run)
+        search = self._search
+        search.weight = min(search.weight, component.weight)
+        search.run(_NODES)
+        if search.columns is not None and search.weight < component.weight:
+            component.offer(Cover.of(component.packing, search.columns).owner, search.weight)
+        component.proven = max(component.proven, min(search.lower_bound, component.weight))
 
 
 def bound_of_component(component: Component, run: Run) -> float:
@@ -25,7 +62,14 @@ def bound_of_component(component: Component, run: Run) -> float:
         return component.weight if component.packing.granularity else min(known, component.weight)
     if run.should_stop():
         return max(component.bound, component.proven)
-    search = BranchAndBound(
+    search = _search(component, run)
+    while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
+        search.run(50)
+    return min(max(component.bound, component.proven, search.lower_bound), component.weight)
+
+
+def _search(component: Component, run: Run) -> BranchAndBound:
+    return BranchAndBound(
         component.packing,
         component.duals,
         component.weight,
@@ -34,9 +78,6 @@ def bound_of_component(component: Component, run: Run) -> float:
         run.memory_allows,
         to_the_end=True,
     )
-    while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
-        search.run(50)
-    return min(max(component.bound, component.proven, search.lower_bound), component.weight)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:

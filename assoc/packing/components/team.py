@@ -1,8 +1,8 @@
 """Several searchers on copies of one component, each on a thread of its own: they exchange their best covers.
 
-In every round each member does one iteration, and what it found is refined; then all take over the best cover of the
-round. Members have random generators of their own and wait for one another, so that the result is a matter of the seed
-and of their number, and not of which was quicker.
+In every round each member does one iteration, and what it found is refined; branch and bound goes on by some nodes
+where that pays; then all take over the best cover of the round. Members have random generators of their own and wait
+for one another, so that the result is a matter of the seed and of their number, and not of which was quicker.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from assoc.packing.components.component import Component
+from assoc.packing.components.proof import Branching
 from assoc.packing.run import Run
 
 
@@ -55,6 +56,7 @@ class Team:
         pool: ThreadPoolExecutor | None,
     ) -> None:
         self._component, self._clusters, self._pool = component, clusters, pool
+        self._branching = Branching(component, run) if Branching.pays(component) else None
         if pool is None:
             self._members = [(component, make(component, run.rng), run)]
             return
@@ -69,16 +71,18 @@ class Team:
 
     def iterate(self) -> None:
         """One iteration of every member, and what it found refined; the best goes to the component and to all."""
-        if self._pool is None:
-            self._step(0)
-            return
         whole = self._component
         for own, _, _ in self._members:
             own.iterations, own.stalled = whole.iterations, whole.stalled
-        list(self._pool.map(self._step, range(len(self._members))))
+        if self._pool is None:
+            self._step(0)
+        else:
+            list(self._pool.map(self._step, range(len(self._members))))
         for own, _, _ in self._members:
             if own.best is not None:
                 whole.offer(own.best, own.weight)
+        if self._branching is not None:
+            self._branching.advance()
         for own, _, _ in self._members:
             if whole.best is not None:
                 own.offer(whole.best, whole.weight)

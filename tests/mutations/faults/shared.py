@@ -43,6 +43,13 @@ FAULTS = (
         "pass",
         _OF_SEARCH,
     ),
+    Fault(
+        "no branch and bound beside",
+        _TEAM,
+        "            self._branching.advance()\n",
+        "            pass\n",
+        _OF_SEARCH,
+    ),
     Fault("the best cover is not refined", _TEAM, "        component.refine(run, self._clusters)\n", "", _OF_SEARCH),
     Fault(
         "workers refine one and the same cover",
