@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from statistics import median
 from typing import Any
 
 import assoc
@@ -26,6 +28,8 @@ from experiments.common.instances import scenes, synthetic
 
 PROVING = ("exact", "milp")
 UNLIMITED = 1_000_000_000
+# runs of fewer seconds are made so many times
+SHORT, TIMES = 0.1, 5
 # families whose rows tell the gap of the linear program
 GHOSTS = ("ghost", "wide gap")
 
@@ -158,17 +162,28 @@ def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[
         case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, ""
     )
     rows = [
-        _run_peer(entry, problem, blank) for entry in case.peers if peers.available(entry.solver, problem)
+        timed(partial(_run_peer, entry, problem, blank))
+        for entry in case.peers
+        if peers.available(entry.solver, problem)
     ]
     first = [entry for entry in case.ours if entry.solver in PROVING]
-    rows += [_run_ours(entry, problem, blank, None) for entry in first]
+    rows += [timed(partial(_run_ours, entry, problem, blank, None)) for entry in first]
     optimum = instance.optimum
     if optimum is None:
         optimum = _proven_optimum(rows)
-    rows += [_run_ours(entry, problem, blank, optimum) for entry in case.ours if entry not in first]
+    rows += [timed(partial(_run_ours, entry, problem, blank, optimum)) for entry in case.ours if entry not in first]
     reference = optimum if optimum is not None else min(row.cost for row in rows)
     gap = (reference - linear_bound(problem)) / max(1.0, abs(reference)) if case.family in GHOSTS else 0.0
     return [replace(row, reference=reference, proven=optimum is not None, extra=gap) for row in rows]
+
+
+def timed(run: Callable[[], Row]) -> Row:
+    """The row of a run; a short one, which an interruption would double, is made several times."""
+    row = run()
+    if row.seconds >= SHORT:
+        return row
+    rows = [row, *(run() for _ in range(TIMES - 1))]
+    return replace(row, seconds=median(one.seconds for one in rows), cpu=median(one.cpu for one in rows))
 
 
 def _proven_optimum(rows: list[Row]) -> float | None:

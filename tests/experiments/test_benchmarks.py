@@ -12,7 +12,7 @@ from experiments.benchmarks import FIRST_SEED, goals, markdown, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
-from experiments.benchmarks.run import run_all, run_case
+from experiments.benchmarks.run import run_all, run_case, timed
 from experiments.common.instances import synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
@@ -189,6 +189,21 @@ def test_run_case_checks_and_compares() -> None:
         assert row.cost >= row.reference - 1e-9
         assert row.bound <= row.reference + 1e-6
     assert all(row.hit for row in found if row.solver == "highs")
+
+
+@pytest.mark.parametrize(("first", "runs", "counts"), [(0.01, 5, 0.02), (0.3, 1, 0.3)])
+def test_the_median_of_short_runs_counts(first: float, runs: int, counts: float) -> None:
+    # the fourth was interrupted
+    times = iter([first, 0.02, 0.01, 0.9, 0.03, 0.5])
+    done = []
+
+    def run() -> Row:
+        done.append(next(times))
+        return replace(ROW, seconds=done[-1], cpu=2.0 * done[-1])
+
+    row = timed(run)
+    assert len(done) == runs
+    assert row == replace(ROW, seconds=counts, cpu=2.0 * counts)
 
 
 def test_cases_cover_the_families() -> None:
