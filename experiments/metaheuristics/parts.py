@@ -16,7 +16,6 @@ from assoc.packing.components.component import Component
 from assoc.packing.components.proof import Branching
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
-from assoc.packing.neighbourhoods.large import LargeNeighbourhood
 from assoc.solvers.aco import max_min
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu import moves
@@ -160,7 +159,6 @@ OWN = (
 SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
-    Part("no large neighbourhoods", SOLVERS, without=_replaced(LargeNeighbourhood, "improve", _unchanged)),
     Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
     Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),
     Part('refinement="local"', SOLVERS, {"refinement": "local"}),

@@ -21,16 +21,12 @@ from assoc.packing.neighbourhoods.cover import Cover, chosen_columns, is_complet
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
 from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.neighbourhoods.insertion import insert_and_eject, search_arrays
-from assoc.packing.neighbourhoods.large import LargeNeighbourhood
 from assoc.packing.neighbourhoods.neighbourhood import Neighbourhood
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
 from assoc.packing.packing import PackingArrays
 from assoc.packing.run import Run
 
 Owner = NDArray[np.int32]
-
-# rows from which large neighbourhoods pay
-_LARGE = 30
 
 
 class Move(NamedTuple):
@@ -58,8 +54,6 @@ NEIGHBOURHOODS = (
     Move(Dimensionwise, on_new=lambda clusters: 1, on_best=lambda clusters, rows: 0),
     # some twenty targets that lie close together are solved exactly
     Move(ClusterSearch, lambda clusters: clusters, lambda clusters, rows: clusters * max(1, rows // 30), at_once=10),
-    # half of all rows or more are covered anew by branch and bound
-    Move(LargeNeighbourhood, lambda clusters: 0, lambda clusters, rows: -(-clusters // 3) if rows >= _LARGE else 0),
 )
 """The moves that improve covers, in the order in which they are tried. Insertion with ejection (insertion.py)
 is not among them: covers are built with it."""

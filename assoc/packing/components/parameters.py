@@ -21,7 +21,7 @@ class SearchParameters(Parameters):
         A component is left after so many iterations without improvement.
     refinement : str
         What improves the metaheuristic's covers. "none": nothing, the metaheuristic is alone; "local": insertion with
-        ejection, and matching halves of all tuples anew; "full": exact sub-steps and large neighbourhoods, too.
+        ejection, and matching halves of all tuples anew; "full": exact sub-steps and dives, too.
     clusters : int
         With refinement "full": exact sub-steps on each new cover, and for every 30 measurements on the best cover after
         each iteration.

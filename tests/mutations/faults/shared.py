@@ -11,7 +11,6 @@ _SEARCH = "assoc/packing/components/search.py"
 _TEAM = "assoc/packing/components/team.py"
 _DIVER = "assoc/packing/neighbourhoods/diving.py"
 _COMPONENT = "assoc/packing/components/component.py"
-_LARGE = "assoc/packing/neighbourhoods/large.py"
 _SIMPLEX = "assoc/packing/simplex/dual.py"
 _PRICING = "assoc/packing/simplex/pricing.py"
 _TRIAL = "assoc/packing/simplex/trial.py"
@@ -23,7 +22,6 @@ _OF_COUNTS = "tests/packing/test_counts_small.py"
 
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
-_OF_LARGE = "tests/packing/test_large.py"
 _OF_DIVES = "tests/packing/test_diving.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
@@ -151,20 +149,6 @@ FAULTS = (
         _OF_SEARCH,
     ),
     Fault("refinement none inserts", _COMPONENT, 'return self.refinement != "none"', "return True", _OF_SEARCH),
-    Fault(
-        "what a large neighbourhood finds is lost",
-        _LARGE,
-        "                own_all(packing.cols, smaller.origin[part.origin[search.columns]], owner)\n",
-        "",
-        _OF_LARGE,
-    ),
-    Fault(
-        "large neighbourhoods have no columns beyond the bound",
-        _LARGE,
-        "limit = max(weight - priced.bound, 0.0) + priced.tolerance",
-        "limit = priced.tolerance",
-        _OF_LARGE,
-    ),
     Fault(
         "the simplex method moves its multipliers the other way",
         _SIMPLEX,
