@@ -50,7 +50,8 @@ def make_parser(name: str, title: str) -> argparse.ArgumentParser:
     """Return the parser of the options that the experiments share; an experiment may add its own."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=f"{title}.")
     parser.add_argument("--quick", action="store_true", help="fewer or shorter runs, for a first look")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default 0)")
+    text = "seed of all random numbers (default %(default)s)"
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help=text)
     parser.add_argument("--json", metavar="FILE", help="write the results here")
     parser.add_argument("--figure", metavar="FILE", help=f"write the figure here (default {_picture(name)})")
     add_publish(parser, name)

@@ -3,9 +3,12 @@
     python -m experiments.metaheuristics.against_peers [--problems NAME ...] [--count N] [--answers FILE] [--publish]
 
 Everybody has one core and the same tuples. Ours get their seconds as processor time; peers count their own limit on the
-clock, and the processor time that they took is told, too. The seeds were used for nothing else. CHILS also runs for
-one second, beside ours. A figure is the mean excess, in percent, over the best cost that anybody found; intervals are
-95 %, from resampling problems; the goal is judged on the worst problem.
+clock, and the processor time that they took is told, too. The seeds were used for nothing else. A figure is the mean
+excess, in percent, over the best cost that anybody found; intervals are 95 %, from resampling problems; the goal is
+judged on the worst problem.
+
+CHILS, the nearest rival, also runs for one second and for five, and again on two cores beside two workers of ours; what
+it costs more than ours is told for the same time, and for its minute beside our five seconds.
 
 With --answers each answer is kept in a file as soon as it is there, and what the file holds is not run again: a long
 run may be stopped and taken up again.
@@ -18,6 +21,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,10 +54,13 @@ class Entry(NamedTuple):
         Solver or peer.
     seconds : float
         Its limit.
+    cores : int
+        On which it runs; as many workers of ours.
     """
 
     who: str
     seconds: float
+    cores: int = 1
 
     @property
     def ours(self) -> bool:
@@ -63,15 +70,17 @@ class Entry(NamedTuple):
     @property
     def words(self) -> str:
         """How it is reported."""
-        return f"{self.who}, {self.seconds:g} s"
+        return f"{self.who}, {self.seconds:g} s" + (f" on {self.cores} cores" if self.cores > 1 else "")
 
 
 PEERS = ("chils", "branch_reduce", "mmwis", "kap", "cp_sat_1", "highs", "scip_1")
+BESIDE = ((1.0, 1.0), (5.0, 5.0), (5.0, 60.0))
+"""Seconds of ours, and those of CHILS with which they are compared."""
+CORES = (1, 2)
 ENTRIES = (
-    *(Entry(name, 5.0) for name in SOLVERS),
-    *(Entry(name, 1.0) for name in SOLVERS),
-    Entry("chils", 1.0),
-    *(Entry(name, 60.0) for name in PEERS),
+    *(Entry(name, seconds, cores) for cores in CORES for seconds in (5.0, 1.0) for name in SOLVERS),
+    *(Entry("chils", seconds, cores) for cores in CORES for seconds in (1.0, 5.0, 60.0)),
+    *(Entry(name, 60.0) for name in PEERS if name != "chils"),
 )
 
 
@@ -99,9 +108,9 @@ class Answers:
 
 def _ask(one: AssignmentProblem, entry: Entry, seed: int) -> tuple[float, float]:
     began = time.process_time()
-    with one_core():
+    with one_core() if entry.cores == 1 else nullcontext():
         if entry.ours:
-            cost = run(one, entry.who, entry.seconds, seed)
+            cost = run(one, entry.who, entry.seconds, seed, workers=entry.cores)
         elif peers.available(entry.who, one):
             try:
                 cost = peers.PEERS[entry.who](one, entry.seconds).cost
@@ -127,6 +136,15 @@ def claims_of(name: str, costs: dict[Entry, list[float]], taken: dict[Entry, lis
         if not entry.ours:
             seconds = float(np.mean(taken[entry]))
             found.append(Claim(f"{name}: {entry.words}, processor time", "s", None, seconds))
+    for ours in filter(lambda entry: entry.ours, table):
+        for seconds in (theirs for own, theirs in BESIDE if own == ours.seconds):
+            chils = Entry("chils", seconds, ours.cores)
+            if chils in table and np.isfinite(table[chils]).all():
+                more = 100.0 * (table[chils] - table[ours]) / np.abs(table[ours])
+                words = f"{name}: {chils.words}, less {ours.words}"
+                interval = mean_interval(more[:, None])
+                found.append(Claim(words, "%", None, float(more.mean()), interval))
+                found.append(Claim(f"{words}, least", "%", None, float(more.min()), band=(-1e-7, None)))
     rivals = [values for entry, values in table.items() if not entry.ours]
     if rivals and np.isfinite(least := np.min(rivals, axis=0)).all():
         for entry, values in table.items():

@@ -188,6 +188,20 @@ def test_claims_against_peers():
     assert claims["ghosts 40: chils, 60 s, processor time"].ours == 2.0
     worst = claims["ghosts 40: aco, 5 s, worst less the best peer"]
     assert worst.ours == pytest.approx(1.0) and not worst.holds
+    # CHILS is 1 below -99, and 1 above -50
+    less = claims["ghosts 40: chils, 60 s, less aco, 5 s"]
+    assert less.ours == pytest.approx(50.0 * (-1.0 / 99.0 + 1.0 / 50.0))
+    assert not claims["ghosts 40: chils, 60 s, less aco, 5 s, least"].holds
+
+
+def test_two_cores_are_compared_with_two_cores():
+    ours, peer = against_peers.Entry("tabu", 1.0, 2), against_peers.Entry("chils", 1.0, 2)
+    costs = {ours: [-50.0, -50.0], peer: [-49.0, -49.0], against_peers.Entry("chils", 1.0): [-60.0, -60.0]}
+    names = [claim.quantity for claim in against_peers.claims_of("ghosts 40", costs, {one: [1.0] for one in costs})]
+    assert [name for name in names if "less tabu" in name] == [
+        "ghosts 40: chils, 1 s on 2 cores, less tabu, 1 s on 2 cores",
+        "ghosts 40: chils, 1 s on 2 cores, less tabu, 1 s on 2 cores, least",
+    ]
 
 
 @pytest.mark.parametrize(
