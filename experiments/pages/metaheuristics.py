@@ -101,5 +101,9 @@ def _plain(claim: Claim) -> str:
     return number(claim.ours, 2)
 
 
-SOLVERS = {f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS} | {"workers": workers}
+SOLVERS = {
+    **{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS},
+    "workers": workers,
+    "chils": beside_chils,
+}
 ANT_COLONY = {"settings": settings}
