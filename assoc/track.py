@@ -79,6 +79,9 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
     else:
         tracker, plots, total = _of_plots(file, parsed, settings)
         count, table, scene = len(plots.windows), plots.table, None
+        if parsed["identity"] == "ignore":
+            # nothing is judged by what was left out
+            plots = plots._replace(rates=None, kept=None)
         table.origin = parsed["origin"]
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
@@ -247,7 +250,7 @@ def _write_rates(path: str, plots: PlotTracks) -> None:
 
 
 def _report_rates(plots: PlotTracks | None, identity: str) -> None:
-    if plots is None or identity == "ignore":
+    if plots is None:
         return
     if plots.kept is not None:
         kept, judged = plots.kept

@@ -136,7 +136,7 @@ def changed_setting(saved: str, own: str) -> str:
 
 
 def described(thing: object) -> str:
-    """A filter, with all that it and its motion model are made of, as text."""
+    """A filter or sensor, with all that it and its motion model are made of, as text."""
     if isinstance(thing, (Filter, Motion)):
         parts = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
         parts.pop("rng", None)
@@ -261,7 +261,7 @@ class Checkpoint(ABC):
         return {
             "tracker": self.name,
             "filter": described(self.filter),
-            "sensors": "; ".join(f"{sensor!r}" for sensor in self.sensors),
+            "sensors": described(self.sensors),
             "region": str(self._place.region.tolist()),
             "solver": f"{self.solver} {sorted(self.solver_parameters.items())}",
             "seed": str(self.seed),

@@ -38,8 +38,8 @@ class LifeCycle:
         track is given up when its score has fallen by -ln(missed_probability) since its best.
     m, n : int
     deletion : "time", "count" or "score"
-        What ends a confirmed track: `deletion_time` seconds without a detection (however the measurements
-        are grouped), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
+        What ends a track, tentative or confirmed: `deletion_time` seconds without a detection (however the
+        measurements are grouped), `deletion_count` scans in a row without one, or a score fallen by `deletion_drop`.
     deletion_time : float, optional
         Seconds. Left out, it is the time in which a target that is there is missed all along with
         probability 1e-4, and at least three scans, at the usual pace of the scans.
@@ -55,7 +55,7 @@ class LifeCycle:
     missed_probability: float = field(default=2e-3, metadata={"help": "share of true tracks given up too early"})
     m: int = field(default=3, metadata={"help": "m-of-n: scans with a detection"})
     n: int = field(default=4, metadata={"help": "m-of-n: of the last n scans"})
-    deletion: Deletion = field(default="time", metadata={"help": "what ends a confirmed track"})
+    deletion: Deletion = field(default="time", metadata={"help": "what ends a track"})
     deletion_time: float | None = field(
         default=None, metadata={"help": "seconds without a detection (default: from the pace of the scans and P_d)"}
     )

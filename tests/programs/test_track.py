@@ -327,6 +327,10 @@ def test_identities_judge_or_are_used_or_are_left_out(tmp_path, capsys):
     assert "2 of 2 tracks with an identity kept one\n" in printed[None] and "CT " in printed["score-only"]
     assert "kept one" not in printed["ignore"] and "CT " not in printed["ignore"]
     assert "kept one (identities were used to make them)" in printed["use"]
+    for identity, told in (("score-only", True), ("ignore", False)):
+        words = [str(tmp_path / "plots.csv"), "-o", str(tmp_path / "tracks.csv"), *NOISE, "--identity", identity]
+        assert track.main([*words, "--report", str(tmp_path / "r.html")]) == 0
+        assert ("CT, MT and IT of the windows" in (tmp_path / "r.html").read_text(encoding="utf-8")) == told
     rates = ["--identity", "ignore", "--rates", str(tmp_path / "rates.csv")]
     assert track.main([str(tmp_path / "plots.csv"), "-o", str(tmp_path / "t.csv"), *NOISE, *rates]) == 2
     assert "--rates: judges by the identities" in capsys.readouterr().err and not (tmp_path / "t.csv").exists()

@@ -1,6 +1,7 @@
 """A file that is no saved tracker is refused by one line, whatever is wrong with it; the tracker stays as it was."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,15 @@ def test_settings_that_cannot_be_read(settings, tmp_path):
     save_npz(path, FORMAT, VERSION, tracker._arrays() | {"settings": np.array(settings)})
     with pytest.raises(InvalidInputError, match="was saved by a tracker with other settings"):
         kind.for_scene(SCENE).restore(path)
+
+
+def test_another_noise_of_a_sensor_is_another_setting(tmp_path):
+    kind, path = TRACKERS["multi-sensor"], tmp_path / "state.npz"
+    tracker = kind(SCENE.sensors, region=SCENE.region)
+    tracker.save(path)
+    coarser = (replace(SCENE.sensors[0], noise=2.0 * SCENE.sensors[0].noise), *SCENE.sensors[1:])
+    with pytest.raises(InvalidInputError, match="other settings: sensors was"):
+        kind(coarser, region=SCENE.region).restore(path)
 
 
 def test_another_process_noise_is_another_setting(tmp_path):

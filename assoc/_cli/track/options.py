@@ -146,11 +146,13 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     parser.elsewhere = lambda: flags_of_solvers(solver)
     parsed = vars(parser.parse_args(words))
     given = parsed["cutoff"]
+    if parsed["live"] and given is not None:
+        raise InvalidInputError("--cutoff: is not for --live")
     parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
     check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [parsed["file"]])
-    parsed["ending"] = check_ending(parsed["output"], "--output", *FORMATS)
+    parsed["ending"] = check_ending(parsed["output"], "--output", *((".csv",) if parsed["live"] else FORMATS))
     check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
     check_ending(parsed["rates"], "--rates", ".csv", strict=False)
     if parsed["ending"] == ".parquet":
