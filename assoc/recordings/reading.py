@@ -221,7 +221,8 @@ class _Table:
                 f"{max_disorder:g} s; split the file there, or allow more with max_disorder"
             )
         order = np.argsort(columns["time"], kind="stable")
-        content = np.stack([np.nan_to_num(columns[meaning], nan=-1.0) for meaning in self.places], axis=1)[order]
+        # a value that is missing is equal to another missing one, and to no number
+        content = np.stack([np.nan_to_num(columns[meaning], nan=-math.inf) for meaning in self.places], axis=1)[order]
         _, first = np.unique(content, axis=0, return_index=True)
         keep = order[np.sort(first)]
         scale = {meaning: UNITS[meaning][unit] for meaning, unit in units.items()}

@@ -121,11 +121,22 @@ def test_tracks_there_and_back(tmp_path):
         np.testing.assert_allclose(back[name], frame[name], atol=step / 2 + 1e-9)
     write_tracks(tmp_path / "again.ast", back, (7, 7))
     assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
-    with pytest.raises(InvalidInputError, match="x does not fit"):
-        write_tracks(tmp_path / "far.ast", frame.assign(x=1e7))
+    for x in (1e7, np.nan):
+        with pytest.raises(InvalidInputError, match="x does not fit"):
+            write_tracks(tmp_path / "far.ast", frame.assign(x=x))
     with pytest.raises(InvalidInputError, match="'vz' is missing"):
         write_tracks(tmp_path / "far.ast", frame.drop(columns="vz"))
     assert not (tmp_path / "far.ast").exists()
+
+
+def test_tracks_of_which_not_all_is_known(tmp_path):
+    frame = pd.DataFrame(
+        [[1, 0.0, 1e3, 2e3, np.nan, 50.0, -50.0, 1.27], [2, 1.0, 1e3, 2e3, 1905.0, np.nan, np.nan, np.nan]],
+        columns=["track_id", "time", *"xyz", "vx", "vy", "vz"],
+    )
+    write_tracks(tmp_path / "tracks.ast", frame)
+    back = read_tracks(tmp_path / "tracks.ast")
+    pd.testing.assert_frame_equal(back[frame.columns], frame, check_dtype=False, atol=1e-9)
 
 
 def test_a_file_cut_in_the_middle_gives_what_is_whole(plots, file, tmp_path):

@@ -99,6 +99,12 @@ def test_disorder_repeats_fillers_and_midnight(tmp_path):
     assert "midnights passed: 1" in recording.summary()
 
 
+def test_a_missing_altitude_is_not_one_below_zero(tmp_path):
+    text = HEAD + "100,10,5,1,-1\n100,10,5,1,\n100,10,5,1,\n110,10,5,1,100\n"
+    recording = read_plots(written(tmp_path, text))
+    assert recording.lines.tolist() == [2, 3, 5] and recording.notes["repeated rows left out"] == 1
+
+
 def test_a_jump_back_is_an_error_with_its_line(tmp_path):
     path = written(tmp_path, HEAD + "100,10,5,1,100\n7200,10,5,1,100\n7201,10,5,1,100\n3600,10,5,1,100\n")
     with pytest.raises(InvalidInputError, match="line 5: the time jumps back by 3601 s, expected at most 30"):

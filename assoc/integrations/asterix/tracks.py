@@ -34,7 +34,8 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     path : path-like
     tracks : DataFrame
         Columns track_id, time, x, y, z, vx, vy, vz (tracks.csv, `assoc.tracking.TrackTable.to_frame`), and confirmed
-        where it is known. Track numbers have 16 bits: ids are taken modulo 65,536.
+        where it is known. Of all but the place NaN says nothing. Track numbers have 16 bits: ids are taken modulo
+        65,536.
     source : (int, int)
         System area code and system identification code of the tracker.
 
@@ -50,10 +51,13 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     for name in COLUMNS[:-1]:
         if name not in tracks:
             raise InvalidInputError(f"tracks: the column {name!r} is missing")
-    raw = {}
+    raw, told = {}, {}
     for name, (step, bits) in _STEPS.items():
         values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
         most = 1 << (bits - 1)
+        told[name] = ~np.isnan(values)
+        if name not in ("x", "y"):
+            values = np.where(told[name], values, 0.0)
         if len(values) and not ((values >= -most) & (values < most)).all():
             expected = f"expected at most {most * step:g} in size"
             raise InvalidInputError(f"tracks: {name} does not fit category 062, {expected}")
@@ -68,11 +72,13 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
                 "040": int(number) % MOST_TRACKS,
                 "080": ((0, 0, 0, 0, ("CNF", 0 if known[k] else 1), None),),
                 "100": (("X", int(raw["x"][k])), ("Y", int(raw["y"][k]))),
-                "185": (("VX", int(raw["vx"][k])), ("VY", int(raw["vy"][k]))),
-                "130": int(raw["z"][k]),
-                "220": int(raw["vz"][k]),
             }
         )
+        if told["vx"][k] and told["vy"][k]:
+            contents[-1]["185"] = (("VX", int(raw["vx"][k])), ("VY", int(raw["vy"][k])))
+        for item, name in (("130", "z"), ("220", "vz")):
+            if told[name][k]:
+                contents[-1][item] = int(raw[name][k])
     write_blocks(path, 62, contents)
 
 

@@ -7,7 +7,7 @@ aircraft, 1,130 s, a rotation of 9.5 s, P_d 0.78, ranges in whole nautical miles
 words; docs/metrics.md says what they mean here. Its grouping without window is irregular: here of gamma-distributed
 lengths with the paper's mean of 6.2 s. "Time stamps" are each plot's own; without them a fixed time passes from group
 to group and tracks are deleted after three groups without a plot, as in the paper. The strong baseline has time stamps
-and deletes by time, but has no window. The thesis's tracker is Reid's with Murty's m best (m is not given; 20 chosen by
+and deletes by time, but has no window. The thesis's tracker is Reid's with Murty's m best (m is not given; 50 chosen by
 us); the track-oriented MHT (depth 4, branch_drop 25) stands beside it. Full size: 12 recordings (6 for Reid's MHT), 100
 pairs of each kind (600 s, 5 nmi apart when parallel), 100 false starts; the IDs are judged by the majority of 6 plots.
 """
