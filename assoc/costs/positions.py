@@ -89,8 +89,14 @@ def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array
 
 
 def scan_of(scene: Scene, scan: int | Scan) -> Scan:
-    """Scan of that number, or the scan itself."""
-    return scan if isinstance(scan, Scan) else scene.scan(scan)
+    """Scan of that number, or the scan itself, where its measurements are those of the scene's sensors."""
+    if not isinstance(scan, Scan):
+        return scene.scan(scan)
+    dims = [one.dim for one in scene.sensors]
+    found = [z.shape[1] for z in scan.measurements]
+    if len(found) == len(dims) and found != dims:
+        raise InvalidInputError(f"scan has measurements of {found} components, the scene's sensors measure {dims}")
+    return scan
 
 
 def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
@@ -127,4 +133,4 @@ def checked_tuples(tuples: Array, sizes: Array) -> Array:
         raise InvalidInputError(f"tuples: row {k} has index {wanted[k, s]} for sensor {s}, expected 0 to {sizes[s]}")
     if len(wanted) and not wanted.any(axis=1).all():
         raise InvalidInputError(f"tuples: row {int(np.argmin(wanted.any(axis=1)))} has no measurement")
-    return wanted
+    return wanted.astype(np.int64, copy=False)

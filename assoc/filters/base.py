@@ -18,6 +18,7 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.filters.kernels.gates import pairs
 from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
+from assoc.filters.kernels.linear_algebra import all_factors
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
@@ -217,7 +218,9 @@ class Filter(ABC, Generic[S]):
         dim = self.observe(sensor).dim
         if z.ndim != 3 or z.shape[1:] != (len(state), dim) or len(z) == 0:
             raise InvalidInputError(f"measured must have shape (K, {len(state)}, {dim}), K > 0, got {z.shape}")
-        times = [float(dt)] * len(z) if isinstance(dt, (int, float)) else [float(step) for step in dt]
+        times = finite(dt, "dt", 1).tolist()
+        if np.ndim(dt) == 0:
+            times *= len(z)
         if len(times) != len(z):
             raise InvalidInputError(f"dt must be one number or {len(z)}, got {len(times)}")
         return z, times
@@ -248,7 +251,7 @@ class Filter(ABC, Generic[S]):
     def _compare_given(o: Observation, h: Array, covariance: Array, z: Array) -> tuple[Array, Array]:
         """Compare with a user's model, whose residual may be his own."""
         v = np.stack([o.model.residual(z, np.broadcast_to(one, z.shape)) for one in h])
-        factor = np.linalg.cholesky(covariance)
+        factor = factors(covariance)
         white = np.linalg.solve(factor, v.transpose(0, 2, 1))
         square = (white**2).sum(axis=1)
         log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
@@ -256,9 +259,12 @@ class Filter(ABC, Generic[S]):
 
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
-        if self._seen[0] is not sensor:
-            self._seen = (sensor, observation(sensor, self.motion))
-        return self._seen[1]
+        # read once: another thread may ask with another sensor
+        seen = self._seen
+        if seen[0] is not sensor:
+            seen = self._seen = (sensor, observation(sensor, self.motion))
+        found: Observation = seen[1]
+        return found
 
     def move(self, state: S, dt: float) -> tuple[S, Array]:
         """`predict`, and the covariance of the states before and after it, (B, n, n), for smoothing."""
@@ -294,6 +300,14 @@ def complain(status: int, where: str = "") -> NoReturn:
     if status == BAD_COVARIANCE:
         raise InvalidInputError(f"state: covariance of target {row} is not positive definite{where}")
     raise InvalidInputError(f"state: mean of target {row} gives no finite measurement{where}")
+
+
+def factors(covariance: Array) -> Array:
+    """Cholesky factors of covariances (B, d, d); refuses those that are not positive definite."""
+    bad, found = all_factors(np.ascontiguousarray(covariance))
+    if bad >= 0:
+        complain(BAD_COVARIANCE + STATUSES * bad)
+    return found
 
 
 def check_dimension(state: Gaussian, dim: int) -> Gaussian:

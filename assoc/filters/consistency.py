@@ -20,12 +20,25 @@ def nees(state: State, truth: Array) -> Array:
     state
         B targets.
     truth : array (B, n)
+
+    Raises
+    ------
+    InvalidInputError
+        Another shape, or a covariance that is singular.
     """
     truth = finite(truth, "truth", 2)
     if truth.shape != state.mean.shape:
         raise InvalidInputError(f"truth must have shape {state.mean.shape}, got {truth.shape}")
     error = truth - state.mean
-    result: Array = np.einsum("bi,bi->b", error, np.linalg.solve(state.covariance, error[..., None])[..., 0])
+    size = np.sqrt(np.maximum(np.einsum("bii->bi", state.covariance), 1e-300))
+    # in units of the standard deviations rounding is small against all that tells of a state
+    unit, error = state.covariance / size[:, :, None] / size[:, None, :], error / size
+    flat = np.linalg.matrix_rank(unit, hermitian=True) < unit.shape[1]
+    if flat.any():
+        raise InvalidInputError(
+            f"state: covariance of target {int(np.argmax(flat))} is singular, as of an ensemble with few members"
+        )
+    result: Array = np.einsum("bi,bi->b", error, np.linalg.solve(unit, error[..., None])[..., 0])
     return result
 
 
@@ -34,7 +47,7 @@ def bounds(dim: int, runs: int, probability: float = 0.95) -> tuple[float, float
     """Interval that the mean of `runs` chi-square variables of `dim` degrees of freedom hits."""
     from scipy.stats import chi2
 
-    if dim < 1 or runs < 1 or not 0 < probability < 1:
+    if not (dim >= 1 and runs >= 1 and 0 < probability < 1):
         raise InvalidInputError(
             f"dim and runs must be above 0, probability between 0 and 1, got {dim}, {runs}, {probability}"
         )

@@ -117,9 +117,10 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
     def _roots(self, state: Ensemble, dt: float) -> Array:
         """Lower factors of the process noise, which may be singular."""
         Q = self.motion.noise(state.mean, dt) if not self.motion.linear else self.motion.noise(_NOTHING2, dt)
-        if self._factors[0] is not Q:
-            self._factors = (Q, _lower_roots(Q))
-        return self._factors[1]
+        known = self._factors
+        if known[0] is not Q:
+            known = self._factors = (Q, _lower_roots(Q))
+        return known[1]
 
     def move(self, state: Ensemble, dt: float) -> tuple[Ensemble, Array]:
         """`predict`, and the sample covariance of the members before and after it, (B, n, n)."""

@@ -161,7 +161,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         super().__init__(filters[0].motion)
         self.filters = tuple(filters)
         m = len(filters)
-        self.transition = finite(transition, "transition", 2)
+        self.transition = finite(transition, "transition", 2).copy()
         if self.transition.shape != (m, m):
             raise InvalidInputError(f"transition must have shape {(m, m)}, got {self.transition.shape}")
         if (self.transition < 0).any() or np.abs(self.transition.sum(axis=1) - 1).max() > 1e-9:
@@ -172,9 +172,11 @@ class InteractingMultipleModel(Filter[Mixture]):
         self._eigen: tuple[Array, Array, Array | None] | None = None
         if weights is None:
             values, vectors = np.linalg.eig(self.transition.T)
+            if np.count_nonzero(values.real > 1 - 1e-12) > 1:
+                raise InvalidInputError("weights must be given: transition has several stationary probabilities")
             stationary = np.abs(vectors[:, np.argmax(values.real)].real)
             weights = stationary / stationary.sum()
-        self.weights = finite(weights, "weights", 1)
+        self.weights = finite(weights, "weights", 1).copy()
         if self.weights.shape != (m,) or (self.weights < 0).any() or abs(self.weights.sum() - 1) > 1e-9:
             raise InvalidInputError(f"weights must be {m} probabilities that sum to 1")
 
@@ -311,11 +313,19 @@ class InteractingMultipleModel(Filter[Mixture]):
         result: Array = np.logaddexp.reduce(joint, axis=1)
         return result
 
+    def compare(self, state: Mixture, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:
+        """`log_likelihood` and `distances`, these from the mixture as one Gaussian; (B, M) each."""
+        return self.log_likelihood(state, measurements, sensor), super().compare(state, measurements, sensor)[1]
+
 
 def _mixed(state: Mixture, weights: Array, transition: Array) -> tuple[Array, Array]:
     """Means and covariances that each model starts from, given the new weights and transitions (m, m) or (B, m, m)."""
     # share of model i in what model j starts from
     share = state.weights[:, :, None] * transition / np.maximum(weights, 1e-300)[:, None, :]
+    dead = weights < 1e-300
+    if dead.any():
+        # a model that nothing speaks for goes on from where it is
+        share = np.where(dead[:, None, :], np.eye(weights.shape[1]), share)
     means = share.transpose(0, 2, 1) @ state.means
     away = state.means[:, :, None] - means[:, None]
     # sum over i of share_ij (P_i + away away')

@@ -107,8 +107,8 @@ class GaussianFilter(Filter[Gaussian]):
         """What `step` needs to know of a sensor and a time step; the last plan is remembered."""
         o, n, d = self.observe(sensor), self.motion.dim, self.observe(sensor).dim
         models = None if self._linear is None or o.code < 0 else self._linear.models(dt)[2]
-        self._plan = (sensor, dt, o.packed, o.code, len(o.columns), models, d, n)
-        return self._plan
+        plan = self._plan = (sensor, dt, o.packed, o.code, len(o.columns), models, d, n)
+        return plan
 
     def run(
         self, state: Gaussian, measured: Array, sensor: Measurement, dt: float | Sequence[float]

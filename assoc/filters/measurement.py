@@ -29,7 +29,7 @@ class LinearMeasurement:
     """
 
     def __init__(self, matrix: Array, covariance: Array) -> None:
-        self.matrix = finite(matrix, "matrix", 2)
+        self.matrix = finite(matrix, "matrix", 2).copy()
         self.dim = len(self.matrix)
         self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
 
@@ -77,14 +77,25 @@ class FunctionMeasurement:
     def jacobian(self, states: Array) -> Array:
         """Derivatives of `measure`, (m, d, n)."""
         if self._jacobian is None:
-            return differences(self.measure, states)
-        return finite(self._jacobian(states), "the measurement function's jacobian", 3)
+            return differences(self.measure, states, self.residual)
+        slopes = finite(self._jacobian(states), "the measurement function's jacobian", 3)
+        wanted = (len(states), self.dim, states.shape[1])
+        if slopes.shape != wanted:
+            raise InvalidInputError(
+                f"the measurement function's jacobian must have shape {wanted}, got {slopes.shape}"
+            )
+        return slopes
 
     def residual(self, measured: Array, predicted: Array) -> Array:
         """Return measured - predicted."""
         if self._residual is None:
             return np.asarray(measured) - predicted
-        return finite(self._residual(measured, predicted), "the measurement function's residual")
+        difference = finite(self._residual(measured, predicted), "the measurement function's residual")
+        if difference.shape != np.shape(measured):
+            raise InvalidInputError(
+                f"the measurement function's residual must have shape {np.shape(measured)}, got {difference.shape}"
+            )
+        return difference
 
 
 Measurement = Sensor | LinearMeasurement | FunctionMeasurement
@@ -170,6 +181,10 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
         if code == POSITION and measurement.dim > len(columns):
             raise InvalidInputError(
                 f"sensor measures {measurement.dim} coordinates, the motion model has {len(columns)}"
+            )
+        if len(columns) not in (2, 3) or len({*columns.tolist()} & {*range(motion.dim)}) < len(columns):
+            raise InvalidInputError(
+                f"motion: position must be two or three different components of {motion.dim}, got {motion.position}"
             )
         if measurement.measures_velocity:
             columns = np.concatenate([columns, _velocity_columns(motion)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected
+from assoc.filters.base import Expected, factors
 from assoc.filters.kernels.gaussian import LOG_TURN, MODIFIED, SIMPLIFIED
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
@@ -43,12 +43,15 @@ class ModifiedEKF(GaussianFilter):
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
         o = super().observe(sensor)
+        # remembered again below, once it has passed
+        self._seen = (None, None)
         if o.code != RADAR3D:
             raise InvalidInputError(f"sensor must be a Radar3D for a modified EKF, got {type(sensor).__name__}")
         if o.dim != 3:
             raise InvalidInputError("sensor: a modified EKF takes no range rate; use ExtendedKalmanFilter")
         if np.count_nonzero(o.covariance[0] - np.diag(np.diag(o.covariance[0]))):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
+        self._seen = (sensor, o)
         return o
 
     def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
@@ -73,7 +76,7 @@ class ModifiedEKF(GaussianFilter):
             v[..., 0] -= 0.5 * r * (np.cos(e) ** 2 * (t**2 - st) + p**2 - sp)
             v[..., 1] -= np.tan(e) * t * p
             v[..., 2] += 0.5 * np.sin(e) * np.cos(e) * (t**2 - st)
-        factor = np.linalg.cholesky(covariance)
+        factor = factors(covariance)
         white = np.linalg.solve(factor, v.transpose(0, 2, 1))
         square = (white**2).sum(axis=1)
         log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)

@@ -28,8 +28,8 @@ def finite(value: object, what: str, *dimensions: int) -> Array:
 
 
 def positive_definite(value: object, what: str, shape: tuple[int, ...]) -> Array:
-    """Return a checked stack (B, n, n) of symmetric positive definite matrices."""
-    array = finite(value, what, 2, 3)
+    """Return a checked stack (B, n, n) of symmetric positive definite matrices, a copy."""
+    array = finite(value, what, 2, 3).copy()
     if array.ndim == 2:
         array = array[None]
     if array.shape != shape:
@@ -64,8 +64,7 @@ class Gaussian:
     covariance: Array
 
     def __post_init__(self) -> None:
-        mean = finite(self.mean, "mean", 1, 2)
-        mean = np.atleast_2d(mean)
+        mean = np.atleast_2d(finite(self.mean, "mean", 1, 2)).copy()
         shape = (len(mean), mean.shape[1], mean.shape[1])
         covariance = np.asarray(self.covariance)
         if covariance.ndim == 2 and covariance.shape == shape[1:]:

@@ -70,12 +70,14 @@ def _gospa(between: Array, cutoff: float, order: float) -> Gospa:
     pairs = np.stack([rows[near], columns[near]], axis=1)
     localisation = float(cost[rows[near], columns[near]].sum())
     missed, false = ((count - len(pairs)) / 2 for count in between.shape)
-    unit = float(np.float64(cutoff) ** order)
+    with np.errstate(over="ignore"):
+        unit = float(np.float64(cutoff) ** order)
     return Gospa(
         float(cutoff * (localisation + missed + false) ** (1.0 / order)),
-        unit * localisation,
-        unit * missed,
-        unit * false,
+        # what is none stays none, even if the unit is beyond all floats
+        unit * localisation if localisation else 0.0,
+        unit * missed if missed else 0.0,
+        unit * false if false else 0.0,
         pairs,
     )
 
@@ -120,6 +122,7 @@ def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     ----------
     Rahmathullah, Garcia-Fernandez & Svensson, FUSION 2017, section V, where the mean is over runs.
     """
+    check_cutoff(1.0, order)
     if len(values) == 0:
         return {"distance": 0.0, "localisation": 0.0, "missed": 0.0, "false": 0.0}
     parts = {

@@ -34,6 +34,8 @@ def identity_after_each(sources: Array, tracks: Array) -> Array:
         The aircraft; -1 where no track took the plot, or its track has false plots only.
     """
     source, track = np.asarray(sources), np.asarray(tracks)
+    if source.ndim != 1 or source.shape != track.shape:
+        raise InvalidInputError(f"sources and tracks must both have shape (n,), got {source.shape}, {track.shape}")
     recent: dict[int, deque[int]] = {}
     identity = np.full(len(source), -1, dtype=np.int64)
     for row, (aircraft, taker) in enumerate(zip(source.tolist(), track.tolist(), strict=True)):

@@ -62,11 +62,10 @@ class Trajectories(Shown):
             value = np.ascontiguousarray(value[order])
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-        keys = np.stack([np.round(self.times / SAME_TIME), self.ids.astype(np.float64)], axis=1)
-        unique, counts = np.unique(keys, axis=0, return_counts=True)
-        if len(unique) < len(keys):
-            row = unique[int(np.argmax(counts > 1))]
-            raise InvalidInputError(f"ids: {int(row[1])} is there twice at {row[0] * SAME_TIME:.6g} s")
+        once = last_at_each_instant(self.times, self.ids)
+        if len(once) < len(self.times):
+            row = int(np.setdiff1d(np.arange(len(self.times)), once)[0])
+            raise InvalidInputError(f"ids: {self.ids[row]} is there twice at {self.times[row]:.6g} s")
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Trajectories:
@@ -100,9 +99,12 @@ class Trajectories(Shown):
 
 def _numbers(value: object, name: str) -> Array:
     try:
+        if np.asarray(value).dtype.kind in "mM":
+            raise TypeError  # numpy would count their days or nanoseconds
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{name} must be numbers, got {type(value).__name__}") from error
+        kind = value.dtype if isinstance(value, np.ndarray) else type(value).__name__
+        raise InvalidInputError(f"{name} must be numbers, got {kind}") from error
     if not np.isfinite(array).all():
         raise InvalidInputError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
     return array

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from assoc._parameters import is_number
 from assoc._system.door import door
 from assoc._types import Array
+from assoc.errors import InvalidInputError
 from assoc.registration.terms import AXES, Term
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Sensor
@@ -110,7 +112,23 @@ def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     Returns
     -------
     Scene
+
+    Raises
+    ------
+    InvalidInputError
+        There is not one mapping for each sensor, or one has what its sensor does not measure.
     """
+    count = len(scene.sensors)
+    if len(biases) != count:
+        raise InvalidInputError(f"biases: expected one mapping for each of {count} sensors, got {len(biases)}")
+    for s, (sensor, own) in enumerate(zip(scene.sensors, biases, strict=True)):
+        known = (*AXES, *sensor.components[: sensor.dim])
+        for name, value in own.items():
+            if name not in known or not is_number(value):
+                raise InvalidInputError(
+                    f"biases of sensor {s}: expected numbers for any of {', '.join(dict.fromkeys(known))}, "
+                    f"got {name!r}: {value!r}"
+                )
     negative = [{name: -value for name, value in own.items()} for own in biases]
     return _changed(scene, negative, scene.name)
 

@@ -18,7 +18,8 @@ def scene_looks(scene: Scene, *, moving: bool) -> list[Looks]:
     """Looks of a scene; with `moving` the velocities of targets too, which clocks' biases need.
 
     Where measurements have times of their own a look holds as many scans as the slowest antenna takes for a turn, and
-    those measurements whose target's velocity is known: these can be moved to the look's middle.
+    those measurements whose target's velocity is known: these can be moved to the look's middle. Late measurements,
+    from before the scan before the look, are left out.
     """
     groups = scan_groups(scene)
     if scene.measurement_times is None and len(groups) == scene.num_scans:
@@ -28,9 +29,14 @@ def scene_looks(scene: Scene, *, moving: bool) -> list[Looks]:
     looks = []
     for group in groups:
         parts = [(scene.measurements[k], scene.scan(k).own_times(), velocities[k]) for k in group]
+        begin = float(scene.times[group[0] - 1]) if group[0] else -math.inf
         measured, times, speeds = (
             [np.concatenate([part[i][s] for part in parts]) for s in range(len(scene.sensors))] for i in range(3)
         )
+        for s, own in enumerate(times):
+            # a late one would take the middle back, before that of the look before
+            late = own < begin
+            measured[s], times[s], speeds[s] = measured[s][~late], own[~late], speeds[s][~late]
         every = np.concatenate(times)
         middle = float(0.5 * (every.min() + every.max())) if len(every) else float(scene.times[group[0]])
         for s, sensor in enumerate(scene.sensors):

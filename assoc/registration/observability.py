@@ -49,7 +49,9 @@ def open_directions(information: Array, spreads: Array) -> Array:
 def describe(direction: Array, terms: Sequence[Term], sensors: Sequence[Sensor]) -> str:
     """Say in words which biases move together in a direction that nothing tells of."""
     order = np.argsort(-np.abs(direction), kind="stable")
-    order = order[np.abs(direction[order]) > _SHARE]
+    # the shift of very many sensors together has small parts only
+    share = min(_SHARE, 0.5 * float(np.abs(direction).max()))
+    order = order[np.abs(direction[order]) > share]
     first = np.sign(direction[order[0]])
     parts = []
     for number in order[:_MOST_NAMED]:

@@ -23,6 +23,7 @@ from assoc.registration.terms import Term
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
+from assoc.sensors.base import finite_array
 
 HOUR = 3600.0
 PREFIX = "registration_"
@@ -57,7 +58,7 @@ class OnlineRegistration:
         for one in ("time", "position"):
             if one in self.parameters.components:
                 raise InvalidInputError(f"components: {one!r} is not estimated online; register a recording for it")
-        empty = [[np.zeros((0, sensor.dim)) for sensor in sensors]]
+        empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
         place = Scene(sensors, np.zeros(1), empty, region)  # type: ignore[arg-type]
         self._problem = make_problem(place, self.parameters)
         n = len(self._problem.terms)
@@ -66,6 +67,11 @@ class OnlineRegistration:
         self._kept: tuple[Looks, ...] = ()
         self._time: float | None = None
         self._scans = 0
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """As they were stated."""
+        return self._problem.sensors
 
     @property
     def biases(self) -> Array:
@@ -89,12 +95,12 @@ class OnlineRegistration:
 
     def correct(self, measurements: Sequence[Array]) -> list[Array]:
         """Measurements without the biases known so far."""
+        checked = self._checked(measurements)
         if not self.significant:
             return list(measurements)
-        terms, sensors = self._problem.terms, self._problem.sensors
         return [
-            corrected_measurements(sensor, z, own_biases(terms, self.biases, s))
-            for s, (sensor, z) in enumerate(zip(sensors, measurements, strict=True))
+            corrected_measurements(sensor, z, own_biases(self.terms, self.biases, s))
+            for s, (sensor, z) in enumerate(zip(self.sensors, checked, strict=True))
         ]
 
     def after(self, time: float, measurements: Sequence[Array]) -> OnlineRegistration:
@@ -106,9 +112,14 @@ class OnlineRegistration:
             Seconds.
         measurements : sequence over sensors of arrays (n_s, d_s)
             As they came, with their biases.
+
+        Raises
+        ------
+        InvalidInputError
+            Measurements have the wrong shape, or are not finite.
         """
         later = copy.copy(self)
-        looks = one_look(Scan(self._scans, time, tuple(measurements)))
+        looks = one_look(Scan(self._scans, time, self._checked(measurements)))
         apart = 0.0 if self._time is None else max(time - self._time, 0.0)
         drift = (self.parameters.drift * self._problem.spreads) ** 2 * apart / HOUR
         later._now = replace(self._now, covariance=self._now.covariance + np.diag(drift))
@@ -122,6 +133,19 @@ class OnlineRegistration:
         later._now = estimate(self._problem, kept) if together else later._corrected(looks)
         later._kept = () if later._scans == _MOST_KEPT else kept
         return later
+
+    def _checked(self, measurements: Sequence[Array]) -> tuple[Array, ...]:
+        """Measurements as float64 arrays (n_s, d_s)."""
+        if len(measurements) != len(self.sensors):
+            raise InvalidInputError(f"measurements of {len(measurements)} sensors, expected {len(self.sensors)}")
+        found = []
+        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
+            what = f"measurements of sensor {s}"
+            array = finite_array(np.zeros((0, sensor.dim)) if np.size(z) == 0 else z, what)
+            if array.ndim != 2 or array.shape[1] != sensor.dim:
+                raise InvalidInputError(f"{what} must have shape (n, {sensor.dim}), got {array.shape}")
+            found.append(array)
+        return tuple(found)
 
     def _corrected(self, looks: Looks) -> Estimate:
         """The biases after one more scan: one step of a filter in information form."""

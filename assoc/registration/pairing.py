@@ -6,7 +6,9 @@ known so far and whose noise is widened by how badly these are known. Gates are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances
-from assoc.errors import LimitExceededError
+from assoc.errors import AssocWarning, LimitExceededError
 from assoc.registration.correction import corrected_measurements, corrected_sensor, own_biases
 from assoc.registration.normal_equations import Places, Tuples
 from assoc.registration.parameters import RegistrationParameters
@@ -87,6 +89,15 @@ def places_of(sensors: Sequence[Sensor]) -> Places:
     )
 
 
+@contextmanager
+def _unasked() -> Iterator[None]:
+    """No doubts about scenes that the user never sees: their noise and measurements are not those that were given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssocWarning)
+        yield
+
+
+@_unasked()
 def corrected_scene(
     sensors: Sequence[Sensor], looks: Sequence[Looks], terms: Sequence[Term], biases: Array, region: Array
 ) -> Scene:
@@ -104,6 +115,7 @@ def corrected_scene(
     return Scene(located, np.array([one.time for one in looks]), measurements, region)
 
 
+@_unasked()
 def widened(scene: Scene, terms: Sequence[Term], deviations: Array) -> Scene:
     """The scene with noise that contains what is not known of the biases, (n,) standard deviations."""
     sensors = []

@@ -167,7 +167,9 @@ class Sensor(ABC):
                 )
             variances = noise**2
         else:
-            if not np.allclose(noise, noise.T, rtol=1e-9, atol=0.0):
+            # rounding counts by the sizes of the two components: a rotated covariance may have +-1e-16 for 0
+            size = np.sqrt(np.abs(np.diagonal(noise)))
+            if not (np.abs(noise - noise.T) <= 1e-9 * np.outer(size, size)).all():
                 raise InvalidInputError(f"{label}: noise must be a symmetric covariance matrix")
             variances = np.linalg.eigvalsh(noise)
             if not variances.min() > 0:
@@ -241,7 +243,7 @@ class Sensor(ABC):
 
     def residual(self, measured: Array, predicted: Array) -> Array:
         """Return measured - predicted, shape (n, d), angles wrapped into (-pi, pi]."""
-        difference = np.asarray(measured, dtype=np.float64) - np.asarray(predicted, dtype=np.float64)
+        difference = self._components(measured, "measured") - self._components(predicted, "predicted")
         for axis in range(self.dim):
             if self.angular[axis]:
                 difference[..., axis] = wrap_angle(difference[..., axis])
@@ -249,7 +251,7 @@ class Sensor(ABC):
 
     def in_view(self, measurements: Array) -> Array:
         """Whether measurements (n, d) lie in the field of view; azimuth intervals may pass through pi."""
-        z = np.asarray(measurements, dtype=np.float64)
+        z = self._components(measurements, "measurements")
         low, high = self.field_of_view[:, 0], self.field_of_view[:, 1]
         inside = np.ones(z.shape[:-1], dtype=np.bool_)
         for axis in range(self.dim):
@@ -258,6 +260,18 @@ class Sensor(ABC):
             else:
                 inside &= (z[..., axis] >= low[axis]) & (z[..., axis] <= high[axis])
         return inside
+
+    def _places(self, positions: Array) -> Array:
+        places = np.asarray(positions, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != 3:
+            raise InvalidInputError(f"{self._label}: positions must have shape (n, 3), got {places.shape}")
+        return places
+
+    def _components(self, measurements: Array, what: str) -> Array:
+        z = np.asarray(measurements, dtype=np.float64)
+        if z.shape[-1:] != (self.dim,):
+            raise InvalidInputError(f"{self._label}: {what} must have shape (n, {self.dim}), got {z.shape}")
+        return z
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -272,7 +286,8 @@ class Sensor(ABC):
         )
 
     def __hash__(self) -> int:
-        return hash((type(self), self.name, self.detection_probability, self.position.tobytes()))
+        # 0 and -0 are equal
+        return hash((type(self), self.name, self.detection_probability, (self.position + 0.0).tobytes()))
 
     def __repr__(self) -> str:
         place = ", ".join(f"{x:g}" for x in self.position)

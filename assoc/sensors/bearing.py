@@ -30,12 +30,12 @@ class BearingSensor(Sensor):
 
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free azimuth, shape (n, 1); see `Sensor.measure`."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         return np.arctan2(d[:, 1], d[:, 0])[:, None]
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, shape (n, 1, 3); see `Sensor.jacobian`."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         square = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST) ** 2
         result = np.zeros((len(d), 1, 3))
         result[:, 0, 0] = -d[:, 1] / square

@@ -29,8 +29,8 @@ class PositionSensor(Sensor):
 
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free positions, shape (n, d); see `Sensor.measure`."""
-        return np.array(np.asarray(positions, dtype=np.float64)[:, : self.dim])
+        return np.array(self._places(positions)[:, : self.dim])
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, shape (n, d, 3): ones on the diagonal."""
-        return np.broadcast_to(np.eye(3)[: self.dim], (len(positions), self.dim, 3)).copy()
+        return np.broadcast_to(np.eye(3)[: self.dim], (len(self._places(positions)), self.dim, 3)).copy()

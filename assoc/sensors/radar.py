@@ -51,7 +51,7 @@ class Radar3D(Sensor):
 
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free range, azimuth, elevation (and range rate), shape (n, d); see `Sensor.measure`."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         ground = np.hypot(d[:, 0], d[:, 1])
         found = [np.hypot(ground, d[:, 2]), np.arctan2(d[:, 1], d[:, 0]), np.arctan2(d[:, 2], ground)]
         if self.measures_velocity:
@@ -60,7 +60,7 @@ class Radar3D(Sensor):
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, (n, 3, 3), with range rate by the velocity, too, (n, 4, 6)."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         ground = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST)
         slant = np.hypot(ground, d[:, 2])
         result = np.zeros((len(d), self.dim, 6 if self.measures_velocity else 3))
@@ -97,13 +97,13 @@ class Radar2D(Sensor):
 
     def measure(self, positions: Array, velocities: Array | None = None) -> Array:
         """Noise-free range, azimuth, shape (n, 2); see `Sensor.measure`."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         slant = np.hypot(np.hypot(d[:, 0], d[:, 1]), d[:, 2])
         return np.stack([slant, np.arctan2(d[:, 1], d[:, 0])], axis=1)
 
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives by the position, shape (n, 2, 3); see `Sensor.jacobian`."""
-        d = np.asarray(positions, dtype=np.float64) - self.position
+        d = self._places(positions) - self.position
         ground = np.maximum(np.hypot(d[:, 0], d[:, 1]), NEAREST)
         result = np.zeros((len(d), 2, 3))
         result[:, 0] = d / np.hypot(ground, d[:, 2])[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._types import Array
+from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
 from assoc.sensors.base import Sensor, wrap_angle
@@ -61,6 +62,11 @@ def observe(
     rate = max((float(sensor.false_alarm_rate) for sensor in sensors), default=0.0)
     present = max((len(ids) for ids in target_ids), default=0)
     require_scene_memory(len(times), len(sensors), present, rate, "scans sensors targets false_alarm_rate")
+    if len(target_ids) != len(times):
+        raise InvalidInputError(f"target_ids: {len(target_ids)} scans, but times has {len(times)}")
+    _require_rows(positions, target_ids, "positions")
+    if velocities is not None:
+        _require_rows(velocities, target_ids, "velocities")
     measurements: list[list[Array]] = []
     sources: list[list[Array]] = []
     if velocities is None and any(sensor.measures_velocity for sensor in sensors):
@@ -74,10 +80,19 @@ def observe(
     return Scene(sensors, times, measurements, region, truth, name)  # type: ignore[arg-type]
 
 
+def _require_rows(given: Sequence[Array], target_ids: Sequence[Array], what: str) -> None:
+    if len(given) != len(target_ids):
+        raise InvalidInputError(f"{what}: {len(given)} scans, but target_ids has {len(target_ids)}")
+    for k, (rows, ids) in enumerate(zip(given, target_ids, strict=True)):
+        if (len(ids) or np.size(rows)) and np.shape(rows) != (len(ids), 3):
+            raise InvalidInputError(f"{what} of scan {k} must have shape ({len(ids)}, 3), got {np.shape(rows)}")
+
+
 def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequence[Array]) -> list[Array]:
     """Velocities of targets whose positions alone are known, by differences from scan to scan.
 
-    Central differences between neighbouring scans, one-sided at the ends of a target's presence.
+    Central differences between neighbouring scans, one-sided at the ends of a target's presence; across its absence
+    only of one that is there for a single scan.
 
     Parameters
     ----------
@@ -99,8 +114,12 @@ def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequen
     order = np.lexsort((scan, target))
     # of a target's rows, side by side in time, the neighbours; the row itself where there is none
     same = target[order][1:] == target[order][:-1]
+    # not across a gap, but for a row with a gap on both sides
+    close = same & (np.diff(scan[order]) == 1)
+    lonely = ~(np.append(False, close) | np.append(close, False))
+    back, on = close | (same & lonely[1:]), close | (same & lonely[:-1])
     before, after = order.copy(), order.copy()
-    before[1:][same], after[:-1][same] = order[:-1][same], order[1:][same]
+    before[1:][back], after[:-1][on] = order[:-1][back], order[1:][on]
     apart = when[after] - when[before]
     rate = (place[after] - place[before]) / np.where(apart > 0, apart, 1.0)[:, None]
     velocity = np.zeros_like(place)

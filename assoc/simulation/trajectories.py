@@ -39,7 +39,7 @@ class Trajectory:
     velocity : array_like (3,)
         Its velocity at time 0, m/s, as long as no manoeuvre has begun.
     manoeuvres : sequence of Manoeuvre
-        At times >= 0. Where two overlap their accelerations add. None: a straight line.
+        At times >= 0. Where two overlap their accelerations add. Without any it is a straight line.
     """
 
     position: Array

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from assoc._files.npz import Field, load_npz, save_npz
+from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Filter
@@ -202,6 +203,7 @@ def _with_own_lists(values: dict[str, Any]) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
+@doors
 class Checkpoint(ABC):
     """What makes a tracker savable: its settings, its state as arrays, and how they are checked and taken over.
 

@@ -46,12 +46,17 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
     Raises
     ------
     InvalidInputError
-        Measurements have times of their own, or the tracker corrects biases of sensors.
+        Measurements have times of their own, the tracker corrects biases of sensors, or the decisions are those of
+        other scans.
     """
     if tracker.registration is not None:
         raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
     if not all(scene.scan(one.scan).at_once for one in decisions):
         raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
+    for one in decisions:
+        scan = scene.scan(one.scan)
+        if one.time != scan.time or [len(ids) for ids in one.assigned] != scan.sizes.tolist():
+            raise InvalidInputError(f"decisions: that of scan {one.scan} is of another scan than the scene's")
     ordered = sorted(decisions, key=lambda one: one.scan)
     sure = {i for one in ordered for ids, known in zip(one.assigned, one.confirmed, strict=True) for i in ids[known]}
     rows: dict[int, dict[int, Array]] = {int(i): {} for i in sorted(sure) if i > 0}

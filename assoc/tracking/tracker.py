@@ -22,7 +22,7 @@ from assoc.filters.base import Filter, predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
 from assoc.registration.online import OnlineRegistration
-from assoc.scene.own_times import FULL_TURN, checked_sectors, checked_times
+from assoc.scene.own_times import FULL_TURN, checked_sectors, checked_times, looked_at
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
@@ -137,6 +137,8 @@ class Tracker(Checkpoint):
             registration = OnlineRegistration(self.sensors, self._place.region)
         if not (registration is None or isinstance(registration, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {registration!r}")
+        if registration is not None and registration.sensors != self.sensors:
+            raise InvalidInputError("registration: its sensors are not those of the tracker")
         self.registration = registration
         self.identities = None if identity is None else Identities(identity)
         self.terms = score_terms(self.sensors)
@@ -263,13 +265,12 @@ class Tracker(Checkpoint):
         if codes is not None and stamps is None:
             # identities are weighed where measurements are followed one by one, at their own times
             stamps = tuple(np.full(len(z), when) for z in checked)
-        before = self.remember()
+        before, dt = self.remember(), self._elapsed(when)
         try:
             if self.registration is not None:
                 self.registration = self.registration.after(when, checked)
                 checked = self.registration.correct(checked)
             scan = Scan(self._scan, when, tuple(checked), times=stamps, sectors=looks, identities=codes)
-            dt = self._elapsed(when)
             if dt > 0:
                 # a running mean that forgets: scans may change their pace
                 share = max(1.0 / max(self._scan, 1), _FORGETTING)
@@ -291,8 +292,8 @@ class Tracker(Checkpoint):
             raise
         if codes is not None and self.identities is not None:
             self.identities = self.identities.after(step.assigned, codes, self._batch.track_id)
-        if scan.at_once:
-            self._batch = self._batch.not_overlooked(-(self._out_of_view() @ self.terms.miss))
+        overlooked: Array = (self._out_of_view() & self._looked(looks)) @ self.terms.miss
+        self._batch = self._batch.not_overlooked(-overlooked)
         self._time = when
         self._scan += 1
         return step
@@ -354,11 +355,23 @@ class Tracker(Checkpoint):
 
     def _out_of_view(self) -> Array:
         """Which sensors cannot see which tracks: they have not missed them; bool (T, S)."""
+        where, views = self._where(), [sensor.position_part for sensor in self.sensors]
+        return ~np.stack([one.in_view(one.measure(where)) for one in views], axis=1)
+
+    def _looked(self, sectors: Array | None) -> Array:
+        """Which sensors looked where the tracks are; bool (T, S)."""
+        if sectors is None:
+            return np.ones((len(self._batch), len(self.sensors)), dtype=np.bool_)
+        away = self._where()[:, None] - np.array([sensor.position for sensor in self.sensors])
+        azimuths = np.arctan2(away[..., 1], away[..., 0])
+        return np.stack([looked_at(one, own) for one, own in zip(sectors, azimuths.T, strict=True)], axis=1)
+
+    def _where(self) -> Array:
+        """Positions of the tracks, (T, 3)."""
         position = list(self.filter.motion.position)
         where = np.zeros((len(self._batch), 3))
         where[:, : len(position)] = self._batch.states.mean[:, position]
-        views = [sensor.position_part for sensor in self.sensors]
-        return ~np.stack([one.in_view(one.measure(where)) for one in views], axis=1)
+        return where
 
     def _seed(self) -> np.random.SeedSequence:
         """Source of the randomness of this step alone, so that a restored tracker goes on alike."""

@@ -159,3 +159,6 @@ def test_a_scan_of_the_scene_serves_as_well_as_its_number():
     np.testing.assert_array_equal(a.tuples, b.tuples)
     with pytest.raises(InvalidInputError, match="scan 7 does not exist"):
         build_problem(scene, 7)
+    flat, _ = make_scene("bb", 0)
+    with pytest.raises(InvalidInputError, match=r"scan has measurements of \[1, 1\] components, .* \[3, 3\]"):
+        build_problem(scene, flat.scan(0))

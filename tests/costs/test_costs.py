@@ -194,6 +194,13 @@ def test_wrong_tuples_are_refused(tuples, words):
         tuple_costs(scene, 0, tuples)
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.uint32, np.uint64])
+def test_tuples_may_be_unsigned(kind):
+    scene, _ = make_scene("RP", 0)
+    tuples = all_tuples(scene, least=1)
+    np.testing.assert_array_equal(tuple_costs(scene, 0, tuples.astype(kind)), tuple_costs(scene, 0, tuples))
+
+
 def test_no_tuples_is_fine():
     scene, _ = make_scene("RP", 0)
     assert tuple_costs(scene, 0, []).shape == (0,)

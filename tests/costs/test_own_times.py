@@ -114,3 +114,12 @@ def test_bearings_alone_are_not_compared_over_time():
     assert assoc.build_problem(scene, 0).num_tuples == 3
     with pytest.raises(InvalidInputError, match="row 0 has bearings alone"):
         tuple_costs(scene, 0, [[1, 1, 0]])
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint64])
+def test_tuples_may_be_unsigned(kind):
+    scene = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
+    tuples = assoc.build_problem(scene, 1).tuples
+    assert (tuples == 0).any()
+    found = tuple_costs(scene, 1, tuples.astype(kind))
+    np.testing.assert_array_equal(found, tuple_costs(scene, 1, tuples))

@@ -22,7 +22,7 @@ from assoc.filters import (
     tuned_data,
 )
 from assoc.sensors import PositionSensor
-from tests.filters.common import MOTION, RADAR, kalman_update, random_state
+from tests.filters.common import FLAT, MOTION, RADAR, kalman_update, random_state
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -76,6 +76,10 @@ def test_refusals():
     with pytest.raises(InvalidInputError, match="scale must not be negative"):
         bad = FuzzyVariable({"a": (-1.0, 0.0, 1.0, 2.0)})
         FuzzyAdaptiveEKF(MOTION, FuzzyRules(good, bad, [("a", "a")]))
+    state = random_state(1, np.random.default_rng(0))
+    with pytest.raises(InvalidInputError, match="components must be below 3"):
+        one = FuzzyAdaptiveEKF(MOTION, paper_rules(), components=[3])
+        one.update(one.start(state), RADAR.measure(state.mean[:, :3]), RADAR)
 
 
 def test_without_rules_it_is_an_ekf():
@@ -134,6 +138,21 @@ def test_two_sensors_in_turn():
     for sensor in (RADAR, BEARING, RADAR):
         state = fuzzy.update(fuzzy.predict(state, 1.0), sensor.measure(state.mean[:, :3]), sensor).state
     assert np.isfinite(state.mean).all()
+
+
+@pytest.mark.parametrize("immediate", [False, True])
+def test_two_sensors_at_one_time(immediate):
+    """The second corrects what the first left: with scales of 1 it is the EKF."""
+    one = FuzzyVariable({"any": (0.0, 0.0, 9.0, 9.0)})
+    rules = FuzzyRules(one, FuzzyVariable({"one": (0.5, 1.0, 1.0, 1.5)}), [("any", "one")])
+    fuzzy, ekf = FuzzyAdaptiveEKF(MOTION, rules, immediate=immediate), ExtendedKalmanFilter(MOTION)
+    start = random_state(1, np.random.default_rng(4))
+    a, b = fuzzy.predict(fuzzy.start(start), 1.0), ekf.predict(start, 1.0)
+    for sensor in (RADAR, FLAT):
+        z = sensor.measure(b.mean[:, :3])
+        a, b = fuzzy.update(a, z, sensor).state, ekf.update(b, z, sensor).state
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9, atol=1e-9)
 
 
 def test_calm_is_a_measurement_of_no_turn():

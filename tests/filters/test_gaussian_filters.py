@@ -19,8 +19,11 @@ from assoc.filters import (
     InteractingMultipleModel,
     KalmanFilter,
     LinearMeasurement,
+    LinearMotion,
     ModifiedEKF,
     UnscentedKalmanFilter,
+    bounds,
+    nees,
     paper_rules,
 )
 from assoc.sensors.codes import CODES
@@ -207,7 +210,110 @@ def test_refusals():
             EnsembleKalmanFilter(MOTION, 20, wrong)
     with pytest.raises(InvalidInputError, match="window must be"):
         FuzzyAdaptiveEKF(MOTION, paper_rules(), window=0)
+    with pytest.raises(InvalidInputError, match="dim and runs must be above 0"):
+        bounds(3, float("nan"))
+    with pytest.raises(InvalidInputError, match="covariance of target 0 is singular"):
+        nees(EnsembleKalmanFilter(MOTION, 4).start(state[:1]), np.zeros((1, 6)))
     # a covariance that a user's own computing has ruined
     state.covariance[:] *= -1
     with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
         ekf.update(state, z, RADAR)
+
+
+@pytest.mark.parametrize(
+    ("dim", "position"), [(2, (0, 1, 2)), (6, (0, 1, 2, 3)), (6, (-6, -5, -4)), (6, (0,)), (6, (0, 0))]
+)
+def test_sensors_ask_for_coordinates_that_the_state_has(dim, position):
+    """Kernels read what they are told to: beyond the state that is somebody else's memory."""
+    motion = LinearMotion(lambda dt: np.eye(dim), lambda dt: np.eye(dim), dim, position)
+    with pytest.raises(InvalidInputError, match="position must be two or three different components"):
+        ExtendedKalmanFilter(motion).expected(Gaussian(np.ones(dim), np.eye(dim)), RADAR)
+
+
+def test_users_matrices_of_a_wrong_shape_are_refused():
+    state = random_state(2, np.random.default_rng(6))
+    z = state.mean[:, :2]
+
+    def moved(noise, jacobian=None):
+        return ExtendedKalmanFilter(FunctionMotion(lambda x, dt: x, noise, 6, jacobian=jacobian)).predict(state, 1.0)
+
+    def corrected(**models):
+        sensor = FunctionMeasurement(lambda x: x[:, :2], np.eye(2), **models)
+        return ExtendedKalmanFilter(MOTION).update(state, z, sensor)
+
+    for noise in (np.eye(3), np.ones((3, 6, 6)), lambda x, dt: np.eye(3)):
+        with pytest.raises(InvalidInputError, match=r"noise must have shape \(2, 6, 6\)"):
+            moved(noise)
+    with pytest.raises(InvalidInputError, match=r"jacobian must have shape \(2, 6, 6\), got \(2, 2, 2\)"):
+        moved(np.eye(6), lambda x, dt: np.ones((len(x), 2, 2)))
+    with pytest.raises(InvalidInputError, match=r"jacobian must have shape \(2, 2, 6\), got \(2, 6, 2\)"):
+        corrected(jacobian=lambda x: np.ones((len(x), 6, 2)))
+    for wrong in (lambda a, b: (a - b)[:, 0], lambda a, b: (a - b)[:, :1]):
+        with pytest.raises(InvalidInputError, match=r"residual must have shape \(2, 2\)"):
+            corrected(residual=wrong)
+
+
+def test_differences_of_an_angle_do_not_jump():
+    sensor = FunctionMeasurement(
+        lambda x: np.arctan2(x[:, 1], x[:, 0])[:, None],
+        [[1e-4]],
+        residual=lambda a, b: (a - b + np.pi) % (2 * np.pi) - np.pi,
+    )
+    slopes = sensor.jacobian(np.array([[-1000.0, 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(slopes[0, 0], [0.0, -1e-3, 0.0, 0.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_arrays_of_the_user_stay_his_own():
+    mean, P, H, R, Q = np.zeros(6), np.eye(6), np.eye(3, 6), np.eye(3), np.eye(6)
+    state, sensor = Gaussian(mean, P), LinearMeasurement(H, R)
+    function, motion = FunctionMeasurement(lambda x: x[:, :3], R), FunctionMotion(lambda x, dt: x, Q, 6)
+    T, weights = np.array([[0.9, 0.1], [0.1, 0.9]]), np.array([0.5, 0.5])
+    imm = InteractingMultipleModel([KalmanFilter(MOTION)] * 2, T, weights)
+    for array in (mean, P, H, R, Q, T, weights):
+        array += 7.0
+    assert not state.mean.any() and np.array_equal(state.covariance[0], np.eye(6))
+    assert np.array_equal(sensor.matrix, np.eye(3, 6))
+    for one in (sensor.covariance, function.covariance):
+        assert np.array_equal(one, np.eye(3))
+    assert np.array_equal(motion.noise(state.mean, 1.0)[0], np.eye(6))
+    assert imm.transition[0, 0] == 0.9 and imm.weights.tolist() == [0.5, 0.5]
+
+
+def test_expected_covariances_that_are_none_are_refused():
+    """Weights of the unscented transform may be negative, and then what they make of a parabola."""
+    one = UnscentedKalmanFilter(MOTION, beta=0.0, kappa=-3.0)
+    state = Gaussian(np.zeros(6), np.eye(6))
+    sensor = FunctionMeasurement(lambda x: (x**2).sum(axis=1)[:, None], [[1.0]])
+    for call in (lambda: one.update(state, [[6.0]], sensor), lambda: one.log_likelihood(state, [[6.0]], sensor)):
+        with pytest.raises(InvalidInputError, match="covariance of target 0 is not positive definite"):
+            call()
+
+
+def test_threads_do_not_mix_up_sensors_and_time_steps():
+    """Another thread asks with another sensor, just after this one has remembered its own."""
+    other = CoordinatedTurn(1.0, 0.1)
+    other.noise(np.zeros((1, 7)), 9.0)
+
+    class Interrupted(ExtendedKalmanFilter):
+        seen: tuple = (None, None)
+
+        @property
+        def _seen(self):
+            return self.seen
+
+        @_seen.setter
+        def _seen(self, value):
+            self.seen = (BEARING, None)
+
+    class InterruptedTurn(CoordinatedTurn):
+        @property
+        def _noise(self):
+            return other.__dict__["_noise"]
+
+        @_noise.setter
+        def _noise(self, value):
+            pass
+
+    assert Interrupted(MOTION).observe(RADAR).dim == 3
+    turn = InterruptedTurn(1.0, 0.1)
+    assert turn.noise(np.zeros((1, 7)), 2.0)[0, 3, 3] == pytest.approx(4.0)

@@ -150,6 +150,13 @@ def test_refusals_of_a_step():
         _ = ekf.step(random_state(1, np.random.default_rng(0)), 1.0, z, RADAR).gain
 
 
+@pytest.mark.parametrize("dt", [np.int64(1), np.float32(1), np.array(1.0), np.ones(2), (1, 1)])
+def test_a_run_takes_any_number_for_its_step(dt):
+    ekf, start = ExtendedKalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
+    z = np.stack([RADAR.measure(start.mean[:, :3])] * 2)
+    assert np.array_equal(ekf.run(start, z, RADAR, dt).mean, ekf.run(start, z, RADAR, 1.0).mean)
+
+
 def test_refusals_of_a_run():
     ekf, start = ExtendedKalmanFilter(MOTION), random_state(2, np.random.default_rng(0))
     z = np.stack([RADAR.measure(start.mean[:, :3])] * 3)
@@ -160,6 +167,8 @@ def test_refusals_of_a_run():
         (z[:, :1], 1.0, r"measured must have shape \(K, 2, 3\)"),
         (z[:0], 1.0, "K > 0"),
         (z, [1.0], "dt must be one number or 3"),
+        (z, "one", "dt must be numbers"),
+        (z, None, "dt must be finite"),
         (z, -1.0, "dt must be a number >= 0"),
     ):
         with pytest.raises(InvalidInputError, match=message):
@@ -186,10 +195,14 @@ def test_time_does_not_run_backwards(name, dt):
 
 
 def test_a_sensor_that_was_refused_once_is_refused_again():
-    one, start = KalmanFilter(MOTION), random_state(1, np.random.default_rng(0))
-    for _ in range(2):
-        with pytest.raises(InvalidInputError, match="must be linear"):
-            one.update(start, RADAR.measure(start.mean[:, :3]), RADAR)
+    start = random_state(1, np.random.default_rng(0))
+    for one, sensor, message in (
+        (KalmanFilter(MOTION), RADAR, "must be linear"),
+        (ModifiedEKF(MOTION), BEARING, "must be a Radar3D"),
+    ):
+        for _ in range(2):
+            with pytest.raises(InvalidInputError, match=message):
+                one.update(start, sensor.measure(start.mean[:, :3]), sensor)
 
 
 @pytest.mark.parametrize("name", ["EnKF, N 20", "fuzzy-adaptive EKF", "IMM"])

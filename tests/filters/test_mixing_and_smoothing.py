@@ -121,6 +121,32 @@ def test_transitions_of_another_interval_and_of_mean_times():
     np.testing.assert_allclose(made.rates, [[-1 / 30, 1 / 30], [1 / 5, -1 / 5]], rtol=1e-9)
 
 
+def test_modes_that_never_change():
+    models = [UnscentedKalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
+    with pytest.raises(InvalidInputError, match="weights must be given"):
+        InteractingMultipleModel(models, np.eye(2))
+    # a mode that nothing speaks for goes on by itself, and the other is alone
+    imm = InteractingMultipleModel(models, np.eye(2), [1.0, 0.0])
+    start = random_state(1, np.random.default_rng(9))
+    state, alone = imm.start(start), start
+    for _ in range(2):
+        state, alone = imm.predict(state, 1.0), models[0].predict(alone, 1.0)
+        z = RADAR.measure(alone.mean[:, :3]) + 1e-3
+        state, alone = imm.update(state, z, RADAR).state, models[0].update(alone, z, RADAR).state
+    np.testing.assert_allclose(state.mean, alone.mean, rtol=1e-12)
+    assert abs(state.means[0, 1] - state.means[0, 0]).max() < 100
+
+
+def test_both_ways_to_ask_a_mixture_for_likelihoods_agree():
+    models = [ExtendedKalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]
+    imm = InteractingMultipleModel(models, [[0.9, 0.1], [0.1, 0.9]])
+    state = imm.predict(imm.start(random_state(2, np.random.default_rng(9))), 5.0)
+    z = RADAR.measure(state.mean[:, :3]) + [200.0, 0.0, 0.0]
+    both = imm.compare(state, z, RADAR)
+    assert np.array_equal(both[0], imm.log_likelihood(state, z, RADAR))
+    assert np.array_equal(both[1], imm.distances(state, z, RADAR))
+
+
 @pytest.mark.parametrize("wrong", [[[0.2, 0.8], [0.9, 0.1]], [[0.5, 0.5], [0.5, 0.5]], [[0.0, 1.0], [1.0, 0.0]]])
 def test_transitions_that_no_chain_in_time_has_are_refused(wrong):
     models = [KalmanFilter(ConstantVelocity(noise)) for noise in (0.5, 20.0)]

@@ -125,6 +125,9 @@ def test_identity_switches_of_plots():
     assert identity_after_each([-1, 0, 1, 1, -1, 1], [3, 3, 3, 3, -1, 4]).tolist() == [-1, 0, 1, 1, -1, 1]
     with pytest.raises(InvalidInputError, match="one shape"):
         plot_identity_switches(sources, true, every[:3])
+    for wrong in ([1], [[1, 2]]):
+        with pytest.raises(InvalidInputError, match="both have shape"):
+            identity_after_each([1, 2], wrong)
 
 
 def test_tracks_of_one_identity():

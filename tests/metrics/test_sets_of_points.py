@@ -177,6 +177,16 @@ def test_the_parts_add_up_to_the_whole_over_time(order):
     assert mean["distance"] ** order == pytest.approx(np.mean([one.distance**order for one in values]))
 
 
+def test_parts_that_are_none_stay_none_where_powers_overflow():
+    one = gospa([[0, 0]], [[0, 0]], cutoff=100.0, order=200.0)
+    assert one[:4] == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_identities_are_compared_as_whole_numbers():
+    large = Trajectories([0, 0], [2**53, 2**53 + 1], np.zeros((2, 3)))
+    assert large.ids.tolist() == [2**53, 2**53 + 1]
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -187,6 +197,8 @@ def test_the_parts_add_up_to_the_whole_over_time(order):
         (lambda: gospa([["a"]], [[1]], 1.0), "truth must be numbers"),
         (lambda: Trajectories([0, 0], [1, 1], np.zeros((2, 3))), "ids: 1 is there twice at 0 s"),
         (lambda: Trajectories([0, 1], [1.5, 1], np.zeros((2, 3))), "ids must be integers"),
+        (lambda: Trajectories(np.array([0, 1], "datetime64[ns]"), [1, 1], np.zeros((2, 3))), "times must be numbers"),
+        (lambda: mean_gospa([gospa([[0, 0]], [[1, 1]], 9.0)], 0), "order: expected a number >= 1"),
         (lambda: Trajectories([0, np.inf], [1, 1], np.zeros((2, 3))), "times must be finite"),
         (lambda: Trajectories([0, 1], [1, 1], np.zeros((3, 3))), "positions must have shape"),
         (lambda: ospa2(Trajectories([], [], []), Trajectories([], [], []), 1.0, window=0), "window: expected"),

@@ -106,3 +106,33 @@ def test_bad_input():
         MultiSensorTracker.for_scene(scene, registration="batch")
     with pytest.raises(InvalidInputError, match="'time' is not estimated online"):
         OnlineRegistration(scene.sensors, REGION, RegistrationParameters(components=("time",)))
+    with pytest.raises(InvalidInputError, match="number 0 is a int, expected a Sensor"):
+        OnlineRegistration([1])
+    online, z = OnlineRegistration(scene.sensors, REGION), scene.measurements[0]
+    for given, match in (
+        (z[:2], "measurements of 2 sensors, expected 3"),
+        ([z[0], z[1][:, :2], z[2]], "measurements of sensor 1 must have shape .n, 3., got"),
+        ([z[0], z[1], np.zeros(3)], "measurements of sensor 2 must have shape"),
+        ([np.full((1, 3), np.nan), *z[1:]], "measurements of sensor 0 must be finite"),
+    ):
+        for act in (online.correct, lambda one: online.after(0.0, one)):
+            with pytest.raises(InvalidInputError, match=match):
+                act(given)
+
+
+def test_biases_of_other_sensors_are_refused():
+    sensors = radars()
+    with pytest.raises(InvalidInputError, match="registration: its sensors are not those of the tracker"):
+        MultiSensorTracker(sensors, region=REGION, registration=OnlineRegistration(sensors[::-1], REGION))
+
+
+def test_numbers_out_of_range_are_told(monkeypatch):
+    scene = biased_scene(scans=1)
+    tracker = MultiSensorTracker.for_scene(scene, registration="online")
+
+    def singular(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(OnlineRegistration, "after", singular)
+    with pytest.raises(InvalidInputError, match="numbers out of range .Singular matrix."):
+        tracker.step(scene.times[0], scene.measurements[0])

@@ -10,10 +10,14 @@ from scipy.optimize import least_squares
 
 from assoc import Scene, build_problem
 from assoc.errors import InvalidInputError
-from assoc.registration import RegistrationParameters, register, with_biases
+from assoc.registration import RegistrationParameters, Term, register, with_biases
 from assoc.registration.correction import corrected_measurements
+from assoc.registration.looks import scene_looks
+from assoc.registration.observability import describe
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D
 from assoc.simulation import simulate
+from assoc.simulation.observation import observe
+from assoc.simulation.radars import radar_over
 from tests.registration.common import BIASES, REGION, biased_scene, late_scene, paths, radars, scene_of
 
 
@@ -324,3 +328,51 @@ def test_files(found, tmp_path):
 def test_same_seed_same_biases():
     scene = biased_scene(scans=6)
     assert np.array_equal(register(scene).biases, register(scene).biases)
+
+
+def test_late_measurements_are_left_out():
+    """A third of a radar's measurements come three scans late: they would take their look before the one before."""
+    scene = scene_of(radars(2), 3, 6)
+    measurements = [list(scan) for scan in scene.measurements]
+    times = [[np.full(len(z), time) for z in scan] for scan, time in zip(measurements, scene.times, strict=True)]
+    for rows in (measurements, times):
+        for k in range(3):
+            cut = len(scene.measurements[k][0]) // 3
+            rows[k + 3][0] = np.concatenate([rows[k + 3][0], rows[k][0][:cut]])
+            rows[k][0] = rows[k][0][cut:]
+    late = Scene(scene.sensors, scene.times, measurements, REGION, measurement_times=times)
+    looks = scene_looks(late, moving=False)
+    assert [one.time for one in looks] == scene.times.tolist()
+    assert all((own == look.time).all() for look in looks for own in look.times)
+    assert np.isfinite(register(late).biases).all()
+
+
+def test_noise_that_is_widened_is_not_doubted():
+    """A single aircraft flies away from precise radars: warnings, which fail a test, would be of noise nobody gave."""
+    options = {"range_noise": 30.0, "angle_noise": 5e-4, "detection_probability": 0.99, "false_alarm_rate": 1e-9}
+    sensors = [radar_over(REGION, np.array([x, 0.0, 0.0]), name=f"{x}", **options) for x in (-50e3, -20e3)]
+    where = [np.array([[10e3 + 800.0 * k, 0.0, 9e3]]) for k in range(12)]
+    rng = np.random.default_rng(1)
+    scene = observe(sensors, 4.0 * np.arange(12), [np.zeros(1, dtype=np.int64)] * 12, where, rng, region=REGION)
+    assert register(scene).tuples >= 5
+
+
+def test_the_shift_of_many_sensors_together_is_named():
+    """Each of 30 has a small part in it."""
+    view = [[-1e5, 1e5]] * 2
+    sensors = [PositionSensor(position=np.zeros(3), noise=[20.0] * 2, field_of_view=view) for _ in range(30)]
+    named = describe(np.full(30, 30**-0.5), [Term(s, "x") for s in range(30)], sensors)
+    assert named == "x of sensor 1 + x of sensor 2 + x of sensor 3 + x of sensor 4 ..."
+
+
+def test_biases_that_are_none_are_refused():
+    scene = scene_of(radars(2), 1, 2)
+    for biases, match in (
+        ([{}], "biases: expected one mapping for each of 2 sensors, got 1"),
+        ([{}, {"rnge": 100.0}], "biases of sensor 1: .* range, azimuth, elevation, got 'rnge': 100.0"),
+        ([{"time": 1.0}, {}], "biases of sensor 0"),
+        ([{"range": "100"}, {}], "biases of sensor 0"),
+        ([{}, None], "biases"),
+    ):
+        with pytest.raises(InvalidInputError, match=match):
+            with_biases(scene, biases)

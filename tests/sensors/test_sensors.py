@@ -95,6 +95,9 @@ def test_noise_is_standard_deviations_or_a_covariance():
     np.testing.assert_allclose(SENSORS["radar3d"].covariance, np.diag([2500, 1e-6, 4e-6]))
     np.testing.assert_allclose(SENSORS["plane"].covariance, [[2, 1], [1, 3]])
     assert [s.dim for s in SENSORS.values()] == [3, 2, 1, 3, 2]
+    # a circle that was turned: rounding leaves other numbers than 0 on both sides of the diagonal
+    turned = np.array([[25.0, -3.1e-16], [-7.5e-16, 25.0]])
+    assert np.array_equal(dataclasses.replace(SENSORS["plane"], noise=turned).covariance, turned)
 
 
 def test_sensors_are_values():
@@ -102,6 +105,8 @@ def test_sensors_are_values():
     assert radar == dataclasses.replace(radar, noise=np.diag([2500, 1e-6, 4e-6]))
     assert radar != dataclasses.replace(radar, false_alarm_rate=2.0)
     assert hash(radar) == hash(dataclasses.replace(radar))
+    zero, minus = (dataclasses.replace(radar, position=[x, 0, 0]) for x in (0.0, -0.0))
+    assert zero == minus and hash(zero) == hash(minus)
     with pytest.raises(ValueError, match="read-only"):
         radar.position[0] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -143,3 +148,19 @@ def test_bad_sensors_are_refused_in_one_line(changes, words):
         dataclasses.replace(SENSORS["radar3d"], **changes)
     assert "\n" not in str(caught.value)
     assert "Radar3D" in str(caught.value)
+
+
+@pytest.mark.parametrize("sensor", SENSORS.values(), ids=SENSORS)
+def test_places_and_measurements_of_a_wrong_shape_are_refused(sensor):
+    for call in (sensor.measure, sensor.jacobian):
+        for wrong in ([1.0, 2.0, 3.0], [[1.0, 2.0]]):
+            with pytest.raises(InvalidInputError, match=r"positions must have shape \(n, 3\)"):
+                call(wrong)
+    wrong, right = np.zeros((2, sensor.dim + 1)), np.zeros((2, sensor.dim))
+    for call, name in (
+        (lambda: sensor.in_view(wrong), "measurements"),
+        (lambda: sensor.residual(wrong, right), "measured"),
+        (lambda: sensor.residual(right, wrong), "predicted"),
+    ):
+        with pytest.raises(InvalidInputError, match=rf"{name} must have shape \(n, {sensor.dim}\)"):
+            call()

@@ -177,6 +177,8 @@ def test_clear_refusals():
         around(Pose(0, 0, 0), Pose(9, 0, 0), 1.0, [(5, 5, 1), (0.5, 0, 1)])
     with pytest.raises(InvalidInputError, match="radius must be"):
         around(Pose(0, 0, 0), Pose(9, 0, 0), 0.0, [])
+    with pytest.raises(InvalidInputError, match=r"obstacles must have shape \(n, 3\), .* got \(3, 2\)"):
+        around(Pose(0, 0, 0), Pose(9, 0, 0), 1.0, [(5, 5), (1, 5), (5, 1)])
     with pytest.raises(InvalidInputError, match="radii above 0"):
         around(Pose(0, 0, 0), Pose(9, 0, 0), 1.0, [(5, 0, -1)])
     with pytest.raises(InvalidInputError, match="pose"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from assoc.errors import InvalidInputError
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, elevation_interval, radar_over, range_interval
@@ -138,3 +139,19 @@ def test_azimuths_from_the_edge_of_a_field():
     # behind the field the interval passes through pi
     low, high = azimuth_interval(np.array([200.0, 50.0, 0.0]), field)
     assert (low, high) == pytest.approx((math.pi - math.atan2(50, 100), math.pi + math.atan2(50, 100)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"positions": [np.zeros((3, 2))]}, r"positions of scan 0 must have shape \(3, 3\), got \(3, 2\)"),
+        ({"positions": []}, "positions: 0 scans, but target_ids has 1"),
+        ({"velocities": [np.zeros((2, 3))]}, r"velocities of scan 0 must have shape \(3, 3\), got \(2, 3\)"),
+        ({"velocities": []}, "velocities: 0 scans"),
+        ({"times": [0.0, 1.0]}, "target_ids: 1 scans, but times has 2"),
+    ],
+)
+def test_targets_that_do_not_agree_are_refused(changes, words):
+    given = {"times": [0.0], "target_ids": [[1, 2, 3]], "positions": [np.ones((3, 3))], **changes}
+    with pytest.raises(InvalidInputError, match=words):
+        observe(sensors(), rng=np.random.default_rng(0), **given)

@@ -25,6 +25,15 @@ def test_velocities_from_positions():
     assert [one.shape for one in velocities_from(times, [[]] * 4, [[]] * 4)] == [(0, 3)] * 4
 
 
+def test_velocities_are_not_taken_across_an_absence():
+    there, gone = [np.array([[0.0, 0, 0]]), np.array([[100.0, 0, 0]])], [np.zeros((0, 3))] * 8
+    found = velocities_from(np.arange(12.0), [[7], [7], *[[]] * 8, [7], [7]], [*there, *gone, *there])
+    np.testing.assert_allclose(np.concatenate(found), [[100.0, 0, 0]] * 4)
+    # one that is there for a single scan each time flies from one to the next
+    alone = velocities_from(np.arange(3.0), [[7], [], [7]], [there[0], gone[0], there[1]])
+    np.testing.assert_allclose(np.concatenate(alone), [[50.0, 0, 0]] * 2)
+
+
 @pytest.mark.parametrize("name", ["three-radar", "crowd", "dubins-uav"])
 def test_scenarios_with_range_rate(name):
     options = {"sensor": "radar", "targets": 20, "scans": 5} if name == "crowd" else {}

@@ -65,6 +65,16 @@ def test_what_no_sensor_can_see_is_not_missed(kind):
     assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
 
 
+@pytest.mark.parametrize("kind", TRACKERS.values())
+@pytest.mark.parametrize("width", [0.0, 2.0 * math.pi, None])
+def test_nor_is_it_where_measurements_have_times_of_their_own(kind, width):
+    tracker = tracker_of(kind, np.array([1500.0, 500.0, 250.0, 0.0, 0.0, 0.0]))
+    sectors = None if width is None else [[0.0, width]] * 2
+    tracker.step(2.0, NOTHING, [np.zeros(0)] * 2, sectors)
+    (track,) = tracker.tracks
+    assert track.existence == pytest.approx(math.exp(-2.0 / LIFETIME) / (1 + math.exp(-20.0)), rel=1e-6)
+
+
 def test_the_default_process_noise_suits_the_pace():
     assert pace_of(np.array([0.0, 10.0, 20.0, 31.0])) == 10.0
     assert pace_of(np.zeros(1)) == 1.0

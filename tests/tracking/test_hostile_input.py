@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assoc import InvalidInputError, simulation
-from assoc.tracking import TRACKERS
-from assoc.tracking.filter_choice import make_filter
+from assoc.tracking import TRACKERS, Initiation
+from assoc.tracking.filter_choice import make_filter, two_speeds
 
 SCENE = simulation.simulate("three-radar", 1, scans=3)
 
@@ -66,3 +66,22 @@ def test_the_order_of_the_measurements_of_a_scan_does_not_matter(name):
             decided.append([ids[np.argsort(o)].tolist() for ids, o in zip(step.assigned, orders, strict=True)])
         found.append(([(t.track_id, t.score, *t.mean.tolist()) for t in own.tracks], decided))
     assert found[0] == found[1] == found[2]
+
+
+def test_the_speed_of_other_axes_is_refused_and_any_number_will_do():
+    for dimensions, speed in ((3, (200.0, 200.0)), (2, [200.0, 200.0, 50.0])):
+        with pytest.raises(InvalidInputError, match=f"speed must be one number, or one for each of {dimensions} axes"):
+            TRACKERS["mht"](SCENE.sensors, two_speeds(dimensions=dimensions), initiation=Initiation(speed=speed))
+    found = []
+    for speed in (200.0, np.int64(200), np.float32(200.0)):
+        tracker = TRACKERS["nearest-neighbour"].for_scene(SCENE, initiation=Initiation(speed=speed))
+        tracker.step(0.0, SCENE.scan(0).measurements)
+        found.append([track.covariance.tolist() for track in tracker.tracks])
+    assert found[0] and found[0] == found[1] == found[2]
+
+
+def test_a_path_that_is_none_is_refused():
+    tracker = TRACKERS["mht"].for_scene(SCENE)
+    for act in (tracker.save, tracker.restore):
+        with pytest.raises(InvalidInputError, match="path: expected"):
+            act(None)

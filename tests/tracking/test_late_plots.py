@@ -150,3 +150,31 @@ def test_late_plots_keep_their_identities():
         LatePlots(TRACKERS["mht"]([radar(recording)], identity=IdentityParameters())).step(
             1.0, [recording.measurements[:1]], None, None, [np.array([[-1, 0]])]
         )
+
+
+@pytest.mark.parametrize("kind", ["mht", "mht-hypothesis"])
+def test_what_is_final_is_told_once(scene, kind):
+    """The oldest scan that is kept is taken in anew, and with it what it says of scans before."""
+    late = LatePlots(TRACKERS[kind].for_scene(scene), horizon=6.0)
+    final = []
+    for k in range(9):
+        scan = scene.scan(k)
+        final += late.step(scan.time, scan.measurements, scan.times, scan.sectors).final
+    one, nothing = scene.measurements[0][0][:1], [np.zeros((0, 3))] * 2
+    times = [np.array([late.scans[0]]), *[np.zeros(0)] * 2]
+    step = late.step(late.time + 1.0, [one, *nothing], times, np.zeros((3, 2)))
+    assert step.late == 1
+    final += [*step.final, *late.flush()]
+    assert [one.scan for one in final] == list(range(10))
+
+
+def test_tracks_of_the_past_keep_their_ids_when_names_are_forgotten(scene):
+    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene))
+    known = []
+    for k in range(6):
+        scan = scene.scan(k)
+        late._many = 0
+        late.step(scan.time, scan.measurements, scan.times, scan.sectors)
+        known.append([track.track_id for track in late.tracks])
+        assert [[track.track_id for track in late.past_tracks(j)] for j in range(k + 1)] == known
+    assert not set(known[0]) <= set(known[-1])

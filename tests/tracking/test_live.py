@@ -249,3 +249,22 @@ def test_kept_identities_are_those_of_the_metric():
         # what is judged is counted once, and forgotten
         judge.settle({1, 2}, 1e9)
         assert judge.counts() == expected and len(judge._tracks) == 2
+
+
+@pytest.mark.parametrize("time", [5_000.0, -5_000.0])
+def test_a_plot_that_is_repeated_does_not_agree_with_itself(scene, time):
+    tracker, told = live(scene)
+    plots = list(replayed(scene, 0.0))
+    for plot in plots[:20]:
+        tracker.take(*plot)
+    for _ in range(30):
+        assert tracker.take(*plots[0]._replace(time=time)) == []
+    assert tracker.counts["repeated"] == 29 and not any("tracks begin anew" in line for line in told)
+
+
+def test_a_plot_without_values_is_left_out(scene):
+    tracker, told = live(scene)
+    assert tracker.take("1", 1.0, []) == []
+    assert tracker.counts["unusable"] == 1 and told[0].endswith(
+        "left out: measurements of sensor 0 must have 3 values; further ones are only counted"
+    )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assoc import filters, simulation
+from assoc import InvalidInputError, filters, simulation
 from assoc.metrics import Trajectories, gospa_over_time, mean_gospa
 from assoc.scene import Scene
 from assoc.tracking import Decision, MultiSensorTracker, TrackOrientedMHT, smoothed, track_scene
@@ -71,3 +71,15 @@ def test_smoothing_brings_tracks_nearer_to_the_truth():
     told = smoothed(tracker, replace(scene, truth=replace(scene.truth, names=names)), decisions)
     assert told.targets and {*told.targets.values()} <= {*names.values()}
     assert "target" in told.to_frame().columns
+
+
+def test_decisions_of_other_scans_are_refused():
+    """One sensor that sees its one target always: the measurements of any scans would make a track."""
+    places = [np.array([[300.0 + 20.0 * k, 400.0, 200.0]]) for k in range(12)]
+    scene = Scene(
+        sensors=[plain.sensor()], times=np.arange(12.0), measurements=[[z] for z in places], region=plain.REGION
+    )
+    tracker = MultiSensorTracker.for_scene(scene)
+    _, decisions = track_scene(tracker, scene, scans=range(6, 12))
+    with pytest.raises(InvalidInputError, match="decisions: that of scan 0 is of another scan"):
+        smoothed(tracker, scene, decisions)

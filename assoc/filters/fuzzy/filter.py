@@ -27,9 +27,9 @@ class Adaptive:
     ----------
     mean, covariance : (B, n), (B, n, n)
     without_noise : (B, n, n)
-        Covariance of the last prediction before process noise was added.
+        Covariance of the last prediction before process noise was added; after a correction the covariance itself.
     process_noise : (B or 1, n, n)
-        Process noise of the last prediction, unscaled.
+        Process noise of the last prediction, unscaled; 0 after a correction.
     innovations : (B, W, d)
         The last normalised innovations, newest last; d is 0 before the first measurement.
     turns : (B, W)
@@ -254,6 +254,8 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
     def update(self, state: Adaptive, measured: Array, sensor: Measurement) -> Update[Adaptive]:
         """Infer q and r, then correct each target with its measurement; see `Filter.update`."""
         o = self._ekf.observe(sensor)
+        if self.components is not None and max(self.components, default=0) >= o.dim:
+            raise InvalidInputError(f"components must be below {o.dim} for this sensor, got {self.components}")
         first = self._ekf.correct(state.gaussian, measured, o, o.covariance)
         variances = np.einsum("bii->bi", first.covariance)
         fresh = first.innovation / np.sqrt(variances)
@@ -274,12 +276,16 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         mean, covariance = done.state.mean, done.state.covariance
         if calm is not None:
             mean, covariance = _calmed(mean, covariance, calm)
-        corrected = Adaptive(mean, covariance, prior, state.process_noise, recent, turns, q)
+        # another measurement of the same time corrects what this one left: there is no noise between them
+        still = np.zeros((1, *covariance.shape[1:]))
+        corrected = Adaptive(mean, covariance, covariance, still, recent, turns, q)
         return Update(corrected, done.innovation, done.covariance, done.nis, done.log_likelihood)
 
     def prior(self, predicted: Adaptive, corrected: Adaptive) -> tuple[Array, Array]:
         """Mean and covariance of the prediction as it was corrected, after the adaptation."""
-        return predicted.mean, corrected.without_noise
+        if not self.immediate:
+            return predicted.mean, predicted.covariance
+        return predicted.mean, predicted.without_noise + _scaled(corrected.process_scale, predicted.process_noise)
 
     def _infer(self, recent: Array, turns: Array, present: Gaussian) -> tuple[Array, Array, Array | None]:
         """Input of the first rules (B,), q (B, n), and the variance of a turn rate of 0, (B,)."""

@@ -248,12 +248,14 @@ class CoordinatedTurn(Motion):
 
     def noise(self, states: Array, dt: float) -> Array:
         """Process noise covariance, (1, 7, 7); that of the last time step is remembered."""
-        if self._noise is None or self._noise[0] != dt:
+        # read once: another thread may ask for another time step
+        known = self._noise
+        if known is None or known[0] != dt:
             Q = np.zeros((1, 7, 7))
             Q[0, :6, :6] = np.kron(polynomial_noise(1, dt, self.sigma, "discrete"), np.eye(3))
             Q[0, 6, 6] = self.rate_sigma**2
-            self._noise = (dt, Q)
-        return self._noise[1]
+            known = self._noise = (dt, Q)
+        return known[1]
 
 
 class Padded(LinearMotion):
@@ -312,7 +314,8 @@ class FunctionMotion(Motion):
         position: tuple[int, ...] = (0, 1, 2),
     ) -> None:
         self.dim, self.position = dim, position
-        self._function, self._jacobian, self._noise = function, jacobian, noise
+        self._function, self._jacobian = function, jacobian
+        self._noise = noise if callable(noise) else finite(noise, "noise", 2, 3).copy()
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""
@@ -324,23 +327,35 @@ class FunctionMotion(Motion):
     def jacobian(self, states: Array, dt: float) -> Array:
         """Derivatives of `propagate` at states (m, n): (m, n, n)."""
         if self._jacobian is not None:
-            return finite(self._jacobian(states, dt), "the motion function's jacobian", 3)
+            slopes = finite(self._jacobian(states, dt), "the motion function's jacobian", 3)
+            return self._of_each(slopes, states, "the motion function's jacobian")
         return differences(lambda x: self.propagate(x, dt), states)
 
     def noise(self, states: Array, dt: float) -> Array:
         """Process noise covariance, (1, n, n) or (m, n, n)."""
         Q = finite(self._noise(states, dt) if callable(self._noise) else self._noise, "noise", 2, 3)
-        return Q[None] if Q.ndim == 2 else Q
+        return self._of_each(Q[None] if Q.ndim == 2 else Q, states, "noise")
+
+    def _of_each(self, matrices: Array, states: Array, what: str) -> Array:
+        if matrices.shape[1:] != (self.dim, self.dim) or len(matrices) not in (1, len(states)):
+            wanted = (len(states), self.dim, self.dim)
+            raise InvalidInputError(f"{what} must have shape {wanted}, got {matrices.shape}")
+        return matrices
 
 
-def differences(function: Callable[[Array], Array], states: Array) -> Array:
-    """Central differences of a vectorised function at states (m, n): (m, d, n)."""
+def differences(
+    function: Callable[[Array], Array], states: Array, minus: Callable[[Array, Array], Array] = np.subtract
+) -> Array:
+    """Central differences of a vectorised function at states (m, n): (m, d, n).
+
+    `minus` takes one of its values (k, d) from another: angles must not jump.
+    """
     m, n = states.shape
     step = 6e-6 * np.maximum(1.0, np.abs(states))
     ends = np.repeat(states[:, None, None, :], n, axis=1).repeat(2, axis=2)
     index = np.arange(n)
     ends[:, index, 0, index] += step
     ends[:, index, 1, index] -= step
-    values = function(np.ascontiguousarray(ends.reshape(-1, n))).reshape(m, n, 2, -1)
-    slopes: Array = (values[:, :, 0] - values[:, :, 1]) / (2 * step[:, :, None])
+    values = function(np.ascontiguousarray(ends.reshape(-1, n))).reshape(m * n, 2, -1)
+    slopes: Array = minus(values[:, 0], values[:, 1]).reshape(m, n, -1) / (2 * step[:, :, None])
     return np.ascontiguousarray(slopes.transpose(0, 2, 1))

@@ -74,7 +74,9 @@ def around(
         More touching points than the search is made for.
     """
     radius = positive_radius(radius)
-    circles = finite_array(np.reshape(np.asarray(obstacles, dtype=np.float64), (-1, 3)), "obstacles").copy()
+    circles = finite_array(obstacles if len(obstacles) else np.zeros((0, 3)), "obstacles").copy()
+    if circles.ndim != 2 or circles.shape[1] != 3:
+        raise InvalidInputError(f"obstacles must have shape (n, 3), x, y and radius each, got {circles.shape}")
     if not (math.isfinite(margin) and margin >= 0):
         raise InvalidInputError(f"margin must be a number of at least 0, got {margin!r}")
     if isinstance(points, bool) or not isinstance(points, int) or points < 4:

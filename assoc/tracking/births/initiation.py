@@ -49,6 +49,22 @@ class Initiation:
             raise InvalidInputError("speed must be one number, or one for each axis")
         for one in speeds:
             positive(one, "speed")
+        if not isinstance(self.speed, (int, float, tuple, list)):
+            object.__setattr__(self, "speed", float(self.speed))  # a number of numpy's
+
+    def prior(self, motion: Motion) -> tuple[Array, Array]:
+        """Where positions stand in a state, and the covariance of a new track before its position is put in.
+
+        Raises
+        ------
+        InvalidInputError
+            The speed is that of other axes.
+        """
+        axes = len(motion.position)
+        speed = self.speed if isinstance(self.speed, (int, float)) else tuple(self.speed)
+        if isinstance(speed, tuple) and len(speed) not in (1, axes):
+            raise InvalidInputError(f"speed must be one number, or one for each of {axes} axes, got {self.speed!r}")
+        return _prior(motion.dim, tuple(motion.position), speed, self.rest)
 
     def start(self, filter: Filter[Any], positions: Array, covariances: Array, lag: Array | None = None) -> Any:
         """States of new tracks, of the filter's own kind.
@@ -62,8 +78,7 @@ class Initiation:
         """
         motion = filter.motion
         axes = len(motion.position)
-        speed = self.speed if isinstance(self.speed, (int, float)) else tuple(self.speed)
-        place, prior = _prior(motion.dim, tuple(motion.position), speed, self.rest)
+        place, prior = self.prior(motion)
         mean = np.zeros((len(positions), motion.dim))
         mean[:, place] = positions[:, :axes]
         covariance = np.empty((len(positions), *prior.shape))
@@ -80,7 +95,6 @@ class Initiation:
 
 @lru_cache(maxsize=64)
 def _prior(dim: int, position: tuple[int, ...], speed: float | tuple[float, ...], rest: float) -> tuple[Array, Array]:
-    """Where positions stand in a state, and the covariance of a new track before its position is put in."""
     place = np.array(position)
     deviation = np.full(dim, rest)
     velocity = _velocities(dim, place)

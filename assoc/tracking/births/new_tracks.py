@@ -38,6 +38,7 @@ class NewTracks:
         self._terms = terms
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
+        initiation.prior(filter.motion)  # refuses what does not suit the filter now, not in the first scan
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:

@@ -8,7 +8,7 @@ and any way to associate. Tracks keep their ids: one that is found anew has the 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,7 +73,8 @@ class LatePlots:
         self._kept: deque[_Kept] = deque()
         self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
         self.next_id = max(first_id, max(self._names, default=0) + 1)
-        self._decided: dict[int, Decision] = {}
+        self._decided: dict[int, tuple[int, Decision]] = {}
+        """By scan: the scan whose step has decided it, and how."""
         self._many = _MANY
 
     @property
@@ -237,7 +238,7 @@ class LatePlots:
         self._names = names
         for k, step in enumerate(steps, start=first):
             self._kept[k].assigned = self._named(step.assigned)
-            self._decide(step.final)
+            self._decide(step)
 
     def _advance(
         self, time: float, measurements: list[Array], times: Sequence[Array] | None, sectors: Array | None,
@@ -249,13 +250,13 @@ class LatePlots:
         kept = _Kept(before, step.time, measurements, None if times is None else list(times), sectors, codes)
         kept.assigned = self._named(step.assigned)
         self._kept.append(kept)
-        self._decide(step.final)
+        self._decide(step)
         ended = np.array(sorted(self._name(i) for i in step.ended.tolist()), dtype=np.int64)
         return replace(step, assigned=kept.assigned, ended=ended)
 
-    def _decide(self, decisions: Iterable[Decision]) -> None:
-        for one in decisions:
-            self._decided[one.scan] = replace(one, assigned=self._named(one.assigned))
+    def _decide(self, step: Step) -> None:
+        for one in step.final:
+            self._decided[one.scan] = step.scan, self._outside(one)
 
     def _finish(self, step: Step, late: list[Array], refused: int) -> Step:
         """Forget what nothing can be late for any more, and the names of tracks that are gone."""
@@ -264,17 +265,19 @@ class LatePlots:
         while self._kept and self._kept[0].time < step.time - self.horizon:
             self._kept.popleft()
         open_scans = step.scan - len(self._kept)
-        final = tuple(self._decided.pop(scan) for scan in sorted(self._decided) if scan <= open_scans)
+        # what a scan that is kept has decided, it may decide otherwise when it is taken in anew
+        done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
+        final = tuple(self._decided.pop(scan)[1] for scan in done)
         if len(self._names) > self._many:
-            living = self.tracker.remember().track_ids | (self._kept[0].before.track_ids if self._kept else set())
+            living = self.tracker.remember().track_ids.union(*(kept.before.track_ids for kept in self._kept))
             self._names = {inner: outer for inner, outer in self._names.items() if inner in living}
             self._many = _MANY + 2 * len(self._names)
         return replace(step, final=final, late=count, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:
         """What is said of the scans that are not final yet, oldest first; for the end of a recording."""
-        self._decide(self.tracker.flush())
-        return tuple(self._decided.pop(scan) for scan in sorted(self._decided))
+        decided = [self._decided.pop(scan)[1] for scan in sorted(self._decided)]
+        return (*decided, *map(self._outside, self.tracker.flush()))
 
     def _name(self, inner: int) -> int:
         """The id by which a track is known outside."""
@@ -282,6 +285,9 @@ class LatePlots:
             self._names[inner] = self.next_id
             self.next_id += 1
         return self._names[inner]
+
+    def _outside(self, one: Decision) -> Decision:
+        return replace(one, assigned=self._named(one.assigned))
 
     def _named(self, assigned: Sequence[Array]) -> tuple[Array, ...]:
         return tuple(

@@ -20,7 +20,7 @@ from assoc.tracking.checking import checked
 from assoc.tracking.identity_evidence import checked_identities
 from assoc.tracking.live.kept_identities import KeptIdentities
 from assoc.tracking.live.late_plots import HORIZON, LatePlots
-from assoc.tracking.live.pictures import Picture, SoundPlot
+from assoc.tracking.live.pictures import Picture, PlotKey, SoundPlot
 from assoc.tracking.tracker import Tracker
 
 FULL_TURN = 2.0 * math.pi
@@ -93,12 +93,12 @@ class LiveTracker:
         self._newest = -math.inf
         self._pending: list[SoundPlot] = []
         self._ahead: list[SoundPlot] = []
-        self._behind = 0
+        self._behind: set[PlotKey] = set()
         self._last = [-math.inf] * count
         self._silent = [False] * count
         self._phase = [0j] * count
         self._heard = [0] * count
-        self._recent: dict[tuple[int, float, bytes], None] = {}
+        self._recent: dict[PlotKey, None] = {}
         self._confirmed: set[int] = set()
         self._kept = KeptIdentities()
         self.counts: Counter[str] = Counter()
@@ -163,6 +163,8 @@ class LiveTracker:
             return []
         where = self._scene.sensors[s].name or s + 1
         try:
+            if not np.size(values):
+                raise InvalidInputError(f"measurements of sensor {s} must have {self._scene.sensors[s].dim} values")
             z = checked(np.array([values], dtype=np.float64), s, self._scene.sensors[s])[0]
             known = checked_identities([np.array([identity])], [1])[0][0]
         except (AssocError, TypeError, ValueError) as error:
@@ -172,7 +174,8 @@ class LiveTracker:
             self.leave_out("unusable", f"plot of {where} left out: its time is {time:g}, expected seconds")
             return []
         plot = SoundPlot(s, time, z, known)
-        if plot.key in self._recent:
+        # a plot that is repeated while its time is doubted does not agree with itself
+        if plot.key in self._recent or plot.key in self._behind or plot.key in [one.key for one in self._ahead]:
             self.leave_out("repeated", f"{where} repeats a plot of {time:g} s: left out")
             return []
         return self._timed(plot)
@@ -191,8 +194,8 @@ class LiveTracker:
             return self._jump()
         if time < self._end - self.interval - self.horizon:
             self.leave_out("too old", f"plot of {time:g} s is more than {self.horizon:g} s late: left out")
-            self._behind += 1
-            if self._behind >= _AGREE:
+            self._behind.add(plot.key)
+            if len(self._behind) >= _AGREE:
                 self._tell(f"the clock went back from {self._newest:g} s to {time:g} s: tracks begin anew")
                 pictures = self.finish()
                 self._restart()
@@ -200,7 +203,7 @@ class LiveTracker:
             return []
         if self._ahead:
             self._drop_ahead()
-        self._behind = 0
+        self._behind.clear()
         self._recent[plot.key] = None
         self.counts["plots"] += 1
         self._hear(plot)
@@ -228,7 +231,7 @@ class LiveTracker:
         self._kept.settle(set(), math.inf)
         first = self._tracker.next_id
         self._tracker = LatePlots(self._make(), self.horizon, first_id=first)
-        self._end, self._newest, self._behind = math.nan, -math.inf, 0
+        self._end, self._newest, self._behind = math.nan, -math.inf, set()
         self._pending, self._ahead, self._recent = [], [], {}
         self._last, self._phase = [-math.inf] * len(self._last), [0j] * len(self._last)
         self._heard = [0] * len(self._last)

@@ -7,6 +7,9 @@ from typing import NamedTuple
 from assoc._types import Array
 from assoc.tracking.track import Track
 
+PlotKey = tuple[int, float, bytes]
+"""Sensor, time, values."""
+
 
 class SoundPlot(NamedTuple):
     """A plot that is sound."""
@@ -18,7 +21,7 @@ class SoundPlot(NamedTuple):
     """Mode 3/A code and ICAO address, (2,)."""
 
     @property
-    def key(self) -> tuple[int, float, bytes]:
+    def key(self) -> PlotKey:
         """What a repeated plot has in common with the first."""
         return self.sensor, self.time, self.z.tobytes()
 
