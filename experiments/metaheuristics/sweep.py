@@ -80,8 +80,7 @@ class Case(NamedTuple):
 HOW = ("paper", "mmas, none", "mmas, full")
 CASES = (
     *(Case(name, 20, how) for name in ("noisy radars", "poor radars") for how in HOW),
-    *(Case("ghosts 20", 4, how) for how in HOW),
-    *(Case("ghosts 40", 4, how) for how in HOW[1:]),
+    *(Case(name, 12, how) for name in ("ghosts 20", "ghosts 40") for how in HOW),
 )
 
 
