@@ -76,26 +76,24 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
         return abs(off) <= math.asin(math.sqrt(ball / away)) + math.sqrt(
             2.0 * limit * sensors.covariance[t, 0, 0]
         )
-    limit = _wide(sensors, s, t, limit)
-    dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
-    c0, c1, c3 = (
-        scan.spread[n, 0] + scan.spread[m, 0],
-        scan.spread[n, 1] + scan.spread[m, 1],
-        scan.spread[n, 3] + scan.spread[m, 3],
-    )
+    tall = sensors.full[s] and sensors.full[t]
+    return _overlap(scan.centre, scan.spread, n, m, _wide(sensors, s, t, limit), tall)
+
+
+@inner_njit
+def _overlap(centre: Array, spread: Array, n: int, m: int, limit: float, tall: bool) -> bool:
+    """Whether the ellipsoids of two converted measurements, added up, hold their difference; `tall`: heights count."""
+    dx, dy = centre[n, 0] - centre[m, 0], centre[n, 1] - centre[m, 1]
+    c0, c1, c3 = spread[n, 0] + spread[m, 0], spread[n, 1] + spread[m, 1], spread[n, 3] + spread[m, 3]
     if dx * dx + dy * dy > limit * (c0 + c3):
         return False
     det = c0 * c3 - c1 * c1
     if det > 1e-12 * c0 * c3 and dx * dx * c3 - 2.0 * dx * dy * c1 + dy * dy * c0 > limit * det:
         return False
-    if not (sensors.full[s] and sensors.full[t]):
+    if not tall:
         return True
-    dz = scan.centre[n, 2] - scan.centre[m, 2]
-    c2, c4, c5 = (
-        scan.spread[n, 2] + scan.spread[m, 2],
-        scan.spread[n, 4] + scan.spread[m, 4],
-        scan.spread[n, 5] + scan.spread[m, 5],
-    )
+    dz = centre[n, 2] - centre[m, 2]
+    c2, c4, c5 = spread[n, 2] + spread[m, 2], spread[n, 4] + spread[m, 4], spread[n, 5] + spread[m, 5]
     if dz * dz > limit * c5:
         return False
     if not det > 1e-12 * c0 * c3:
@@ -159,25 +157,35 @@ def _near_within(
     """
     found = np.empty((1024, 2), np.int32)
     count = 0
-    # out of the tuple first: a field read in the loop costs a reference count each time
+    # out of the tuples first: a field read in the loop costs a reference count each time
     centre, spread = scan.centre, scan.spread
     s = scan.owner[rows[0]]
     located = sensors.code[s] != BEARING and sensors.code[t] != BEARING
     tall = sensors.full[s] and sensors.full[t]
-    wide = (1.0 + 1e-9) * _wide(sensors, s, t, limit)
+    wide = _wide(sensors, s, t, limit)
+    room = (1.0 + 1e-9) * wide
+    # of the others position and variances, as a window runs through them
+    beside = np.empty((len(others) if located else 0, 6))
+    for e in range(len(beside)):
+        m = others[e]
+        for i in range(3):
+            beside[e, i] = centre[m, i]
+        beside[e, 3], beside[e, 4], beside[e, 5] = spread[m, 0], spread[m, 3], spread[m, 5]
     for k in range(len(rows)):
         n = rows[k]
+        x, y, z = centre[n, 0], centre[n, 1], centre[n, 2]
+        xx, yy, zz = spread[n, 0], spread[n, 3], spread[n, 5]
         for e in range(first[k], last[k]):
-            m = others[e]
             if located:
                 # coordinate by coordinate: most are ruled out by one
-                dx, dy, dz = centre[n, 0] - centre[m, 0], centre[n, 1] - centre[m, 1], centre[n, 2] - centre[m, 2]
-                if dx * dx > wide * (spread[n, 0] + spread[m, 0]) or dy * dy > wide * (spread[n, 3] + spread[m, 3]):
+                dx, dy, dz = x - beside[e, 0], y - beside[e, 1], z - beside[e, 2]
+                if dx * dx > room * (xx + beside[e, 3]) or dy * dy > room * (yy + beside[e, 4]):
                     continue
-                if tall and dz * dz > wide * (spread[n, 5] + spread[m, 5]):
+                if tall and dz * dz > room * (zz + beside[e, 5]):
                     continue
+            m = others[e]
             low, high = min(n, m), max(n, m)
-            if _near(sensors, scan, low, high, limit):
+            if _overlap(centre, spread, low, high, wide, tall) if located else _near(sensors, scan, low, high, limit):
                 if count == len(found):
                     found = _twice_as_long(found)
                 found[count, 0], found[count, 1] = low, high
