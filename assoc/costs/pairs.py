@@ -139,7 +139,7 @@ def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, 
     return found[:count]
 
 
-@inner_njit
+@njit
 def _wide(code: int, other: int, limit: float) -> float:
     """The gate of two sensors' ellipsoids: for bent measurement models these are added up, not their covariances."""
     return limit if code == POSITION and other == POSITION else 2.0 * limit
