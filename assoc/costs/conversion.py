@@ -49,19 +49,19 @@ def convert(
         if code[s] == BEARING:
             continue
         R = covariance[s]
-        # first as wide as the gate asks, then as for any start
-        for turn in range(2):
-            c = spread[n] if turn == 0 else information[n]
-            size = reach if turn == 0 else START_REACH
-            base = least if turn == 0 else START_REACH
-            convert_one(code[s], dim[s], z[n], place[s], R, heights, size, base, centre[n], c)
-            if dim[s] == 2:
-                c[2], c[4], c[5] = 0.0, 0.0, 1.0
-        c = information[n]
-        ok, i0, i1, i2, i3, i4, i5 = inverse_by_cofactors((c[0], c[1], c[2], c[3], c[4], c[5]))
+        U = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
+        one, at = (z[n, 0], z[n, 1], z[n, 2]), (place[s, 0], place[s, 1], place[s, 2])
+        # as wide as the gate asks, then as for any start
+        _, wide = convert_one(code[s], dim[s], one, at, U, heights, reach, least)
+        there, c = convert_one(code[s], dim[s], one, at, U, heights, START_REACH, START_REACH)
+        ok, i0, i1, i2, i3, i4, i5 = inverse_by_cofactors(c)
         if not ok:
             # too flat to invert: a ball of the same size will do for a start
             i0 = i3 = i5 = 1.0 / (c[0] + c[3] + (c[5] if dim[s] == 3 else 0.0))
             i1 = i2 = i4 = 0.0
-        c[0], c[1], c[2], c[3], c[4], c[5] = i0, i1, i2, i3, i4, i5
+        centre[n, 0], centre[n, 1], centre[n, 2] = there
+        for i, value in enumerate(wide):
+            spread[n, i] = value
+        for i, value in enumerate((i0, i1, i2, i3, i4, i5)):
+            information[n, i] = value
     return centre, spread, information

@@ -22,11 +22,23 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.costs.conversion import HEIGHTS
-from assoc.costs.residuals import normal
+from assoc.costs.residuals import (
+    CENTRE,
+    CODE,
+    DIM,
+    FULL,
+    INFORMATION,
+    MEASURED,
+    PLACE,
+    RISE,
+    WEIGHT,
+    WIDTH,
+    normal,
+)
 from assoc.costs.starts import bearing_starts, height_start, mean_start, singular_start
 from assoc.costs.symmetric import inverse, solve
 from assoc.sensors.codes import BEARING, RADAR2D
-from assoc.sensors.kernels.records import Six
+from assoc.sensors.kernels.records import Six, Three
 
 # a position is undetermined along a direction if the measurements tell less of it than this times the prior
 _WEAK = 1.0
@@ -40,18 +52,12 @@ _HEIGHT_SLACK = 1.1
 
 
 @inner_njit
-def _descend(
-    sensors: SensorArrays,
-    scan: ScanArrays,
-    members: Array,
-    at: tuple[float, float, float],
-    prior: Six,
-) -> tuple[float, float, float, float, Six]:
+def _descend(members: Array, middle: Three, at: Three, prior: Six) -> tuple[float, float, float, float, Six]:
     """Levenberg-Marquardt from `at`: chi-square, position and information, all without the prior's share."""
     x, y, z = at
-    m0, m1, m2 = sensors.middle[0], sensors.middle[1], sensors.middle[2]
+    m0, m1, m2 = middle
     damping = 0.0
-    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = normal(sensors, scan, members, x, y, z)
+    chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = normal(members, x, y, z)
     q0, q1, q2 = m0 - x, m1 - y, m2 - z
     w0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
     w1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -72,7 +78,7 @@ def _descend(
         promise = s0 * (g0 + w0) + s1 * (g1 + w1) + s2 * (g2 + w2)
         if promise <= 1e-13 * goal + 1e-20:
             break
-        trial = normal(sensors, scan, members, x + s0, y + s1, z + s2)
+        trial = normal(members, x + s0, y + s1, z + s2)
         q0, q1, q2 = m0 - x - s0, m1 - y - s1, m2 - z - s2
         v0 = prior[0] * q0 + prior[1] * q1 + prior[2] * q2
         v1 = prior[1] * q0 + prior[3] * q1 + prior[4] * q2
@@ -95,16 +101,15 @@ def _descend(
 
 
 @inner_njit
-def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
+def _determined(half: Three, A: Six, flat: bool) -> bool:
     """Whether the information is above the prior's in every direction (judged by the inverse's trace)."""
-    h = sensors.half
-    height = A[5] * h[2] * h[2] if not flat else 100.0 * _WEAK
+    height = A[5] * half[2] * half[2] if not flat else 100.0 * _WEAK
     scaled = (
-        A[0] * h[0] * h[0],
-        A[1] * h[0] * h[1],
-        A[2] * h[0] * h[2],
-        A[3] * h[1] * h[1],
-        A[4] * h[1] * h[2],
+        A[0] * half[0] * half[0],
+        A[1] * half[0] * half[1],
+        A[2] * half[0] * half[2],
+        A[3] * half[1] * half[1],
+        A[4] * half[1] * half[2],
         height,
     )
     ok, c0, _, _, c3, _, c5 = inverse(scaled)
@@ -112,14 +117,13 @@ def _determined(sensors: SensorArrays, A: Six, flat: bool) -> bool:
 
 
 @inner_njit
-def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
+def _weak_prior(half: Three, A: Six) -> Six:
     """The region's prior along those directions only which the information `A` leaves open."""
-    h = sensors.half
     M, V = np.zeros((3, 3)), np.zeros((3, 3))
-    M[0, 0], M[1, 1], M[2, 2] = A[0] * h[0] * h[0], A[3] * h[1] * h[1], A[5] * h[2] * h[2]
-    M[0, 1] = M[1, 0] = A[1] * h[0] * h[1]
-    M[0, 2] = M[2, 0] = A[2] * h[0] * h[2]
-    M[1, 2] = M[2, 1] = A[4] * h[1] * h[2]
+    M[0, 0], M[1, 1], M[2, 2] = A[0] * half[0] * half[0], A[3] * half[1] * half[1], A[5] * half[2] * half[2]
+    M[0, 1] = M[1, 0] = A[1] * half[0] * half[1]
+    M[0, 2] = M[2, 0] = A[2] * half[0] * half[2]
+    M[1, 2] = M[2, 1] = A[4] * half[1] * half[2]
     V[0, 0] = V[1, 1] = V[2, 2] = 1.0
     # Jacobi's rotations: eigenvalues end on the diagonal of M, eigenvectors in the columns of V
     for _ in range(12):
@@ -143,51 +147,46 @@ def _weak_prior(sensors: SensorArrays, A: Six) -> Six:
         if M[k, k] < _WEAK:
             for i in range(3):
                 for j in range(3):
-                    P[i, j] += V[i, k] * V[j, k] / (h[i] * h[j])
+                    P[i, j] += V[i, k] * V[j, k] / (half[i] * half[j])
     return P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2]
 
 
 @inner_njit
 def _settle(
-    sensors: SensorArrays,
-    scan: ScanArrays,
-    members: Array,
-    at: tuple[float, float, float],
-    flat: bool,
+    members: Array, middle: Three, half: Three, at: Three, flat: bool
 ) -> tuple[float, float, float, float, Six, Six]:
     """Descend without prior if the members determine the position, else with it where they do not."""
-    h = sensors.half
-    none = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / (h[2] * h[2]) if flat else 0.0)
-    every = (1.0 / (h[0] * h[0]), 0.0, 0.0, 1.0 / (h[1] * h[1]), 0.0, 1.0 / (h[2] * h[2]))
-    _, _, _, _, a0, a1, a2, a3, a4, a5 = normal(sensors, scan, members, at[0], at[1], at[2])
-    pure = _determined(sensors, (a0, a1, a2, a3, a4, a5), flat)
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / (half[2] * half[2]) if flat else 0.0)
+    every = (1.0 / (half[0] * half[0]), 0.0, 0.0, 1.0 / (half[1] * half[1]), 0.0, 1.0 / (half[2] * half[2]))
+    _, _, _, _, a0, a1, a2, a3, a4, a5 = normal(members, at[0], at[1], at[2])
+    pure = _determined(half, (a0, a1, a2, a3, a4, a5), flat)
     if pure:
-        chi, x, y, z, A = _descend(sensors, scan, members, at, none)
-        if _determined(sensors, A, flat):
+        chi, x, y, z, A = _descend(members, middle, at, none)
+        if _determined(half, A, flat):
             return chi, x, y, z, A, none
-    chi, x, y, z, A = _descend(sensors, scan, members, at, every)
-    prior = none if _determined(sensors, A, flat) else _weak_prior(sensors, A)
-    chi, x, y, z, A = _descend(sensors, scan, members, (x, y, z), prior)
-    if not _determined(sensors, A, flat):
+    chi, x, y, z, A = _descend(members, middle, at, every)
+    prior = none if _determined(half, A, flat) else _weak_prior(half, A)
+    chi, x, y, z, A = _descend(members, middle, (x, y, z), prior)
+    if not _determined(half, A, flat):
         # the final step may have moved where directions open up: keep the covariance finite
-        prior = _weak_prior(sensors, A)
+        prior = _weak_prior(half, A)
     return chi, x, y, z, A, prior
 
 
 @inner_njit
 def _from(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, at: tuple[float, float, float], full: bool, flat: bool
+    members: Array, middle: Three, half: Three, at: Three, full: bool, flat: bool
 ) -> tuple[float, float, float, float, Six, Six]:
     """Position that a start leads to."""
     if full:
         none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        chi, x, y, z, A = _descend(sensors, scan, members, at, none)
+        chi, x, y, z, A = _descend(members, middle, at, none)
         return chi, x, y, z, A, none
-    return _settle(sensors, scan, members, at, flat)
+    return _settle(members, middle, half, at, flat)
 
 
 @inner_njit
-def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[float, float, float, float, Six, Six]:
+def _locate(members: Array, middle: Three, half: Three) -> tuple[float, float, float, float, Six, Six]:
     """Maximum-likelihood position: chi-square there, x, y, z, information, and the prior that was needed.
 
     Ranges near a radar that measures no elevation bend so much that the fit may end in a local minimum, hundreds of
@@ -197,38 +196,36 @@ def _locate(sensors: SensorArrays, scan: ScanArrays, members: Array) -> tuple[fl
     """
     # counted, not flagged: a variable that starts as a literal makes numba compile its callees twice
     full_ones = tall_ones = located_ones = slant_ones = 0
-    # out of the tuples first: a field read in the loop costs a reference count each time
-    owner, fulls, code = scan.owner, sensors.full, sensors.code
-    for n in members:
-        s = owner[n]
-        full_ones += 1 if fulls[s] else 0
-        tall_ones += 1 if fulls[s] or code[s] == RADAR2D else 0
-        located_ones += 1 if code[s] != BEARING else 0
-        slant_ones += 1 if code[s] == RADAR2D else 0
+    for m in range(len(members)):
+        code, tall = members[m, CODE], members[m, FULL] > 0.0
+        full_ones += 1 if tall else 0
+        tall_ones += 1 if tall or code == RADAR2D else 0
+        located_ones += 1 if code != BEARING else 0
+        slant_ones += 1 if code == RADAR2D else 0
     full, flat = full_ones > 0, tall_ones == 0
     at = ahead = (0.0, 0.0, 0.0)
     if located_ones == 0:
-        at, ahead = bearing_starts(sensors, scan, members)
+        at, ahead = bearing_starts(members, middle, half)
     else:
-        at = mean_start(sensors, scan, members, full)
-    best = _from(sensors, scan, members, at, full, flat)
+        at = mean_start(members, full)
+    best = _from(members, middle, half, at, full, flat)
     if located_ones == 0 and not best[0] <= _POOR_FIT:
-        other = _from(sensors, scan, members, ahead, full, flat)
+        other = _from(members, middle, half, ahead, full, flat)
         if other[0] < best[0] or not math.isfinite(best[0]):
             best = other
     if len(members) == 1 or located_ones == 0 or best[0] <= _DOUBTFUL:
         return best
     if slant_ones > 0:
-        chi, x, y, z = height_start(sensors, scan, members, slant_ones == len(members))
+        chi, x, y, z = height_start(members, middle, half, slant_ones == len(members))
         if chi < math.inf:
-            other = _from(sensors, scan, members, (x, y, z), full, flat)
-            if other[0] < best[0] and abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]:
+            other = _from(members, middle, half, (x, y, z), full, flat)
+            if other[0] < best[0] and abs(other[3] - middle[2]) <= _HEIGHT_SLACK * half[2]:
                 best = other
     # a descent from there is worth its time only where the start is already better
-    chi, x, y, z = singular_start(sensors, scan, members, at)
+    chi, x, y, z = singular_start(members, at)
     if chi < best[0]:
-        other = _from(sensors, scan, members, (x, y, z), full, flat)
-        if other[0] < best[0] and (full or abs(other[3] - sensors.middle[2]) <= _HEIGHT_SLACK * sensors.half[2]):
+        other = _from(members, middle, half, (x, y, z), full, flat)
+        if other[0] < best[0] and (full or abs(other[3] - middle[2]) <= _HEIGHT_SLACK * half[2]):
             best = other
     return best
 
@@ -252,22 +249,38 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
     total = len(rows)
     kept = 0 if gating else total
     chis, places, covariances = np.zeros(total), np.zeros((kept, 3)), np.zeros((kept, 3, 3))
-    members = np.zeros(len(sensors.dim), np.int64)
+    middle = (sensors.middle[0], sensors.middle[1], sensors.middle[2])
+    half = (sensors.half[0], sensors.half[1], sensors.half[2])
+    code, dim, full, place = sensors.code, sensors.dim, sensors.full, sensors.place
+    weight, covariance = sensors.weight, sensors.covariance
+    measured, centre, information = scan.z, scan.centre, scan.information
+    members = np.empty((len(dim), WIDTH))
     for t in range(total):
         count = 0
+        full_ones = 0
         for s in range(rows.shape[1]):
-            if rows[t, s] >= 0:
-                members[count] = rows[t, s]
-                count += 1
-        chi, x, y, z, A, prior = _locate(sensors, scan, members[:count])
+            n = rows[t, s]
+            if n < 0:
+                continue
+            members[count, CODE], members[count, DIM], members[count, FULL] = code[s], dim[s], full[s]
+            entry = WEIGHT
+            for i in range(3):
+                members[count, PLACE + i] = place[s, i]
+                members[count, MEASURED + i] = measured[n, i]
+                members[count, CENTRE + i] = centre[n, i]
+                for j in range(i, 3):
+                    members[count, entry] = weight[s, i, j]
+                    entry += 1
+            members[count, RISE] = covariance[s, 2, 2]
+            for i in range(6):
+                members[count, INFORMATION + i] = information[n, i]
+            full_ones += 1 if full[s] else 0
+            count += 1
+        chi, x, y, z, A, prior = _locate(members[:count], middle, half)
         chis[t] = chi
         if gating:
-            if abs(z - sensors.middle[2]) > HEIGHTS * sensors.half[2]:
-                full = 0
-                for n in members[:count]:
-                    full += 1 if sensors.full[scan.owner[n]] else 0
-                if full == 0:
-                    chis[t] = math.inf
+            if full_ones == 0 and abs(z - middle[2]) > HEIGHTS * half[2]:
+                chis[t] = math.inf
             continue
         places[t, 0], places[t, 1], places[t, 2] = x, y, z
         B = (
@@ -277,7 +290,7 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
         ok, c0, c1, c2, c3, c4, c5 = inverse(B)
         if not ok:
             # numerically singular: the region's width is all that can be said
-            c0, c3, c5 = sensors.half[0] ** 2, sensors.half[1] ** 2, sensors.half[2] ** 2
+            c0, c3, c5 = half[0] ** 2, half[1] ** 2, half[2] ** 2
             c1 = c2 = c4 = 0.0
         elif not solve((c0, c1, c2, c3, c4, c5), 0.0, 0.0, 0.0)[0]:
             # longer than thin by more digits than there are: rounding must not leave it indefinite

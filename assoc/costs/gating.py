@@ -34,9 +34,7 @@ def chi_square_quantiles(probability: float, largest: int) -> Array:
     from scipy.special import gammaincinv
 
     freedom = np.maximum(np.arange(largest + 1), 1)
-    quantiles = (
-        np.full(largest + 1, np.inf) if probability == 1.0 else 2.0 * gammaincinv(freedom / 2.0, probability)
-    )
+    quantiles = np.full(largest + 1, np.inf) if probability == 1.0 else 2.0 * gammaincinv(freedom / 2.0, probability)
     quantiles.setflags(write=False)
     return quantiles
 
@@ -55,8 +53,10 @@ def degrees_of_freedom(sensors: SensorArrays, detected: Array) -> Array:
     -------
     int ndarray (K,)
     """
-    coordinates = np.where(detected @ sensors.full.astype(np.int64) > 0, 3, 2)
-    return np.maximum(detected @ sensors.dim - coordinates, 0)
+    coordinates = np.where(detected[:, sensors.full].any(axis=1), 3, 2)
+    # whole numbers all the same: the product is quick for floats alone
+    measured = (detected @ sensors.dim.astype(np.float64)).astype(np.int64)
+    return np.maximum(measured - coordinates, 0)
 
 
 def make_gates(sensors: SensorArrays, probability: float) -> Gates:

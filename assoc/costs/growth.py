@@ -145,13 +145,13 @@ def grow(
         total = chi + price if priced else chi
         hopeful: Array = 0.5 * total < worth + gates.future[t + 1] + (SLACK if t + 1 < count else 0.0)
         if not hopeful.all():
-            rows, chi, worth = rows[hopeful], chi[hopeful], worth[hopeful]
+            rows, chi, worth = rows.compress(hopeful, axis=0), chi[hopeful], worth[hopeful]
             price = price[hopeful] if priced else price
         if len(rows) > max_tuples:
             raise refuse(number, len(rows), max_tuples)
     costs = 0.5 * (chi + price if priced else chi) - worth
     good = (chi <= gates.joint[degrees_of_freedom(sensors, rows >= 0)]) & (costs < 0.0)
-    return rows[good], costs[good]
+    return rows.compress(good, axis=0), costs[good]
 
 
 def _grown(
@@ -182,14 +182,14 @@ def _grown(
             rows[part], t, pairs.second, pairs.start, scan.z[:, 0].copy(), middle, half, _BLOCK
         )
         low += done
-        grown = rows[part][parent]
+        grown = rows[part].take(parent, axis=0)
         grown[:, t] = added
         value = fit(sensors, scan, grown, True)[0]
         detected = grown >= 0
         freedom = np.minimum(degrees_of_freedom(sensors, detected) + later + 1, len(gates.joint) - 1)
         hopeful = value <= gates.joint[freedom] + SLACK
         hopeful &= 0.5 * value < detected @ sensors.gain - sensors.base + gates.future[t + 1] + SLACK
-        kept_rows.append(grown[hopeful])
+        kept_rows.append(grown.compress(hopeful, axis=0))
         kept_chi.append(value[hopeful])
         so_far += len(kept_chi[-1])
         if so_far > max_tuples or too_many(so_far - len(rows), low / len(rows), max_tuples):

@@ -73,29 +73,25 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
             return True
         off = scan.z[m, 0] - math.atan2(dy, dx)
         off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
-        return abs(off) <= math.asin(math.sqrt(ball / away)) + math.sqrt(
-            2.0 * limit * sensors.covariance[t, 0, 0]
-        )
-    limit = _wide(sensors, s, t, limit)
-    dx, dy = scan.centre[n, 0] - scan.centre[m, 0], scan.centre[n, 1] - scan.centre[m, 1]
-    c0, c1, c3 = (
-        scan.spread[n, 0] + scan.spread[m, 0],
-        scan.spread[n, 1] + scan.spread[m, 1],
-        scan.spread[n, 3] + scan.spread[m, 3],
-    )
+        return abs(off) <= math.asin(math.sqrt(ball / away)) + math.sqrt(2.0 * limit * sensors.covariance[t, 0, 0])
+    tall = sensors.full[s] and sensors.full[t]
+    return _overlap(scan.centre, scan.spread, n, m, _wide(sensors.code[s], sensors.code[t], limit), tall)
+
+
+@inner_njit
+def _overlap(centre: Array, spread: Array, n: int, m: int, limit: float, tall: bool) -> bool:
+    """Whether the ellipsoids of two converted measurements, added up, hold their difference; `tall`: heights count."""
+    dx, dy = centre[n, 0] - centre[m, 0], centre[n, 1] - centre[m, 1]
+    c0, c1, c3 = spread[n, 0] + spread[m, 0], spread[n, 1] + spread[m, 1], spread[n, 3] + spread[m, 3]
     if dx * dx + dy * dy > limit * (c0 + c3):
         return False
     det = c0 * c3 - c1 * c1
     if det > 1e-12 * c0 * c3 and dx * dx * c3 - 2.0 * dx * dy * c1 + dy * dy * c0 > limit * det:
         return False
-    if not (sensors.full[s] and sensors.full[t]):
+    if not tall:
         return True
-    dz = scan.centre[n, 2] - scan.centre[m, 2]
-    c2, c4, c5 = (
-        scan.spread[n, 2] + scan.spread[m, 2],
-        scan.spread[n, 4] + scan.spread[m, 4],
-        scan.spread[n, 5] + scan.spread[m, 5],
-    )
+    dz = centre[n, 2] - centre[m, 2]
+    c2, c4, c5 = spread[n, 2] + spread[m, 2], spread[n, 4] + spread[m, 4], spread[n, 5] + spread[m, 5]
     if dz * dz > limit * c5:
         return False
     if not det > 1e-12 * c0 * c3:
@@ -144,9 +140,9 @@ def _near_all(sensors: SensorArrays, scan: ScanArrays, limits: Array, low: int, 
 
 
 @njit
-def _wide(sensors: SensorArrays, s: int, t: int, limit: float) -> float:
+def _wide(code: int, other: int, limit: float) -> float:
     """The gate of two sensors' ellipsoids: for bent measurement models these are added up, not their covariances."""
-    return limit if sensors.code[s] == POSITION and sensors.code[t] == POSITION else 2.0 * limit
+    return limit if code == POSITION and other == POSITION else 2.0 * limit
 
 
 @njit
@@ -159,25 +155,35 @@ def _near_within(
     """
     found = np.empty((1024, 2), np.int32)
     count = 0
-    # out of the tuple first: a field read in the loop costs a reference count each time
+    # out of the tuples first: a field read in the loop costs a reference count each time
     centre, spread = scan.centre, scan.spread
     s = scan.owner[rows[0]]
     located = sensors.code[s] != BEARING and sensors.code[t] != BEARING
     tall = sensors.full[s] and sensors.full[t]
-    wide = (1.0 + 1e-9) * _wide(sensors, s, t, limit)
+    wide = _wide(sensors.code[s], sensors.code[t], limit)
+    room = (1.0 + 1e-9) * wide
+    # positions of the others and their variances, in the order in which windows run through them
+    beside = np.empty((len(others) if located else 0, 6))
+    for e in range(len(beside)):
+        m = others[e]
+        for i in range(3):
+            beside[e, i] = centre[m, i]
+        beside[e, 3], beside[e, 4], beside[e, 5] = spread[m, 0], spread[m, 3], spread[m, 5]
     for k in range(len(rows)):
         n = rows[k]
+        x, y, z = centre[n, 0], centre[n, 1], centre[n, 2]
+        xx, yy, zz = spread[n, 0], spread[n, 3], spread[n, 5]
         for e in range(first[k], last[k]):
-            m = others[e]
             if located:
                 # coordinate by coordinate: most are ruled out by one
-                dx, dy, dz = centre[n, 0] - centre[m, 0], centre[n, 1] - centre[m, 1], centre[n, 2] - centre[m, 2]
-                if dx * dx > wide * (spread[n, 0] + spread[m, 0]) or dy * dy > wide * (spread[n, 3] + spread[m, 3]):
+                dx, dy, dz = x - beside[e, 0], y - beside[e, 1], z - beside[e, 2]
+                if dx * dx > room * (xx + beside[e, 3]) or dy * dy > room * (yy + beside[e, 4]):
                     continue
-                if tall and dz * dz > wide * (spread[n, 5] + spread[m, 5]):
+                if tall and dz * dz > room * (zz + beside[e, 5]):
                     continue
+            m = others[e]
             low, high = min(n, m), max(n, m)
-            if _near(sensors, scan, low, high, limit):
+            if _overlap(centre, spread, low, high, wide, tall) if located else _near(sensors, scan, low, high, limit):
                 if count == len(found):
                     found = _twice_as_long(found)
                 found[count, 0], found[count, 1] = low, high
@@ -205,9 +211,7 @@ def _coarse(sensors: SensorArrays, scan: ScanArrays, limits: Array) -> Iterator[
         done += size
 
 
-def _between(
-    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
-) -> Iterator[tuple[Array, float]]:
+def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> Iterator[tuple[Array, float]]:
     """Blocks of the near pairs of sensors s and t, each with the share of them that is done after it."""
     if sensors.code[s] == BEARING:
         # windows are those of located measurements, where there are any
@@ -223,9 +227,7 @@ def _between(
         k = stop
 
 
-def _windows(
-    sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
-) -> tuple[Array, Array, Array]:
+def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> tuple[Array, Array, Array]:
     """Measurements of sensor t, and for each of sensor s where among them those near it begin and end.
 
     If one of the two sensors measures bearings alone, it is t.
@@ -253,19 +255,20 @@ def _windows_along_an_axis(
     sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
 ) -> tuple[Array, Array, Array]:
     """`_windows` of sensors that measure positions, along the axis, x or y, that spreads those of t the more."""
-    rows, others = np.arange(scan.start[s], scan.start[s + 1]), np.arange(scan.start[t], scan.start[t + 1])
-    along = int(np.argmax(np.ptp(scan.centre[others, :2], axis=0)))
-    others = others[np.argsort(scan.centre[others, along], kind="stable")]
-    # x and y of a measurement's position, and their variances
+    own, other = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
+    along = int(np.ptp(scan.centre[other, 1]) > np.ptp(scan.centre[other, 0]))
+    middle, line = scan.centre[own, along], scan.centre[other, along]
+    order = np.argsort(line, kind="stable")
+    line = line[order]
+    # variances of x or of y
     variance = scan.spread[:, 3 * along]
-    far = np.sqrt(_wide(sensors, s, t, limit) * (variance[rows] + variance[others].max())) * (1.0 + 1e-9)
-    middle, line = scan.centre[rows, along], scan.centre[others, along]
-    return others, np.searchsorted(line, middle - far), np.searchsorted(line, middle + far, side="right")
+    wide = _wide(sensors.code[s], sensors.code[t], limit)
+    far = np.sqrt(wide * (variance[own] + variance[other].max())) * (1.0 + 1e-9)
+    first, last = np.searchsorted(line, middle - far), np.searchsorted(line, middle + far, side="right")
+    return order + scan.start[t], first, last
 
 
-def compatible_pairs(
-    sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int
-) -> Pairs:
+def compatible_pairs(sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, number: int, max_tuples: int) -> Pairs:
     """All pairs of measurements of different sensors that pass the pair gate.
 
     Raises
@@ -283,7 +286,7 @@ def compatible_pairs(
             np.put_along_axis(rows, owners, block, axis=1)
             chi = fit(sensors, scan, rows, True)[0]
             passed = chi <= gates.pair[owners[:, 0], owners[:, 1]]
-            kept.append(block[passed])
+            kept.append(block.compress(passed, axis=0))
             values.append(chi[passed])
             so_far += len(kept[-1])
             if too_many(so_far, share, max_tuples):
@@ -293,8 +296,9 @@ def compatible_pairs(
     keys = pairs[:, 0].astype(np.int64) * total + pairs[:, 1]
     if (np.diff(keys) < 0).any():
         order = np.argsort(keys, kind="stable")
-        keys, pairs, chi = keys[order], pairs[order], chi[order]
-    start = np.searchsorted(keys, np.arange(total)[:, None] * total + scan.start[None, :])
-    return Pairs(
-        np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1]), chi, start.astype(np.int64)
-    )
+        pairs, chi = pairs.take(order, axis=0), chi[order]
+    first, second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+    # partners of a measurement in a sensor stand together; those in the next one, or of the next measurement, follow
+    partners = np.bincount(first * np.int64(count) + scan.owner[second], minlength=total * count)
+    starts = np.append(0, np.cumsum(partners))
+    return Pairs(first, second, chi, starts[np.arange(total)[:, None] * count + np.arange(count + 1)])

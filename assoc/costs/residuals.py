@@ -1,31 +1,34 @@
-"""How well a position explains measurements, compiled: chi-square, its gradient, and the information."""
+"""How well a position explains measurements, compiled: chi-square, its gradient, and the information.
+
+The measurements of a tuple, its members, are the rows of one array: of a record of arrays every field that a kernel
+reads costs a reference count, and these kernels run millions of times a second.
+"""
 
 from __future__ import annotations
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Array
-from assoc.costs.arrays import ScanArrays, SensorArrays
 from assoc.sensors.kernels.dispatch import add_information
 from assoc.sensors.kernels.records import Information
 
+# columns of a member: its sensor's kind, dimension, whether it measures full positions, inverse covariance (6), place
+CODE, DIM, FULL, WEIGHT, PLACE = 0, 1, 2, 3, 9
+# the measurement, the variance of its third component, and converted: position, information (6)
+MEASURED, RISE, CENTRE, INFORMATION = 12, 15, 16, 19
+WIDTH = 25
+
 
 @inner_njit
-def normal(
-    sensors: SensorArrays, scan: ScanArrays, members: Array, x: float, y: float, z: float
-) -> Information:
+def normal(members: Array, x: float, y: float, z: float) -> Information:
     """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members at a position."""
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    # out of the tuples first: a field read in the loop costs a reference count each time
-    owner, measured, code, dim = scan.owner, scan.z, sensors.code, sensors.dim
-    places, weights = sensors.place, sensors.weight
     at = (x, y, z)
-    for n in members:
-        s = owner[n]
+    for m in range(len(members)):
         W = (
-            weights[s, 0, 0], weights[s, 0, 1], weights[s, 0, 2],
-            weights[s, 1, 1], weights[s, 1, 2], weights[s, 2, 2],
+            members[m, WEIGHT], members[m, WEIGHT + 1], members[m, WEIGHT + 2],
+            members[m, WEIGHT + 3], members[m, WEIGHT + 4], members[m, WEIGHT + 5],
         )  # fmt: skip
-        place = (places[s, 0], places[s, 1], places[s, 2])
-        one = (measured[n, 0], measured[n, 1], measured[n, 2])
-        sums = add_information(code[s], dim[s], W, place, one, at, sums)
+        place = (members[m, PLACE], members[m, PLACE + 1], members[m, PLACE + 2])
+        one = (members[m, MEASURED], members[m, MEASURED + 1], members[m, MEASURED + 2])
+        sums = add_information(int(members[m, CODE]), int(members[m, DIM]), W, place, one, at, sums)
     return sums

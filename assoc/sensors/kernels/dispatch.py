@@ -23,7 +23,7 @@ from assoc.sensors.kernels.radar import (
     linearise_range_rate,
     measure_range_azimuth,
 )
-from assoc.sensors.kernels.records import TURN, Information, Six, Three
+from assoc.sensors.kernels.records import TURN, Converted, Information, Six, Three
 from assoc.sensors.radar import NEAREST
 
 
@@ -129,21 +129,20 @@ def add_information(
 
 @inner_njit
 def convert_one(
-    code: int, dim: int, z: Array, place: Array, R: Array, heights: Three, reach: float, least: float,
-    centre: Array, c: Array,
-) -> None:  # fmt: skip
-    """Write the position a measurement points at, and its covariance (xx, xy, xz, yy, yz, zz), widened.
+    code: int, dim: int, measured: Three, place: Three, R: Six, heights: Three, reach: float, least: float
+) -> Converted:
+    """Position that a measurement points at, and its covariance, widened.
 
     Parameters
     ----------
     heights
-        Lowest, middle and highest that are sought where the measurement leaves the height open.
+        Lowest, middle and highest that are sought where the measurement leaves the height open; xz, yz and zz are
+        0, 0 and 1 then.
     reach, least
         The covariance's ellipsoid of chi-square value `least` holds all positions within `reach`.
     """
     if code == POSITION:
-        convert_position(dim, z, R, heights[1], centre, c)
-    elif code == RADAR3D:
-        convert_radar3d(z, place, R, reach, least, centre, c)
-    else:
-        convert_radar2d(z, place, R, heights, reach, least, centre, c)
+        return convert_position(dim, measured, R, heights[1])
+    if code == RADAR3D:
+        return convert_radar3d(measured, place, R, reach, least)
+    return convert_radar2d(measured, place, R, heights, reach, least)

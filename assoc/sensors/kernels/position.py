@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Array
-from assoc.sensors.kernels.records import Information, Six, Three
+from assoc.sensors.kernels.records import Converted, Information, Six, Three
 
 
 @inner_njit
@@ -42,8 +42,8 @@ def add_position(dim: int, W: Six, measured: Three, at: Three, sums: Information
 
 
 @inner_njit
-def convert_position(dim: int, z: Array, R: Array, middle: float, centre: Array, c: Array) -> None:
-    """Write the position and its covariance; see `assoc.sensors.kernels.dispatch.convert_one`."""
-    centre[0], centre[1] = z[0], z[1]
-    centre[2] = z[2] if dim == 3 else middle
-    c[0], c[1], c[2], c[3], c[4], c[5] = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
+def convert_position(dim: int, measured: Three, R: Six, middle: float) -> Converted:
+    """Position and its covariance; see `assoc.sensors.kernels.dispatch.convert_one`."""
+    if dim == 3:
+        return measured, R
+    return (measured[0], measured[1], middle), (R[0], R[1], 0.0, R[3], 0.0, 1.0)

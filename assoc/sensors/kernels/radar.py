@@ -6,7 +6,7 @@ import math
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Array
-from assoc.sensors.kernels.records import TURN, Information, Six, Three
+from assoc.sensors.kernels.records import TURN, Converted, Information, Six, Three
 from assoc.sensors.radar import NEAREST
 
 START_REACH = 10.0
@@ -131,64 +131,54 @@ def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Informat
 
 
 @inner_njit
-def convert_radar3d(z: Array, place: Array, R: Array, reach: float, least: float, centre: Array, c: Array) -> None:
+def convert_radar3d(measured: Three, place: Three, R: Six, reach: float, least: float) -> Converted:
     """Range, azimuth, elevation; see `assoc.sensors.kernels.dispatch.convert_one`."""
-    slant = max(z[0], 0.0)
-    ca, sa, ce, se = math.cos(z[1]), math.sin(z[1]), math.cos(z[2]), math.sin(z[2])
+    slant = max(measured[0], 0.0)
+    ca, sa, ce, se = math.cos(measured[1]), math.sin(measured[1]), math.cos(measured[2]), math.sin(measured[2])
     # the target may be a sigma farther than measured; and near the zenith the azimuth opens up
-    arm = max(slant, math.sqrt(R[0, 0]))
-    tilt = arm * max(abs(ce), math.sqrt(R[2, 2]))
-    axes = (
-        (ca * ce, -tilt * sa, -arm * ca * se),
-        (sa * ce, tilt * ca, -arm * sa * se),
-        (se, 0.0, arm * ce),
+    arm = max(slant, math.sqrt(R[0]))
+    tilt = arm * max(abs(ce), math.sqrt(R[5]))
+    x, y, z = (ca * ce, -tilt * sa, -arm * ca * se), (sa * ce, tilt * ca, -arm * sa * se), (se, 0.0, arm * ce)
+    bend = 0.5 * reach * arm * (R[3] * ce * ce + R[5])
+    wide = 4.0 * arm * arm if reach * max(R[3], R[5]) > 1.0 else 0.0
+    f = 2.0 * bend * bend / least
+    c = (
+        _rotated(x, x, R, f * x[0] * x[0] + wide),
+        _rotated(x, y, R, f * x[0] * y[0]),
+        _rotated(x, z, R, f * x[0] * z[0]),
+        _rotated(y, y, R, f * y[0] * y[0] + wide),
+        _rotated(y, z, R, f * y[0] * z[0]),
+        _rotated(z, z, R, f * z[0] * z[0] + wide),
     )
-    bend = 0.5 * reach * arm * (R[1, 1] * ce * ce + R[2, 2])
-    wide = 4.0 * arm * arm if reach * max(R[1, 1], R[2, 2]) > 1.0 else 0.0
-    entry = 0
-    for i in range(3):
-        a = axes[i]
-        centre[i] = place[i] + slant * a[0]
-        for j in range(i, 3):
-            b = axes[j]
-            total = 2.0 * bend * bend / least * a[0] * b[0] + (wide if i == j else 0.0)
-            for k in range(3):
-                total += a[k] * (R[k, 0] * b[0] + R[k, 1] * b[1] + R[k, 2] * b[2])
-            c[entry] = total
-            entry += 1
+    return (place[0] + slant * x[0], place[1] + slant * y[0], place[2] + slant * z[0]), c
 
 
 @inner_njit
-def convert_radar2d(
-    z: Array,
-    place: Array,
-    R: Array,
-    heights: Three,
-    reach: float,
-    least: float,
-    centre: Array,
-    c: Array,
-) -> None:
+def _rotated(a: Three, b: Three, R: Six, more: float) -> float:
+    """`more` and a' R b."""
+    more += a[0] * (R[0] * b[0] + R[1] * b[1] + R[2] * b[2])
+    more += a[1] * (R[1] * b[0] + R[3] * b[1] + R[4] * b[2])
+    return more + a[2] * (R[2] * b[0] + R[4] * b[1] + R[5] * b[2])
+
+
+@inner_njit
+def convert_radar2d(measured: Three, place: Three, R: Six, heights: Three, reach: float, least: float) -> Converted:
     """Range and azimuth: the ground ranges that the heights (lowest, middle, highest) allow make it long."""
     low, high = heights[0] - place[2], heights[2] - place[2]
     lowest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
     most = max(abs(low), abs(high))
-    slack = math.sqrt(START_REACH * R[0, 0])
-    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
-    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    slack = math.sqrt(START_REACH * R[0])
+    farthest = math.sqrt(max((measured[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(measured[0] - slack, 0.0) ** 2 - most * most, 0.0))
     ground = 0.5 * (farthest + nearest)
-    slack = math.sqrt(reach * R[0, 0])
-    farthest = math.sqrt(max((z[0] + slack) ** 2 - lowest * lowest, 0.0))
-    nearest = math.sqrt(max(max(z[0] - slack, 0.0) ** 2 - most * most, 0.0))
-    bend = 0.5 * reach * R[1, 1] * farthest
-    wide = 4.0 * farthest**2 if reach * R[1, 1] > 1.0 else 0.0
+    slack = math.sqrt(reach * R[0])
+    farthest = math.sqrt(max((measured[0] + slack) ** 2 - lowest * lowest, 0.0))
+    nearest = math.sqrt(max(max(measured[0] - slack, 0.0) ** 2 - most * most, 0.0))
+    bend = 0.5 * reach * R[3] * farthest
+    wide = 4.0 * farthest**2 if reach * R[3] > 1.0 else 0.0
     # a box, not an ellipse: twice, for the target may be at the end of the range and of the azimuth at once
     along = 2.0 * (max(farthest - ground, ground - nearest, slack) + bend) ** 2 / least + wide
-    across = 2.0 * max(farthest * farthest, R[0, 0]) * R[1, 1] * reach / least + wide
-    ca, sa = math.cos(z[1]), math.sin(z[1])
-    centre[0], centre[1], centre[2] = place[0] + ground * ca, place[1] + ground * sa, heights[1]
-    c[0], c[1], c[3] = (
-        ca * ca * along + sa * sa * across,
-        ca * sa * (along - across),
-        sa * sa * along + ca * ca * across,
-    )
+    across = 2.0 * max(farthest * farthest, R[0]) * R[3] * reach / least + wide
+    ca, sa = math.cos(measured[1]), math.sin(measured[1])
+    xx, xy, yy = ca * ca * along + sa * sa * across, ca * sa * (along - across), sa * sa * along + ca * ca * across
+    return (place[0] + ground * ca, place[1] + ground * sa, heights[1]), (xx, xy, 0.0, yy, 0.0, 1.0)

@@ -12,5 +12,8 @@ Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 """A symmetric 3 x 3 matrix: (xx, xy, xz, yy, yz, zz)."""
 
+Converted = tuple[Three, Six]
+"""The position that a measurement points at, and its covariance."""
+
 Information = tuple[float, float, float, float, float, float, float, float, float, float]
 """Chi-square, its gradient H' R^-1 nu (x, y, z) and H' R^-1 H (xx, xy, xz, yy, yz, zz)."""
