@@ -9,8 +9,8 @@ taken out of it without refinement ("alone"), where they can be seen. Intervals 
 The first row gives how far the whole is above the best cost that any of these runs found. With --workers the whole on
 one core is compared with two workers on two.
 
---publish replaces the rows of the problems and of the budget that were measured, so that the whole table can be
-measured in several runs.
+--publish replaces the rows of the problems, of the budget and of the solvers that were measured, so that the whole
+table can be measured in several runs.
 """
 
 from __future__ import annotations
@@ -91,11 +91,17 @@ def prefix(name: str, seconds: float) -> str:
 
 
 def merged(new: list[Claim], name: str = NAME) -> list[Claim]:
-    """The published claims, those of the same problems and budgets replaced."""
+    """The published claims, those of the same problems, budgets and solvers replaced."""
     path = result_file(name)
     old = load_json(path) if path.exists() else []
-    groups = {claim.quantity.split(": ")[0] for claim in new}
-    return [claim for claim in old if claim.quantity.split(": ")[0] not in groups] + new
+    measured_anew = {_subject(claim) for claim in new}
+    return [claim for claim in old if _subject(claim) not in measured_anew] + new
+
+
+def _subject(claim: Claim) -> str:
+    """Problem, budget and solver of a claim."""
+    group, what = claim.quantity.split(": ", 1)
+    return f"{group}: {what.split(',')[0]}"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:

@@ -74,7 +74,7 @@ def beside_chils() -> str:
 
 
 def settings() -> str:
-    """Best setting, advice and default of every case."""
+    """Best setting and advice of every case."""
     r = Results("metaheuristics.sweep")
     rows = []
     for case in sweep.CASES:
@@ -89,12 +89,11 @@ def settings() -> str:
             f"{case.problems}, mode {case.how}", words, _plain(best),
             _plain(r[f"{case.name}: table 1's advice"]),
             _cell(r[f"{case.name}: table 1's advice less the best setting"]),
-            f"{number(rank.ours, 2)} of {of}", _plain(r[f"{case.name}: default"]),
-            _plain(r[f"{case.name}: worst setting"]), _plain(r[f"{case.problems}, greedy: excess"]),
+            f"{number(rank.ours, 2)} of {of}", _plain(r[f"{case.name}: worst setting"]),
+            _plain(r[f"{case.problems}, greedy: excess"]),
         ])  # fmt: skip
-    head = ["excess in %", "best setting", "it", "table 1's advice", "less the best", "its rank", "default", "worst",
-            "greedy"]  # fmt: skip
-    return table(head, rows, lambda column: column > 1)
+    heads = ["excess in %", "best setting", "it", "table 1's advice", "less the best", "its rank", "worst", "greedy"]
+    return table(heads, rows, lambda column: column > 1)
 
 
 def _plain(claim: Claim) -> str:

@@ -27,9 +27,9 @@ class AcoParameters(SearchParameters):
     divers : int
         Mode mmas with refinement "full": further ants of each cycle, which build their covers in the linear program.
     alpha, beta : float
-        Exponents of pheromone and visibility in eq. 8.
+        Exponents of pheromone and visibility in eq. 8; 2 and 1 in the paper.
     rho : float
-        Share of the pheromone that stays, eq. 9.
+        Share of the pheromone that stays, eq. 9; 0.3 in the paper.
     visibility : str
         Mode paper: transform of the costs, which eq. 7 needs positive. "exponential": exp((c - c_min) / scale);
         "shifted": c - c_min + scale; "reciprocal": c itself, only for positive costs.
@@ -40,9 +40,9 @@ class AcoParameters(SearchParameters):
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
     ants: int = field(default=15, metadata={"help": "ants in a cycle"})
     divers: int = field(default=1, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
-    alpha: float = field(default=1.0, metadata={"help": "exponent of the pheromone, eq. 8"})
+    alpha: float = field(default=2.0, metadata={"help": "exponent of the pheromone, eq. 8"})
     beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
-    rho: float = field(default=0.9, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
+    rho: float = field(default=0.3, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})
     visibility: str = field(
         default="exponential", metadata={"help": "mode paper: exponential, shifted or reciprocal costs in eq. 7"}
     )
