@@ -15,9 +15,9 @@ from assoc.sweeps.tuning import default_space, scores
 
 def test_ranges_of_the_defaults_are_what_the_solver_takes():
     space = default_space("aco")
-    assert space["alpha"] == Range(0.25, 4.0, logarithmic=True)
+    assert space["alpha"] == Range(0.5, 8.0, logarithmic=True)
     assert space["ants"] == Range(4, 60, logarithmic=True, whole=True)
-    assert space["rho"].low == 0.225 and 0.99 < space["rho"].high < 1.0
+    assert space["rho"].low == 0.075 and 0.99 < space["rho"].high < 1.0
     assert "iterations" not in space and "patience" not in space and "mode" not in space
     assert default_space("greedy") == {}
 
