@@ -20,7 +20,7 @@ WIDTH = 25
 
 @inner_njit
 def normal(members: Array, x: float, y: float, z: float) -> Information:
-    """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members at a position."""
+    """Chi-square, gradient H' R^-1 nu and information H' R^-1 H of the members, (K, WIDTH), at a position in metres."""
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     at = (x, y, z)
     for m in range(len(members)):

@@ -11,6 +11,7 @@ import pytest
 import assoc
 from assoc.packing.components.component import Component
 from assoc.packing.run import Run
+from assoc.solvers.aco.parameters import AcoParameters
 from experiments.common.claims import Claim
 from experiments.metaheuristics import ablation, against_peers, parts, running, sweep
 from experiments.metaheuristics.problems import problem
@@ -140,6 +141,11 @@ def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
     assert claims["ghosts 10, mmas, full: worst setting"] == pytest.approx(0.0, abs=1e-9)
     assert claims["ghosts 10, paper: worst setting"] >= claims["ghosts 10, paper: rho 0.3, ants 15"] >= 0.0
     assert assoc.assign(one, "greedy").cost >= assoc.assign(one).cost
+
+
+def test_the_defaults_are_the_advice():
+    defaults = AcoParameters()
+    assert {name: getattr(defaults, name) for name in sweep.ADVICE} == sweep.ADVICE
 
 
 def test_claims_of_a_case():
