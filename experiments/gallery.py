@@ -223,6 +223,7 @@ PICTURES: dict[str, Callable[[Any], None]] = {
     "metric": metric,
     "overview": overview,
     "surfaces-ghosts-20": surfaces("surfaces-ghosts-20"),
+    "surfaces-ghosts-40": surfaces("surfaces-ghosts-40"),
     "surfaces-poor-radars": surfaces("surfaces-poor-radars"),
     "stonesoup-fusion": stonesoup_fusion,
 }
