@@ -18,7 +18,8 @@ from assoc import track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_tracks, write_plots, write_tracks
 from assoc.integrations.asterix.blocks import edition
-from assoc.recordings import Recording
+from assoc.recordings import Recording, read_plots
+from assoc.recordings import write_plots as write_table
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.simulation import simulate_recording
 
@@ -55,6 +56,16 @@ def test_plots_there_and_back(plots, file, tmp_path):
     again = read_asterix(tmp_path / "again.ast").plots[25, 201]
     for name in ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "addresses"):
         np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
+
+
+def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):
+    """Octal digits of a table become the 12 bits that ASTERIX has, and come back from both."""
+    for name, told in (("squawk", "1234"), ("mode3_oct", "1234"), ("mode3", "668"), ("mode3_dec", "668")):
+        (tmp_path / "plots.csv").write_text(f"time,range,bearing,{name}\n1,10,20,{told}\n")
+        write_plots(tmp_path / "plots.ast", read_plots(tmp_path / "plots.csv"))
+        assert read_asterix(tmp_path / "plots.ast").plots[0, 1].identities.tolist() == [0o1234]
+        write_table(tmp_path / "again.csv", read_asterix(tmp_path / "plots.ast").plots[0, 1])
+        assert read_plots(tmp_path / "again.csv").identities.tolist() == [0o1234]
 
 
 def test_a_plot_that_others_encoded(tmp_path):

@@ -68,7 +68,8 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     for name, bits in (("identities", 12), ("addresses", 24)):
         most = int(getattr(recording, name).max(initial=0))
         if most >> bits:
-            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}")
+            said = "; octal digits are read from a column mode3_oct" if name == "identities" else ""
+            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}{said}")
     theta = np.round((math.pi / 2 - recording.azimuths) / ANGLE_STEP).astype(np.int64) % 65536
     levels = np.round(recording.altitudes / LEVEL_STEP)
     contents = []
