@@ -119,7 +119,8 @@ def seconds(text: str) -> tuple[float, bool]:
         if hours > 24 or minutes > 59 or rest >= 61:
             raise ValueError(text)
         return 3600.0 * hours + 60.0 * minutes + rest, True
-    if text[4:5] == "-" and len(text) <= 40:
+    # 1.5e-05 has a dash there, too
+    if text[4:5] == "-" and text[:4].isdigit() and len(text) <= 40:
         moment = datetime.datetime.fromisoformat(text)
         if moment.tzinfo is None:
             moment = moment.replace(tzinfo=datetime.UTC)

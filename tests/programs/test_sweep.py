@@ -178,6 +178,8 @@ BAD = [
     (["--solver", "aco", "--grid", "alpha=x"], "expected a number, got 'x'"),
     (["--solver", "aco", "--grid", "alpha=1:2"], "random design"),
     (["--solver", "aco", "--random", "5"], "nothing to draw"),
+    (["--solver", "aco", "--random", "5", "--grid", f"ants=1:1{'0' * 400}"], "ants: expected whole numbers within"),
+    (["--solver", "aco", "--random", "5", "--grid", f"ants=1:1{'0' * 30}"], "ants: expected whole numbers within"),
     (["--solver", "aco", "--repeats", "0"], "--repeats: expected a whole number >= 1"),
     (["--solver", "aco", "--scans", "3:99"], "not within the scans"),
     (["--solver", "aco", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], "--jobs or --scheduler"),

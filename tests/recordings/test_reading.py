@@ -246,3 +246,8 @@ def test_octal_codes(tmp_path):
             read_plots(written(tmp_path, head.format("squawk", told)))
     with pytest.raises(InvalidInputError, match="expected dec or oct for the mode3"):
         read_plots(written(tmp_path, head.format("mode3", 1)), units={"mode3": "hex"})
+
+
+def test_times_with_an_exponent(tmp_path):
+    text = "time,range,bearing\n1.5e-05,1,1\n1e-3,1,2\n1.5e+01,1,3\n"
+    assert read_plots(written(tmp_path, text)).times.tolist() == [1.5e-5, 1e-3, 15.0]
