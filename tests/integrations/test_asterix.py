@@ -132,11 +132,20 @@ def test_tracks_there_and_back(tmp_path):
         np.testing.assert_allclose(back[name], frame[name], atol=step / 2 + 1e-9)
     write_tracks(tmp_path / "again.ast", back, (7, 7))
     assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
+    write_tracks(tmp_path / "again.ast", back.assign(track_id=back["track_id"].astype(float)), (7, 7))
+    assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
     for x in (1e7, np.nan):
         with pytest.raises(InvalidInputError, match="x does not fit"):
             write_tracks(tmp_path / "far.ast", frame.assign(x=x))
     with pytest.raises(InvalidInputError, match="'vz' is missing"):
         write_tracks(tmp_path / "far.ast", frame.drop(columns="vz"))
+    for name, value, message in (
+        ("time", np.nan, "tracks: time"), ("time", "noon", "tracks: time"), ("track_id", np.nan, "tracks: track_id"),
+        ("track_id", "first", "tracks: track_id"), ("track_id", 1.5, "whole numbers in the column 'track_id'"),
+        ("vx", "fast", "tracks: expected numbers in the column 'vx'"),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInputError, match=message):
+            write_tracks(tmp_path / "far.ast", frame.assign(**{name: value}))
     assert not (tmp_path / "far.ast").exists()
 
 
@@ -230,6 +239,9 @@ def test_bad_arguments(plots, tmp_path):
     digits = Recording([0.0], [1e4], [0.0], identities=[7700])
     with pytest.raises(InvalidInputError, match="identities of category 048 have 12 bits, got 7700"):
         write_plots(tmp_path / "x.ast", digits)
+    high = Recording([0.0], [1e4], [0.0], altitudes=[70_000.0])
+    with pytest.raises(InvalidInputError, match="an altitude of 70000 m, expected at most 62415"):
+        write_plots(tmp_path / "x.ast", high)
     wide = Recording([0.0], [1e4], [0.0], addresses=[2**24])
     with pytest.raises(InvalidInputError, match="addresses of category 048 have 24 bits, got 16777216"):
         write_plots(tmp_path / "x.ast", wide)
