@@ -48,6 +48,7 @@ _LAST_SCAN = 3.0
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
 _GATING = ("gate_probability", "max_tuples", "target_density")
+_LEAST = {"seed": 0, "jobs": 1, "max_tuples": 1, "kbest": 1}
 _SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
 
 
@@ -76,7 +77,8 @@ def _solve(words: list[str]) -> None:
     parameters = {**_section(config, solver, choices), **parameter_values(choices, parsed)}
     registry.make_parameters(solver, parameters)
     if "kbest" in settings and (explicit or parameters):
-        raise InvalidInputError("--kbest: has its own algorithm; leave out --solver and solver parameters")
+        label = "--kbest" if parsed["kbest"] is not None else f"{first['config']}: kbest"
+        raise InvalidInputError(f"{label}: has its own algorithm; leave out --solver and solver parameters")
     files, proof = parsed["files"], parsed["proof"]
     if proof is not None and (proof == STDOUT or is_stream(proof)):
         raise InvalidInputError(f"--proof: {proof}: expected the name of a file, for its problem is written beside it")
@@ -212,6 +214,8 @@ def _read_config(path: str) -> dict[str, Any]:
             continue
         kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
         check_kind(value, kind, f"{path}: {key}")
+        if key in _LEAST and value < _LEAST[key]:
+            raise InvalidInputError(f"{path}: {key}: expected a whole number >= {_LEAST[key]}, got {value!r}")
     return config
 
 

@@ -19,7 +19,7 @@ from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
 from assoc._cli.signals import EarlyEnd, Interruption
 from assoc._cli.speech import spoken
-from assoc._cli.track.options import FORMATS, RADAR, WINDOWS, make_tracker, read_options
+from assoc._cli.track.options import CUTOFF, FORMATS, RADAR, WINDOWS, make_tracker, read_options
 from assoc._cli.track.options import completions as completions
 from assoc._cli.values import number, seconds
 from assoc._files.output import STDOUT, is_stream
@@ -69,7 +69,7 @@ def _track(words: list[str]) -> None:
 
 
 def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, Any]) -> None:
-    file = parsed["file"]
+    file, cutoff = parsed["file"], parsed["cutoff"] or CUTOFF
     started, compiled = time.perf_counter(), compile_seconds()
     if _is_npz(file):
         if parsed["window"] is not None:
@@ -92,7 +92,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
 
             asked = tracker.solver if tracker.solver_calls else "none"
             used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
-            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": parsed["cutoff"], "words": words}
+            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": cutoff, "words": words}
             more["plots"] = plots
             write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
 
@@ -114,7 +114,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         write_rates,
         write_report,
         lambda: _report(parsed["output"], count, tracker, table, elapsed, compiling),
-        lambda: _compare(scene, table, parsed["cutoff"]),
+        lambda: _compare(scene, table, cutoff),
         lambda: _report_rates(plots, parsed["identity"] or "score-only"),
     )
     _EARLY_END.say(f"the tracks of {count} of {total} scans are written")
@@ -151,9 +151,7 @@ def _read_asterix(file: str, radar: str | None) -> Recording:
     return plots[radar]
 
 
-def _of_scene(
-    file: str, parsed: dict[str, Any], settings: dict[str, Any]
-) -> tuple[Tracker, TrackTable, Scene, int]:
+def _of_scene(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, TrackTable, Scene, int]:
     """The tracker, its tracks, the scene as far as it was tracked, and how many scans it has in all."""
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
@@ -212,6 +210,12 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
         if parsed[flag] is not None:
             radar[argument] = unit * number(parsed[flag], flag_of(flag))
     turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
+    if turn is not None and not window.startswith("ctw"):
+        raise InvalidInputError(f"--rotation: is only for --window ctw or ctw-time, not for {window}")
+    if parsed["cutoff"] is not None:
+        raise InvalidInputError(
+            "--cutoff: is for scenes, whose tracks are judged by GOSPA; plots are judged by identity"
+        )
     if parsed["smooth"]:
         raise InvalidInputError("--smooth: is for scenes (.npz), not for plots")
     recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)

@@ -50,7 +50,7 @@ def seconds(text: str, label: str) -> float:
     return value
 
 
-def scan_range(text: str, count: int, name: str) -> range:
+def scan_range(text: str, count: int, name: str, label: str = "--scans") -> range:
     """Parse A:B or A, within the scans of the source ``name``.
 
     Raises
@@ -63,9 +63,9 @@ def scan_range(text: str, count: int, name: str) -> range:
         start = int(first) if first or not colon else 0
         stop = (int(last) if last else count) if colon else start + 1
     except ValueError:
-        raise InvalidInputError(f"--scans: expected A:B or A in whole numbers, got {text!r}") from None
+        raise InvalidInputError(f"{label}: expected A:B or A in whole numbers, got {text!r}") from None
     if not 0 <= start < stop <= count:
-        raise InvalidInputError(f"--scans: {text} is not within the scans 0:{count} of {name}")
+        raise InvalidInputError(f"{label}: {text} is not within the scans 0:{count} of {name}")
     return range(start, stop)
 
 

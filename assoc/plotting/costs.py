@@ -15,6 +15,7 @@ from assoc.association.scan import ScanAssociation
 from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import BLACK, BLUE, GREY, VERMILION
+from assoc.plotting.places import scan_of
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
 from assoc.solution import Solution
@@ -108,9 +109,9 @@ def plot_gates(
 
     if not is_whole(bins, 1):
         raise InvalidInputError(f"bins: expected a whole number >= 1, got {bins!r}")
-    ax = axes_or_new(ax)
     scans = association.scans if isinstance(association, Association) else association
     parts = [(np.zeros(0), np.zeros(0)), *(_squares(scene, one) for one in scans)]
+    ax = axes_or_new(ax)
     squares, freedom = (np.concatenate(column) for column in zip(*parts, strict=True))
     share = gammainc(freedom / 2.0, squares / 2.0)
     ax.hist(share, bins=bins, range=(0.0, 1.0), color=BLUE, edgecolor="white", label=f"{share.size} tuples")
@@ -125,7 +126,7 @@ def plot_gates(
 
 def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
     """Normalised squared residuals of the targets, and their degrees of freedom (0 left out)."""
-    scan = scene.scan(one.scan)
+    scan = scan_of(scene, one)
     total, freedom = np.zeros(len(one.targets)), np.zeros(len(one.targets))
     heights = np.zeros(len(one.targets), dtype=np.bool_)
     for s, sensor in enumerate(scene.sensors):

@@ -5,7 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._types import Array
+from assoc.association.scan import ScanAssociation
+from assoc.errors import InvalidInputError
+from assoc.scene.scan import Scan
+from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Sensor
+
+
+def scan_of(scene: Scene, association: ScanAssociation) -> Scan:
+    """The scan of a scene to which an association belongs.
+
+    Raises
+    ------
+    InvalidInputError
+        The scene has no such scan, or one of other measurements.
+    """
+    scan = scene.scan(association.scan)
+    if tuple(scan.sizes) != tuple(association.sizes):
+        had, has = list(map(int, association.sizes)), scan.sizes.tolist()
+        raise InvalidInputError(
+            f"association: is not one of this scene, whose scan {association.scan} has {has} measurements, not {had}"
+        )
+    return scan
 
 
 def places(sensor: Sensor, measurements: Array, heights: Array | float, distances: Array | float) -> Array:

@@ -13,7 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, stacked, unit_of
 from assoc.plotting.colours import BLACK, GREY, SKY, colour, marker
 from assoc.plotting.ellipses import ellipses
-from assoc.plotting.places import distances_to_border, places
+from assoc.plotting.places import distances_to_border, places, scan_of
 from assoc.plotting.scene import draw_sensors, draw_truth
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
@@ -44,7 +44,7 @@ def plot_solution(
     Raises
     ------
     InvalidInputError
-        The association has no positions, or no such target; or the probability is none.
+        The association is of another scene, has no positions or no such target; or the probability is none.
     """
     if association.positions is None or association.covariances is None:
         raise InvalidInputError("association: has no positions, expected one made from a scene")
@@ -52,8 +52,8 @@ def plot_solution(
         raise InvalidInputError(f"target: expected 0 to {len(association.targets) - 1}, got {target!r}")
     if not 0.0 < probability < 1.0:
         raise InvalidInputError(f"probability: expected a number between 0 and 1, got {probability!r}")
+    scan = scan_of(scene, association)
     ax = axes_or_new(ax)
-    scan = scene.scan(association.scan)
     found = association.positions
     drawn = measured_places(scene, association)
     sites = stacked(sensor.position for sensor in scene.sensors)

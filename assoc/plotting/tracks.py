@@ -12,6 +12,7 @@ from assoc.plotting.axes import axes_or_new, box_around, legend, set_plan_view, 
 from assoc.plotting.colours import BLACK, DASHES, GREY, colour
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
+from assoc.sensors.base import finite_array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,15 +40,15 @@ def plot_tracks(tracks: pd.DataFrame, truth: Scene | None = None, *, ax: Any = N
     Raises
     ------
     InvalidInputError
-        A column is missing.
+        A column is missing, or a place is no number.
     """
     missing = [name for name in ("track_id", "time", "x", "y") if name not in tracks.columns]
     if missing:
         raise InvalidInputError(f"tracks: the column {missing[0]!r} is missing")
+    far = finite_array(tracks[["x", "y"]].to_numpy(), "tracks: x, y", (len(tracks), 2))
     ax = axes_or_new(ax)
     paths = [] if truth is None else [*truth_paths(truth).values()]
     near = np.concatenate([np.zeros((0, 2)), *(path[:, :2] for path in paths)])
-    far = tracks[["x", "y"]].to_numpy(dtype=np.float64)
     unit = unit_of(np.concatenate([near, far]))
     for number, path in enumerate(paths):
         style = {"color": GREY, "alpha": 0.3, "linewidth": 6, "solid_capstyle": "round"}

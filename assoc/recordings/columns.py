@@ -31,11 +31,14 @@ UNITS: dict[str, dict[str, float]] = {
     "range": {"nmi": NAUTICAL_MILE, "km": 1000.0, "m": 1.0},
     "bearing": {"deg": math.pi / 180.0, "rad": 1.0},
     "altitude": {"fl": FLIGHT_LEVEL, "ft": 0.3048, "m": 1.0},
+    "mode3": {"dec": 10, "oct": 8},
 }
-"""Units of each column and what they are in metres and radians; the first one is taken where nothing is said."""
+"""Units of each column and what they are in metres and radians, of codes the base in which their digits are written.
 
-_ENDINGS = {"range": (*UNITS["range"], "nm"), "bearing": tuple(UNITS["bearing"]), "altitude": tuple(UNITS["altitude"])}
-_MODE3_ENDINGS = ("dec", "oct")
+The first one is taken where nothing is said, for a column squawk the second.
+"""
+
+_ENDINGS = {meaning: (*known, "nm") if meaning == "range" else tuple(known) for meaning, known in UNITS.items()}
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:\.\d{1,9})?)\Z")
 
 
@@ -56,7 +59,7 @@ def choose(
     places : dict of str to int
         Meaning to column number, for the columns that are there.
     units : dict of str to str
-        The unit of range, bearing and altitude.
+        The unit of range, bearing and altitude, and the base of codes.
     """
     for meaning in columns:
         if meaning not in COLUMNS:
@@ -71,7 +74,6 @@ def choose(
     chosen: dict[str, str] = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
     for meaning, usual in COLUMNS.items():
         endings = {f"_{unit}": unit for unit in _ENDINGS.get(meaning, ())}
-        endings |= {f"_{base}": "" for base in _MODE3_ENDINGS if meaning == "mode3"}
         if meaning in columns:
             wanted = [columns[meaning].strip().lower()]
         else:
@@ -87,6 +89,8 @@ def choose(
             raise InvalidInputError(f"the column {found!r} is there {names.count(found)} times")
         places[meaning] = names.index(found)
         unit = next((unit for ending, unit in endings.items() if found.endswith(ending)), "")
+        if found == "squawk":
+            unit = "oct"
         if unit:
             chosen[meaning] = "nmi" if unit == "nm" else unit
     if len(set(places.values())) < len(places):
@@ -115,7 +119,8 @@ def seconds(text: str) -> tuple[float, bool]:
         if hours > 24 or minutes > 59 or rest >= 61:
             raise ValueError(text)
         return 3600.0 * hours + 60.0 * minutes + rest, True
-    if text[4:5] == "-" and len(text) <= 40:
+    # 1.5e-05 has a dash there, too
+    if text[4:5] == "-" and text[:4].isdigit() and len(text) <= 40:
         moment = datetime.datetime.fromisoformat(text)
         if moment.tzinfo is None:
             moment = moment.replace(tzinfo=datetime.UTC)
@@ -131,6 +136,14 @@ def number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(text)
     return value
+
+
+def code(text: str, base: float) -> int:
+    """Read a Mode 3/A code: a whole number, or its octal digits as the number of their 12 bits; nothing is 0."""
+    value = whole(text)
+    if value < 0 or (base == 8 and value > 7777):
+        raise ValueError(text)
+    return int(str(value), 8) if base == 8 else value
 
 
 def whole(text: str) -> int:

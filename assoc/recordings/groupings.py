@@ -10,7 +10,9 @@ import numpy as np
 from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
-from assoc.recordings.windows import Window, windows_of
+from assoc.recordings.windows import MOST_TURNS, Window, windows_of
+
+MOST_GROUPS = 10_000_000
 
 
 @door
@@ -48,6 +50,8 @@ def irregular_groups(
         lengths = np.cumsum(rng.gamma(shape, mean / shape, 256))
         edges.extend((reached + lengths).tolist())
         reached = edges[-1]
+        if len(edges) > MOST_GROUPS:
+            raise InvalidInputError(f"mean, shape: {mean:g}, {shape:g} make more than {MOST_GROUPS} groups")
     return windows_of(recording, np.searchsorted(np.array(edges), recording.times, side="right"))
 
 
@@ -58,6 +62,9 @@ def fixed_groups(recording: Recording, seconds: float) -> list[Window]:
         raise InvalidInputError(f"seconds: expected a number > 0, got {seconds!r}")
     if not len(recording):
         return []
+    span = float(recording.times[-1] - recording.times[0])
+    if not span / seconds < MOST_TURNS:
+        raise InvalidInputError(f"seconds: {seconds:g} s is too short for a recording of {span:g} s")
     return windows_of(recording, np.floor((recording.times - recording.times[0]) / seconds).astype(np.int64))
 
 

@@ -16,7 +16,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
-from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, number, seconds, whole
+from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, code, number, seconds, whole
 from assoc.recordings.recording import UNDECODED, Recording
 
 MAX_DISORDER = 30.0
@@ -48,8 +48,10 @@ def read_plots(
         Names of the columns for "time", "range", "bearing", "mode3", "altitude", "aircraft", where they are not
         the usual ones (`assoc.recordings.columns.COLUMNS`).
     units : mapping of str to str, optional
-        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m). Without it the end of the
-        column's name tells (range_km), and without that nautical miles, degrees and flight levels are meant.
+        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m), and how the codes of "mode3" are
+        written: dec, the 12 bits as a number, or oct, their octal digits. Without it the end of the column's name
+        tells (range_km), and without that nautical miles, degrees, flight levels and dec are meant, of a column squawk
+        oct.
     max_disorder : float, default 30
         Plots up to this many seconds late are sorted in; one that is later is an error with its line.
     garbled_codes : array_like of int, optional
@@ -114,7 +116,7 @@ def _read(
         raise InvalidInputError(f"{file}: line 1: {error}") from None
     except InvalidInputError as error:
         raise InvalidInputError(f"{file}: {error}") from None
-    table = _Table(file, places, header)
+    table = _Table(file, places, header, UNITS["mode3"][scales["mode3"]])
     rows = csv.reader(lines, delimiter=separator)
     try:
         for cells in rows:
@@ -127,9 +129,10 @@ def _read(
 class _Table:
     """Rows of the file as they come."""
 
-    def __init__(self, file: Path, places: Mapping[str, int], header: list[str]) -> None:
+    def __init__(self, file: Path, places: Mapping[str, int], header: list[str], base: float) -> None:
         self.file = file
         self.places = places
+        self.base = base
         self.names = {meaning: header[place].strip()[:30] for meaning, place in places.items()}
         self.values = {meaning: array("d") for meaning in COLUMNS}
         self.lines = array("q")
@@ -174,10 +177,7 @@ class _Table:
             self.clock = clock
             return value
         if meaning == "mode3":
-            code = whole(text)
-            if code < 0:
-                raise ValueError(text)
-            return float(code)
+            return float(code(text, self.base))
         if meaning == "aircraft":
             return float(whole(text)) if text else -1.0
         if meaning == "altitude" and not text:
@@ -200,6 +200,8 @@ class _Table:
         if meaning == "time":
             kind = {None: "seconds, h:mm:ss or an ISO date", True: "h:mm:ss", False: "seconds or an ISO date"}
             return kind[self.clock]
+        if meaning == "mode3" and self.base == 8:
+            return "up to four octal digits"
         return "a whole number" if meaning in ("mode3", "aircraft") else "a number"
 
     def _error(self, line: int, meaning: str, expected: str, text: str) -> InvalidInputError:

@@ -33,7 +33,7 @@ class Recording(Shown):
     azimuths : array_like (n,)
         From +x (east) towards +y (north), radians; kept within (-pi, pi].
     identities : array_like of int (n,), optional
-        Mode 3 codes; 0 is "not decoded", and the default.
+        Mode 3 codes, their 12 bits as a number (7700 is 0o7700, 4032); 0 is "not decoded", and the default.
     altitudes : array_like (n,), optional
         As reported, metres; NaN where there is none.
     garbled : array_like of bool (n,), optional

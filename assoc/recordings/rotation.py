@@ -18,6 +18,7 @@ STRETCH = 300.0
 """Seconds that are looked at together, so that neither gaps nor a drifting motor matter."""
 
 _MOST = 20_000
+_MOST_FREQUENCIES = 10_000_000
 _LEAST_COHERENCE = 0.5
 
 
@@ -56,6 +57,8 @@ def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest:
     step = 1.0 / (8.0 * span)
     # less than a turn and a half tells nothing of a turn
     lowest = max(1.0 / longest, 1.5 / span)
+    if (1.0 / shortest - lowest) / step > _MOST_FREQUENCIES:
+        raise InvalidInputError(f"shortest: {shortest:g} s makes too many rotation times to try on {span:g} s of plots")
     frequencies = np.arange(lowest, 1.0 / shortest, step)
     if not len(frequencies):
         raise InvalidInputError(f"the rotation time cannot be estimated from {span:g} s of plots: give it")

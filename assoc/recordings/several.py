@@ -63,7 +63,8 @@ def scene_of_radars(
         )
     if rotations is not None and len(rotations) != len(recordings):
         raise InvalidInputError(f"rotations: expected one for each of {len(recordings)} recordings")
-    turns = [positive(one, "rotations") for one in rotations or [estimate_rotation(one) for one in recordings]]
+    given = [estimate_rotation(one) for one in recordings] if rotations is None else rotations
+    turns = [positive(one, "rotations") for one in given]
     pace = 0.5 * min(turns) if interval is None else positive(interval, "interval")
     if pace > min(turns) * (1 + 1e-9):
         raise InvalidInputError(f"interval: expected at most the shortest turn, {min(turns):g} s, got {pace:g}")

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from assoc._parameters import is_number
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
@@ -17,7 +18,7 @@ from assoc.recordings.rotation import estimate_rotation
 LONG_GAP = 20.0
 """Rotations without a plot after which the antenna's phase is taken anew."""
 
-_MOST_TURNS = 1e12
+MOST_TURNS = 1e12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,10 +104,11 @@ def clustering_time_window(
     if not len(recording):
         return []
     turn = estimate_rotation(recording) if rotation is None else rotation
-    if isinstance(turn, bool) or not isinstance(turn, (int, float)) or not 0 < turn < math.inf:
+    if not is_number(turn, 0.0) or turn == 0:
         raise InvalidInputError(f"rotation: expected seconds > 0, got {rotation!r}")
+    turn = float(turn)
     span = float(recording.times[-1] - recording.times[0])
-    if not span / turn < _MOST_TURNS:
+    if not span / turn < MOST_TURNS:
         raise InvalidInputError(f"rotation: {turn:g} s is too short for a recording of {span:g} s")
     numbers = _by_time(recording.times, turn) if by == "time" else _by_antenna(recording, turn)
     return windows_of(recording, numbers)

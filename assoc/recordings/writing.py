@@ -18,10 +18,10 @@ from assoc.recordings.recording import Recording
 
 @door
 def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
-    """Write plots so that `read_plots` reads them back.
+    """Write plots for `read_plots`.
 
-    Columns are time (s), range_nmi, bearing_deg, mode3, altitude_fl, and aircraft where the sources are known.
-    The file appears whole or not at all.
+    Columns are time (s), range_nmi, bearing_deg, mode3, altitude_fl, and aircraft where the sources are known; ICAO
+    addresses are left out. The file appears whole or not at all.
 
     Parameters
     ----------

@@ -90,18 +90,14 @@ class Scene:
             raise InvalidInputError("sensors: the scene has none, expected at least one")
         for s, sensor in enumerate(self.sensors):
             if not isinstance(sensor, Sensor):
-                raise InvalidInputError(
-                    f"sensors: number {s} is a {type(sensor).__name__}, expected a Sensor"
-                )
+                raise InvalidInputError(f"sensors: number {s} is a {type(sensor).__name__}, expected a Sensor")
         if not isinstance(self.name, str):
             raise InvalidInputError(f"name must be text, got {type(self.name).__name__}")
         times = finite_array(as_seconds(self.times, "times"), "times")
         if times.ndim != 1 or not times.size:
             raise InvalidInputError(f"times must have shape (K,) with K >= 1, got {times.shape}")
         if (np.diff(times) < 0).any():
-            raise InvalidInputError(
-                f"times must not decrease, scan {int(np.argmax(np.diff(times) < 0)) + 1} does"
-            )
+            raise InvalidInputError(f"times must not decrease, scan {int(np.argmax(np.diff(times) < 0)) + 1} does")
         put(self, "times", times)
         put(self, "measurements", self._checked_measurements())
         put(self, "region", self._checked_region())
@@ -115,7 +111,10 @@ class Scene:
             put(self, "sectors", given)
         if self.origin is not None:
             put(self, "origin", checked_origin(self.origin))
-        put(self, "notes", {str(what): int(count) for what, count in dict(self.notes).items()})
+        for what, count in self.notes.items():
+            if not is_whole(count, -(2**63), 2**63 - 1):
+                raise InvalidInputError(f"notes: expected whole numbers, got {count!r} for {what!r}")
+        put(self, "notes", {str(what): int(count) for what, count in self.notes.items()})
         if self.truth is not None:
             self._check_truth(self.truth)
         for line in self._doubts:
@@ -141,15 +140,11 @@ class Scene:
 
     def _checked_measurements(self) -> tuple[tuple[Array, ...], ...]:
         if len(self.measurements) != self.num_scans:
-            raise InvalidInputError(
-                f"measurements: {len(self.measurements)} scans, but times has {self.num_scans}"
-            )
+            raise InvalidInputError(f"measurements: {len(self.measurements)} scans, but times has {self.num_scans}")
         result = []
         for k, scan in enumerate(self.measurements):
             if len(scan) != len(self.sensors):
-                raise InvalidInputError(
-                    f"measurements: scan {k} has {len(scan)} sensors, expected {len(self.sensors)}"
-                )
+                raise InvalidInputError(f"measurements: scan {k} has {len(scan)} sensors, expected {len(self.sensors)}")
             row = []
             for s, (z, sensor) in enumerate(zip(scan, self.sensors, strict=True)):
                 what = f"measurements of scan {k}, sensor {s}"
@@ -161,9 +156,7 @@ class Scene:
         return tuple(result)
 
     def _checked_region(self) -> Array:
-        region = finite_array(
-            default_region(self.sensors) if self.region is None else self.region, "region", (3, 2)
-        )
+        region = finite_array(default_region(self.sensors) if self.region is None else self.region, "region", (3, 2))
         if (region[:, 0] > region[:, 1]).any() or (region[:, 0] == region[:, 1]).all():
             raise InvalidInputError("region must have lower <= upper for x, y, z, and some extent")
         return region
@@ -176,9 +169,7 @@ class Scene:
         if truth.sources is None:
             return
         if len(truth.sources) != self.num_scans:
-            raise InvalidInputError(
-                f"truth: sources has {len(truth.sources)} scans, expected {self.num_scans}"
-            )
+            raise InvalidInputError(f"truth: sources has {len(truth.sources)} scans, expected {self.num_scans}")
         for k, (sources, scan) in enumerate(zip(truth.sources, self.measurements, strict=True)):
             if [len(s) for s in sources] != [len(z) for z in scan]:
                 raise InvalidInputError(
@@ -200,9 +191,7 @@ class Scene:
             There is no such scan.
         """
         if not isinstance(k, (int, np.integer)) or not -self.num_scans <= k < self.num_scans:
-            raise InvalidInputError(
-                f"scan {k!r} does not exist, the scene has scans 0 to {self.num_scans - 1}"
-            )
+            raise InvalidInputError(f"scan {k!r} does not exist, the scene has scans 0 to {self.num_scans - 1}")
         k = int(k) % self.num_scans
         truth = self.truth
         return Scan(
@@ -263,9 +252,7 @@ class Scene:
         name = f"{self.name!r}, " if self.name else ""
         count = sum(len(z) for scan in self.measurements for z in scan)
         known = f", {self.truth!r}" if self.truth is not None else ""
-        return (
-            f"Scene({name}{len(self.sensors)} sensors, {self.num_scans} scans, {count} measurements{known})"
-        )
+        return f"Scene({name}{len(self.sensors)} sensors, {self.num_scans} scans, {count} measurements{known})"
 
     def _repr_html_(self) -> str:
         """Return what notebooks and reports show: one row a sensor."""

@@ -101,7 +101,7 @@ def observe_in_turns(
     edges = np.append(start, times)
     if np.diff(edges).max() > min(turns) * (1 + 1e-9):
         raise InvalidInputError(
-            f"scans must not be longer than the shortest turn, {min(turns):g} s, got {np.diff(edges).max():g} s"
+            f"interval: expected at most the shortest turn, {min(turns):g} s, got {np.diff(edges).max():g} s"
         )
     rows: list[list[Array]] = [[] for _ in times]
     stamps: list[list[Array]] = [[] for _ in times]

@@ -43,7 +43,7 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     LimitExceededError
         More than a million settings.
     """
-    return _combinations(solver, _spaces(solver, space or {}), "grid")
+    return _combinations(solver, _spaces(solver, space or {}), "grid", "assoc.sweeps.random_settings")
 
 
 @door
@@ -65,7 +65,7 @@ def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int
     list of Setting
         At most ``count``: a setting that was drawn twice is there once.
     """
-    return _drawn(solver, _spaces(solver, space), count, whole_seed(seed))
+    return _drawn(solver, _spaces(solver, space), count, whole_seed(seed), "count")
 
 
 def _spaces(solver: str, space: Mapping[str, Any]) -> dict[str, Space]:
@@ -80,13 +80,13 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, (tuple, range)) else value
 
 
-def _combinations(solver: str, spaces: Mapping[str, Space], label: str) -> list[Setting]:
+def _combinations(solver: str, spaces: Mapping[str, Space], label: str, drawn_by: str) -> list[Setting]:
     registry.parameters(solver)
     lists = []
     for name, space in spaces.items():
         if isinstance(space, Range):
             raise InvalidInputError(
-                f"{label}: {name} is a range, which only a random design takes (--random N); a grid needs values"
+                f"{label}: {name} is a range, which only a random design takes ({drawn_by}); a grid needs values"
             )
         lists.append(space.values)
     count = math.prod(map(len, lists))
@@ -96,11 +96,11 @@ def _combinations(solver: str, spaces: Mapping[str, Space], label: str) -> list[
     return list(dict.fromkeys(made))
 
 
-def _drawn(solver: str, spaces: Mapping[str, Space], count: int, seed: int) -> list[Setting]:
+def _drawn(solver: str, spaces: Mapping[str, Space], count: int, seed: int, label: str) -> list[Setting]:
     if not spaces:
-        raise InvalidInputError(f"--random: no parameter of {solver} to draw; give its values or range in --grid")
+        raise InvalidInputError(f"space: no parameter of {solver} to draw; give values or a range")
     if count > MOST_SETTINGS:
-        raise LimitExceededError(f"--random: {count} settings, at most {MOST_SETTINGS}")
+        raise LimitExceededError(f"{label}: {count} settings, at most {MOST_SETTINGS}")
     made = []
     for number in range(count):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
@@ -169,35 +169,40 @@ def settings_from(
         What errors begin with.
     """
     found: list[Setting] = []
+    drawn = False
     for solver, given in tables.items():
         for table in given if isinstance(given, list) else [given]:
             if not isinstance(table, Mapping):
                 raise InvalidInputError(f"{label}[{solver}]: expected a table of parameters, got {table!r}")
             try:
                 spaces = _spaces(solver, {key.replace("-", "_"): value for key, value in table.items()})
-                found += combine(solver, spaces, random, seed)
-            except InvalidInputError as error:
-                raise InvalidInputError(f"{label}{error}") from None
+                if random is not None and _is_open(spaces):
+                    found += _drawn(solver, spaces, random, seed, "random")
+                else:
+                    found += _combinations(solver, spaces, f"[{solver}]", "random = N")
+            except (InvalidInputError, LimitExceededError) as error:
+                raise type(error)(f"{label}{error}") from None
+            drawn |= _is_open(spaces)
+    if random is not None and tables and not drawn:
+        raise InvalidInputError(f"{label}random: nothing to draw; give lists of values or ranges")
     return list(dict.fromkeys(found))
 
 
-def combine(solver: str, spaces: Mapping[str, Space], random: int | None, seed: int) -> list[Setting]:
-    """Every combination, or with ``random`` so many drawn ones where there is something to draw."""
-    open_ended = any(isinstance(space, Range) or len(space.values) > 1 for space in spaces.values())
-    if random is not None and open_ended:
-        return _drawn(solver, spaces, random, seed)
-    return _combinations(solver, spaces, "--grid")
+def _is_open(spaces: Mapping[str, Space]) -> bool:
+    """Whether there is something to draw."""
+    return any(isinstance(space, Range) or len(space.values) > 1 for space in spaces.values())
 
 
-def designed(designs: Sequence[tuple[str, Mapping[str, Space]]], random: int | None, seed: int) -> list[Setting]:
-    """Settings of several solvers, none twice."""
-    found = [setting for solver, spaces in designs for setting in combine(solver, spaces, random, seed)]
-    if (
-        random is not None
-        and len(found)
-        and not any(
-            isinstance(space, Range) or len(space.values) > 1 for _, spaces in designs for space in spaces.values()
-        )
-    ):
-        raise InvalidInputError("--random: nothing to draw; give values or ranges in --grid")
+def designed(
+    designs: Sequence[tuple[str, Mapping[str, Space]]], random: int | None, seed: int, label: str = "--grid"
+) -> list[Setting]:
+    """Settings of several solvers, none twice: every combination, or with `random` so many of what can be drawn."""
+    found: list[Setting] = []
+    for solver, spaces in designs:
+        if random is not None and _is_open(spaces):
+            found += _drawn(solver, spaces, random, seed, "--random")
+        else:
+            found += _combinations(solver, spaces, label, "--random N")
+    if random is not None and designs and not any(_is_open(spaces) for _, spaces in designs):
+        raise InvalidInputError(f"{label}: nothing to draw at random; give values or ranges")
     return list(dict.fromkeys(found))

@@ -98,6 +98,8 @@ def values(found: list[Any]) -> Values:
 
 def make_range(option: Option, low: float, high: float, logarithmic: bool, label: str) -> Range:
     """Return a checked range."""
+    if option.kind is int and max(abs(low), abs(high)) >= 2**62:
+        raise InvalidInputError(f"{label}: expected whole numbers within +-4e18, got a larger one")
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise InvalidInputError(f"{label}: expected low < high, got {low}:{high}")
     if logarithmic and low <= 0:

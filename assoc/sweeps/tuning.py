@@ -102,7 +102,7 @@ def tune(
         Values or range of each parameter; without it the solver's numbers from a quarter of their default to
         four times it, as far as the solver takes them.
     trials : int, default 100
-        Settings to try, the default one first.
+        Settings to try, the default one first if the space has it.
     target : str, default "gap"
         "gap": mean gap. "time": mean time, where a run without certified optimum counts ten times the cutoff,
         which is the time limit, or without one the longest training run of the defaults.
@@ -160,8 +160,9 @@ def tune(
 
         length = sum(map(len, training)) * repeats
         size = length * trials + 2 * sum(map(len, test)) * repeats
-        _, _, times = memory.of(evaluate([default], training, range(repeats)))
-        cutoff = time_limit if time_limit is not None else float(np.nanmax(times, initial=1e-6))
+        runs = memory.of(evaluate([default], training, range(repeats)))
+        cutoff = time_limit if time_limit is not None else float(np.nanmax(runs[2], initial=1e-6))
+        untuned = float(scores(*runs, target, cutoff).mean())
         sampler = optuna.samplers.TPESampler(seed=seed)
         search = optuna.create_study(sampler=sampler)
         search.enqueue_trial(_point(default, ranges))
@@ -175,7 +176,7 @@ def tune(
             search.tell(trial, values[setting])
         tuned = min(values, key=lambda one: values[one])
         held = _frame(folder, evaluate([default, tuned], test, range(repeats, 2 * repeats)))
-    report = _report(solver, target, trials, tuned, default, values, held, cutoff, words)
+    report = _report(solver, target, trials, tuned, default, (untuned, values[tuned]), held, cutoff, words)
     _save(Path(folder) / REPORT, report)
     return report
 
@@ -309,7 +310,7 @@ def _report(
     trials: int,
     tuned: Setting,
     default: Setting,
-    values: Mapping[Setting, float],
+    training: tuple[float, float],
     held: pd.DataFrame,
     cutoff: float,
     words: str,
@@ -326,7 +327,6 @@ def _report(
     rows = summary.loc[[default.key, tuned.key]].reset_index()
     rows.insert(0, "parameters", ["default", "tuned"])
     rows["score"] = [float(np.nanmean(tables[one])) for one in (default, tuned)]
-    training = values.get(default, float("nan")), values[tuned]
     difference = float(np.nanmean(pairs)), low, high
     return Report(solver, target, trials, tuned, default, training, rows, difference, words)
 

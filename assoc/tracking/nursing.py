@@ -57,6 +57,8 @@ class NursingTracker(Tracker):
                 life_cycle=self.life_cycle, initiation=self.initiation, gate_probability=self.gate_probability,
                 max_tuples=self.max_tuples,
             )  # fmt: skip
+            # it is told of by this one
+            self._nursery._can_start = False
             self._keep(self._nursery)
             self._unseen = Unseen.none(len(self.sensors))
 

@@ -17,7 +17,7 @@ from assoc.costs.build import GATE_PROBABILITY
 from assoc.costs.limits import MAX_TUPLES
 from assoc.costs.tracks.own_times import PairEvidence, TimedScan
 from assoc.costs.tracks.scores import score_terms
-from assoc.errors import InvalidInputError
+from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import Filter, predict_each
 from assoc.filters.state import Gaussian
 from assoc.problem import AssignmentProblem
@@ -30,7 +30,7 @@ from assoc.solution import Solution
 from assoc.solvers.assign import assign
 from assoc.solvers.registry import make_parameters
 from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.joint_starts import Crossings
+from assoc.tracking.births.joint_starts import Crossings, angles_alone
 from assoc.tracking.births.new_tracks import NewTracks
 from assoc.tracking.checking import checked_measurements
 from assoc.tracking.checkpoint import Checkpoint, Memory
@@ -143,6 +143,8 @@ class Tracker(Checkpoint):
         self.identities = None if identity is None else Identities(identity)
         self.terms = score_terms(self.sensors)
         self._new_tracks = NewTracks(self._place, self.filter, self.initiation, self.terms)
+        self._can_start = True
+        """Whether no measurements have come that can start no track; of the first ones it is told."""
         self._time: float | None = None
         self._pace = 0.0
         self._turns = np.ones(len(self.sensors))
@@ -252,6 +254,11 @@ class Tracker(Checkpoint):
         InvalidInputError
             The time runs backwards, or measurements have the wrong shape, are not finite, or are none that the
             sensor can have made. Whatever the error, the tracker is as it was before the step.
+
+        Warns
+        -----
+        AssocWarning
+            Once, where all sensors measure angles alone and these measurements can start no track.
         """
         when = self._checked_time(time)
         checked = checked_measurements(measurements, self.sensors)
@@ -259,12 +266,13 @@ class Tracker(Checkpoint):
         looks = None if sectors is None else checked_sectors(sectors, len(self.sensors), "sectors")
         if self.registration is not None and stamps is not None:
             raise InvalidInputError("times: registration needs measurements of one instant; register a scene before")
-        codes = None if self.identities is None or identities is None else tuple(
-            checked_identities(identities, [len(z) for z in checked])
-        )
+        codes = None
+        if self.identities is not None and identities is not None:
+            codes = tuple(checked_identities(identities, [len(z) for z in checked]))
         if codes is not None and stamps is None:
             # identities are weighed where measurements are followed one by one, at their own times
             stamps = tuple(np.full(len(z), when) for z in checked)
+        self._tell_of_no_starts(checked, stamps is None and looks is None)
         before, dt = self.remember(), self._elapsed(when)
         try:
             if self.registration is not None:
@@ -297,6 +305,19 @@ class Tracker(Checkpoint):
         self._time = when
         self._scan += 1
         return step
+
+    def _tell_of_no_starts(self, measurements: list[Array], at_once: bool) -> None:
+        """Warn once where angles alone can start no track, and there is none."""
+        if not self._can_start or not any(map(len, measurements)) or not angles_alone(self.sensors):
+            return
+        if at_once and len(self.sensors) > 1 or len(self._current()) or self._new_tracks.any_alone(measurements):
+            return
+        self._can_start = False
+        if len(self.sensors) == 1:
+            warn("the only sensor measures angles alone: no track starts, for bearings do not cross")
+        else:
+            what = "measurements with times, sectors or identities start no tracks"
+            warn(f"all sensors measure angles alone: {what}, only those of one instant without do")
 
     def remember(self) -> Memory:
         """What a step may change, for `go_back`; costs next to nothing."""
@@ -336,6 +357,7 @@ class Tracker(Checkpoint):
 
     def _timed(self, scan: Scan) -> TimedScan:
         """The tracks and a scan whose measurements have times of their own."""
+
         def start(where: Array, spread: Array, lag: Array) -> Any:
             return self.initiation.start(self.filter, where, spread, lag)
 
@@ -383,9 +405,7 @@ class Tracker(Checkpoint):
         if self.solver == "exact" and self.time_limit is None:
             nodes = max(_LEAST_NODES, _VISITS // max(problem.num_tuples, 1))
             parameters = {"nodes": nodes, "patience": 0} | parameters
-        return assign(
-            problem, self.solver, seed=self._seed(), time_limit=self.time_limit, advise=False, **parameters
-        )
+        return assign(problem, self.solver, seed=self._seed(), time_limit=self.time_limit, advise=False, **parameters)
 
     def _elapsed(self, time: float) -> float:
         return 0.0 if self._time is None else time - self._time

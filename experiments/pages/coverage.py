@@ -90,7 +90,9 @@ def ant_colony() -> str:
     seen = r.starting("truth, mode paper: targets seen by 2")[0]
     greedy = r.starting("truth, greedy: scans of")[0]
     paper_solved = r.starting("truth, mode paper: scans of")[0]
-    grid = r["reading, all tuples of the grid are nodes: mean cycles"]
+    readings = [c for c in r.starting("reading, ") if c.quantity.endswith(": mean cycles")]
+    nearest = min(readings, key=lambda c: abs(c.ours - (c.paper or 0.0)))
+    reading = nearest.quantity.removeprefix("reading, ").removesuffix(": mean cycles")
     return rendered([
         Row("equations 1 to 3, likelihoods and cost", "assoc/costs/", f"{HOLDS}, with clutter density r / V", costs),
         Row("equation 4, position of greatest likelihood", "assoc/costs/estimation.py", HOLDS, costs),
@@ -112,7 +114,8 @@ def ant_colony() -> str:
         Row("figure 3, measurements selected", TRUTH, f"{HOLDS}: drawn; no numbers to compare", command),
         Row("table 1, mean cycles", TABLE_1,
             f"{verdict(*settings)}: {number(cycles.ours)} against {number(cycles.paper or 0.0)}; "
-            f"nearest of the [readings](sweeps.md) of what is left open: {number(grid.ours)}, all tuples as nodes",
+            f"nearest of the [readings](sweeps.md) of what is left open: {number(nearest.ours)} against "
+            f"{number(nearest.paper or 0.0)}, {reading}",
             command),
         Row("alpha > beta is quicker", TABLE_1,
             f"{verdict(greater)}: {number(greater.ours, 2)} cycles, {interval(greater)}; from alpha = 1 alone",

@@ -11,6 +11,7 @@ import pytest
 from experiments.__main__ import EXPERIMENTS
 from experiments.common.results import RESULTS, Results, number
 from experiments.pages.__main__ import DOCS, TABLES, insert, main
+from experiments.pages.coverage import ant_colony
 
 PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md", "solvers.md", "ant_colony.md")
 ROOT = Path(__file__).parents[2]
@@ -125,6 +126,14 @@ def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
         for program, what in shown:
             known = (ROOT / what).exists() if program == "pytest" else what.removeprefix("experiments.") in NAMES
             assert known, element
+
+
+def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
+    readings = [c for c in Results("papers.ant_colony").starting("reading, ") if c.quantity.endswith("mean cycles")]
+    off = [abs(one.ours - one.paper) for one in readings]
+    nearest = readings[off.index(min(off))]
+    row = next(line for line in ant_colony().splitlines() if line.startswith("| table 1, mean cycles"))
+    assert f"{nearest.ours:.2f} against 4.03, {nearest.quantity.split(': ')[0].removeprefix('reading, ')} |" in row
 
 
 def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):

@@ -18,7 +18,8 @@ from assoc import track
 from assoc.errors import InvalidInputError
 from assoc.integrations.asterix import read_asterix, read_tracks, write_plots, write_tracks
 from assoc.integrations.asterix.blocks import edition
-from assoc.recordings import Recording
+from assoc.recordings import Recording, read_plots
+from assoc.recordings import write_plots as write_table
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.simulation import simulate_recording
 
@@ -55,6 +56,16 @@ def test_plots_there_and_back(plots, file, tmp_path):
     again = read_asterix(tmp_path / "again.ast").plots[25, 201]
     for name in ("times", "ranges", "azimuths", "identities", "altitudes", "garbled", "addresses"):
         np.testing.assert_array_equal(getattr(again, name), getattr(back, name))
+
+
+def test_codes_of_a_table_and_of_asterix_are_the_same(tmp_path):
+    """Octal digits of a table become the 12 bits that ASTERIX has, and come back from both."""
+    for name, told in (("squawk", "1234"), ("mode3_oct", "1234"), ("mode3", "668"), ("mode3_dec", "668")):
+        (tmp_path / "plots.csv").write_text(f"time,range,bearing,{name}\n1,10,20,{told}\n")
+        write_plots(tmp_path / "plots.ast", read_plots(tmp_path / "plots.csv"))
+        assert read_asterix(tmp_path / "plots.ast").plots[0, 1].identities.tolist() == [0o1234]
+        write_table(tmp_path / "again.csv", read_asterix(tmp_path / "plots.ast").plots[0, 1])
+        assert read_plots(tmp_path / "again.csv").identities.tolist() == [0o1234]
 
 
 def test_a_plot_that_others_encoded(tmp_path):
@@ -121,11 +132,20 @@ def test_tracks_there_and_back(tmp_path):
         np.testing.assert_allclose(back[name], frame[name], atol=step / 2 + 1e-9)
     write_tracks(tmp_path / "again.ast", back, (7, 7))
     assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
+    write_tracks(tmp_path / "again.ast", back.assign(track_id=back["track_id"].astype(float)), (7, 7))
+    assert (tmp_path / "again.ast").read_bytes() == (tmp_path / "tracks.ast").read_bytes()
     for x in (1e7, np.nan):
         with pytest.raises(InvalidInputError, match="x does not fit"):
             write_tracks(tmp_path / "far.ast", frame.assign(x=x))
     with pytest.raises(InvalidInputError, match="'vz' is missing"):
         write_tracks(tmp_path / "far.ast", frame.drop(columns="vz"))
+    for name, value, message in (
+        ("time", np.nan, "tracks: time"), ("time", "noon", "tracks: time"), ("track_id", np.nan, "tracks: track_id"),
+        ("track_id", "first", "tracks: track_id"), ("track_id", 1.5, "whole numbers in the column 'track_id'"),
+        ("vx", "fast", "tracks: expected numbers in the column 'vx'"),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInputError, match=message):
+            write_tracks(tmp_path / "far.ast", frame.assign(**{name: value}))
     assert not (tmp_path / "far.ast").exists()
 
 
@@ -219,6 +239,9 @@ def test_bad_arguments(plots, tmp_path):
     digits = Recording([0.0], [1e4], [0.0], identities=[7700])
     with pytest.raises(InvalidInputError, match="identities of category 048 have 12 bits, got 7700"):
         write_plots(tmp_path / "x.ast", digits)
+    high = Recording([0.0], [1e4], [0.0], altitudes=[70_000.0])
+    with pytest.raises(InvalidInputError, match="an altitude of 70000 m, expected at most 62415"):
+        write_plots(tmp_path / "x.ast", high)
     wide = Recording([0.0], [1e4], [0.0], addresses=[2**24])
     with pytest.raises(InvalidInputError, match="addresses of category 048 have 24 bits, got 16777216"):
         write_plots(tmp_path / "x.ast", wide)

@@ -48,6 +48,7 @@ def test_a_scene_survives_the_way_there_and_back():
     reader = SceneDetectionReader(scene, start_time=start)
     back = scene_from_detections(reader, adapted(scene), start=start, region=scene.region)
     np.testing.assert_allclose(back.times, scene.times)
+    assert back.measurement_times is None
     assert [type(s) for s in back.sensors] == [type(s) for s in scene.sensors]
     for ours, theirs in zip(scene.measurements, back.measurements, strict=True):
         for one, other in zip(ours, theirs, strict=True):
@@ -55,6 +56,17 @@ def test_a_scene_survives_the_way_there_and_back():
             np.testing.assert_allclose(one[np.argsort(one[:, 2])], other, rtol=0, atol=1e-12)
     costs = [[s.cost for s in assoc.associate(one).solutions] for one in (scene, back)]
     np.testing.assert_allclose(costs[0], costs[1])
+
+
+def test_measurements_keep_times_of_their_own():
+    scene = simulate("rotating-radars", 0, aircraft=3, duration=12.0)
+    back = scene_from_detections(SceneDetectionReader(scene), adapted(scene), region=scene.region)
+    elapsed = back.times - scene.times
+    np.testing.assert_allclose(elapsed, elapsed[0], atol=1e-6)
+    for k in range(scene.num_scans):
+        here, there = scene.scan(k), back.scan(k)
+        for ours, when, other in zip(here.measurements, here.times, there.times, strict=True):
+            np.testing.assert_allclose(when[np.argsort(ours[:, 2])] + elapsed[0], other, atol=2e-6)
 
 
 def test_detections_say_where_they_come_from():

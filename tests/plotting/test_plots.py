@@ -143,6 +143,10 @@ def test_solution(scene, association, ax):
             plotting.plot_scene(scene, 0, gates=True, gate_probability=wrong, ax=ax)
     with pytest.raises(assoc.InvalidInputError, match="bins: expected a whole number >= 1, got 0"):
         plotting.plot_gates(scene, association, bins=0, ax=ax)
+    other = assoc.simulation.simulate("crowd", 1, targets=2, scans=scene.num_scans)
+    for draw in (lambda: plotting.plot_solution(other, one, ax=ax), lambda: plotting.plot_gates(other, [one], ax=ax)):
+        with pytest.raises(assoc.InvalidInputError, match="association: is not one of this scene"):
+            draw()
 
 
 def test_costs(scene, association, ax):
@@ -235,6 +239,9 @@ def test_tracks_and_metric(scene, ax):
     plotting.plot_tracks(frame, scene, ax=ax)
     assert_units(ax)
     assert line(ax, "track 4") == pytest.approx(np.array([p[1, :2] for p in scene.truth.positions]) / 1e3)
+    for wrong in (np.nan, "here"):
+        with pytest.raises(assoc.InvalidInputError, match="tracks: x, y must be"):
+            plotting.plot_tracks(frame.assign(x=wrong), ax=ax)
     with pytest.raises(assoc.InvalidInputError, match="'time' is missing"):
         plotting.plot_tracks(frame.drop(columns="time"), ax=ax)
     other = plotting.plot_metric([0, 1, 2], {"a": [1, 2, 3], "b": [3, 2, np.nan]}, name="GOSPA", unit="m")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import signal
 import socket
@@ -127,6 +128,17 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
     assert program.returncode == 130
     assert "p99" in told and "interrupted" in told and "Traceback" not in told
     assert rest == "" or rest.endswith("\n")
+
+
+def test_verbose_and_an_output_that_is_full(scene_file, tmp_path, capsys):
+    words = [str(scene_file), "--live", "--replay", "0"]
+    assert track.main([*words, "-v", "-o", str(tmp_path / "t.csv")]) == 0
+    assert "life_cycle LifeCycle(" in capsys.readouterr().err
+    if not os.path.exists("/dev/full"):
+        pytest.skip("needs a device that is full")
+    assert track.main([*words, "-o", "/dev/full"]) == 2
+    error = capsys.readouterr().err
+    assert error == "assoc.track: error: /dev/full: cannot be written (No space left on device)\n"
 
 
 def test_bad_options(scene_file, tmp_path, capsys):

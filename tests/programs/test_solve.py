@@ -36,9 +36,7 @@ def test_table_json_and_csv_agree(run, scene_file, tmp_path):
     done = run(*words)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
-    assert lines[0].split() == (
-        "scan measurements targets false alarms cost lower bound gap status ms correct".split()
-    )
+    assert lines[0].split() == ("scan measurements targets false alarms cost lower bound gap status ms correct".split())
     assert [line.split()[0] for line in lines[1:7]] == list("012345")
     assert "6 of 6 scans certified optimal" in done.stdout and "true tuples correct" in done.stdout
     assert re.search(r" s of it in the solver, \d+\.\d\d s compiling$", done.stdout, re.M)
@@ -107,6 +105,25 @@ def test_a_density_in_a_file_may_be_text(tmp_path):
     assert solve._read_config(str(tmp_path / "c.toml")) == {"target_density": 1e-12}
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("kbest = 0", "kbest: expected a whole number >= 1, got 0"),
+        ("kbest = 2\nsolver = 'aco'", "kbest: has its own algorithm"),
+        ("seed = -1", "seed: expected a whole number >= 0, got -1"),
+        ("jobs = 0", "jobs: expected a whole number >= 1, got 0"),
+        ("max_tuples = 0", "max_tuples: expected a whole number >= 1, got 0"),
+    ],
+)
+def test_numbers_of_a_file_are_refused_by_its_name(scene_file, tmp_path, capsys, text, message):
+    from assoc import solve
+
+    (tmp_path / "c.toml").write_text(text)
+    assert solve.main([str(scene_file), "--config", str(tmp_path / "c.toml")]) == 2
+    error = capsys.readouterr().err
+    assert f"{tmp_path / 'c.toml'}: {message}" in error and error.count("\n") == 1
+
+
 def test_help_is_silent_and_quick(run):
     done = run("assoc.solve", "--help")
     assert (done.returncode, done.stderr) == (0, "")
@@ -147,9 +164,7 @@ def test_interrupt_is_clean(tmp_path, solver):
     simulate("bearing-only", targets=70, scans=4).save(tmp_path / "s.npz")
     endless = ["--iterations", "1000000000", "--patience", "1000000000"] if solver == "aco" else []
     command = [sys.executable, "-m", "assoc.solve", "s.npz", "--solver", solver, "--json", "o.json", *endless]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
-    )
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     time.sleep(4.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)

@@ -178,6 +178,8 @@ BAD = [
     (["--solver", "aco", "--grid", "alpha=x"], "expected a number, got 'x'"),
     (["--solver", "aco", "--grid", "alpha=1:2"], "random design"),
     (["--solver", "aco", "--random", "5"], "nothing to draw"),
+    (["--solver", "aco", "--random", "5", "--grid", f"ants=1:1{'0' * 400}"], "ants: expected whole numbers within"),
+    (["--solver", "aco", "--random", "5", "--grid", f"ants=1:1{'0' * 30}"], "ants: expected whole numbers within"),
     (["--solver", "aco", "--repeats", "0"], "--repeats: expected a whole number >= 1"),
     (["--solver", "aco", "--scans", "3:99"], "not within the scans"),
     (["--solver", "aco", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], "--jobs or --scheduler"),
@@ -218,6 +220,14 @@ TOML = [
     ("repeats = true", "expected a whole number"),
     ("time_limit = -1", "expected seconds > 0"),
     (f"time_limit = 1{'0' * 400}", "time_limit: expected a number within +-1.8e308"),
+    ("[aco]\nalpha = {low = 1, high = 2}", "[aco]: alpha is a range, which only a random design takes (random = N)"),
+    ("random = 5\n[aco]\nalpha = 1", "s.toml: random: nothing to draw"),
+    ("grid = ['alpha=1:2']", "s.toml: grid: alpha is a range"),
+    ("grid = ['alpha=']", "s.toml: grid: alpha: no values"),
+    ("random = 5\ngrid = ['alpha=1']", "s.toml: grid: nothing to draw"),
+    ("scans = '3:99'", "s.toml: scans: 3:99 is not within"),
+    ("gate_probability = 2", "s.toml: gate_probability: expected"),
+    ("target = 'gap'", "s.toml: target: can be given only"),
     (f"[aco]\nalpha = 1{'0' * 400}", "aco.alpha: expected a number within +-1.8e308"),
 ]
 

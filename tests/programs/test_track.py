@@ -161,7 +161,8 @@ def test_every_filter(name, scene_file, tmp_path, capsys):
 def test_plots_from_csv(window, name, tmp_path, capsys):
     plots(tmp_path / "plots.csv")
     words = [str(tmp_path / "plots.csv"), "--tracker", name, "--window", window, "-o", str(tmp_path / "tracks.csv")]
-    assert track.main([*words, "--rotation", "10", "--false-alarms", "0.5", *NOISE, "--process-noise", "2"]) == 0
+    turn = [] if window == "none" else ["--rotation", "10"]
+    assert track.main([*words, *turn, "--false-alarms", "0.5", *NOISE, "--process-noise", "2"]) == 0
     table = pd.read_csv(tmp_path / "tracks.csv")
     last = table[table.time == table.time.max()]
     if window != "none":
@@ -196,6 +197,22 @@ BAD = {
     "plots for scenes' tracker": (["PLOTS", "--tracker", "static"], "--tracker: static takes scenes"),
     "no steps": (["PLOTS"], "range_noise: the plots do not come in steps"),
     "window": (["PLOTS", "--window", "x"], "--window: unknown name 'x'; known: ctw, ctw-time, irregular, none"),
+    "rotation without turns": (
+        ["PLOTS", "--window", "none", "--rotation", "9"],
+        "--rotation: is only for --window ctw",
+    ),
+    "cutoff for plots": (["PLOTS", "--cutoff", "9"], "--cutoff: is for scenes"),
+    "m without m-of-n": (["SCENE", "--m", "2"], "--m: is only for --confirmation m-of-n"),
+    "score without score": (
+        ["SCENE", "--confirmation", "m-of-n", "--false-probability", "0.1"],
+        "--false-probability: is only for --confirmation score",
+    ),
+    "count without count": (["SCENE", "--deletion-count", "2"], "--deletion-count: is only for --deletion count"),
+    "drop without score": (["SCENE", "--deletion-drop", "9"], "--deletion-drop: is only for --deletion score"),
+    "time with count": (
+        ["SCENE", "--deletion", "count", "--deletion-time", "9"],
+        "--deletion-time: is only for --deletion time",
+    ),
     "overwrites": (["SCENE", "-o", "SCENE"], "would overwrite an input file"),
     "folder": (["SCENE", "-o", "absent/tracks.csv"], "the folder absent does not exist"),
 }

@@ -233,3 +233,21 @@ def test_rows_of_a_recording():
     assert len(part) == (recording.sources == 3).sum()
     assert len(recording.take([])) == 0
     assert recording.take([]).summary() == "no plots"
+
+
+def test_octal_codes(tmp_path):
+    head = "time,range,bearing,{}\n1,1,1,{}\n"
+    for name, told in (("squawk", "7700"), ("mode3_oct", "7700.0"), ("Mode3A_OCT", "7700")):
+        assert read_plots(written(tmp_path, head.format(name, told))).identities.tolist() == [0o7700]
+    assert read_plots(written(tmp_path, head.format("squawk", ""))).identities.tolist() == [0]
+    assert read_plots(written(tmp_path, head.format("squawk", "902")), units={"mode3": "dec"}).identities[0] == 902
+    for told in ("7780", "10000", "-1", "7.5"):
+        with pytest.raises(InvalidInputError, match="line 2, column 'squawk': expected up to four octal digits"):
+            read_plots(written(tmp_path, head.format("squawk", told)))
+    with pytest.raises(InvalidInputError, match="expected dec or oct for the mode3"):
+        read_plots(written(tmp_path, head.format("mode3", 1)), units={"mode3": "hex"})
+
+
+def test_times_with_an_exponent(tmp_path):
+    text = "time,range,bearing\n1.5e-05,1,1\n1e-3,1,2\n1.5e+01,1,3\n"
+    assert read_plots(written(tmp_path, text)).times.tolist() == [1.5e-5, 1e-3, 15.0]

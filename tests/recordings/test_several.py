@@ -46,7 +46,7 @@ def test_a_recording_that_ends_within_a_scan_looked_until_its_last_plot():
     ends = 40.5, 60.0
     seen = [np.linspace(0.0, end, round(10 * end) + 1) for end in ends]
     made = [Recording(t, np.full(len(t), 1e4), np.pi / 2 - 2 * np.pi * t / 4.0) for t in seen]
-    scene = scene_of_radars(made, radars(made), rotations=[4.0, 4.0])
+    scene = scene_of_radars(made, radars(made), rotations=np.array([4.0, 4.0]))
     # the antenna goes clockwise from north
     np.testing.assert_allclose(scene.sectors[20, 0], [np.pi / 4, np.pi / 2], atol=1e-6)
     np.testing.assert_allclose(scene.sectors[20, 1], [-np.pi / 2, np.pi / 2], atol=1e-6)

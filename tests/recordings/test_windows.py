@@ -152,3 +152,21 @@ def test_groupings_without_a_window(tmp_path):
     ):
         with pytest.raises(InvalidInputError, match=message):
             call()
+
+
+def test_groups_without_number_are_refused():
+    recording = circling()
+    for mean, shape in ((1e-300, 2.0), (6.2, 1e-300)):
+        with pytest.raises(InvalidInputError, match="mean, shape: .* make more than 10000000 groups"):
+            irregular_groups(recording, np.random.default_rng(0), mean, shape)
+    with pytest.raises(InvalidInputError, match="seconds: 1e-300 s is too short"):
+        fixed_groups(recording, 1e-300)
+    with pytest.raises(InvalidInputError, match="shortest: 1e-09 s makes too many"):
+        estimate_rotation(recording, 1e-9, 30.0)
+
+
+def test_rotations_of_numpy():
+    recording = circling()
+    expected = [len(one) for one in clustering_time_window(recording, 10)]
+    assert [len(one) for one in clustering_time_window(recording, np.int64(10))] == expected
+    assert [len(one) for one in clustering_time_window(recording, np.float32(10))] == expected

@@ -13,9 +13,7 @@ CIRCLE = [-np.pi, np.pi]
 
 def sensors():
     return [
-        Radar3D(
-            name="a", position=[0, 0, 10], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], CIRCLE, [0, 1.5]]
-        ),
+        Radar3D(name="a", position=[0, 0, 10], noise=[50, 1e-3, 1e-3], field_of_view=[[0, 1e5], CIRCLE, [0, 1.5]]),
         Radar2D(position=[1e4, 0, 0], noise=[[9, 1e-3], [1e-3, 1e-6]], field_of_view=[[0, 5e4], CIRCLE]),
         BearingSensor(position=[0, 1e4, 0], noise=[5e-3], detection_probability=0.7, false_alarm_rate=0.1),
         PositionSensor(position=[0, 0, 0], noise=[5, 5], field_of_view=[[0, 1e4], [0, 1e4]]),
@@ -131,6 +129,8 @@ NAN = float("nan")
         ({"truth": Truth([[]], [[]])}, "truth has 1 scans, expected 3"),
         ({"truth": Truth([[]] * 3, [[]] * 3, [[[1] * 9] * 4] * 3)}, "sources of scan 0"),
         ({"name": 3}, "name must be text"),
+        ({"notes": {"rows": "many"}}, "notes: expected whole numbers, got 'many' for 'rows'"),
+        ({"notes": {"rows": 2**70}}, "notes: expected whole numbers"),
     ],
 )
 def test_bad_scenes_are_refused_in_one_line(changes, words):

@@ -164,6 +164,7 @@ def test_scenes_and_recordings_have_their_own_doors():
         ({"identity_loss": 1.0}, "identity_loss: expected a share"),
         ({"range_step": -1.0}, "range_step: expected a number, at least 0"),
         ({"separation": math.nan}, "separation"),
+        ({"separation": 5.0}, "separation: is of a pair"),
         ({"detection_probability": 1.0}, "detection_probability"),
         ({"duration": 1e300}, "duration: expected at most 1e7 rotations"),
         ({"speed": 3.0}, "speed: no parameter of scenario 'rotating-radar'"),

@@ -82,6 +82,8 @@ def test_recorded_traffic_under_turning_radars(tmp_path):
     made = simulate("from-tracks", 0, file=str(file), turns="4,5", radars=2, interval=4.0)
     assert made.sectors is not None and made.truth.target_ids[3].tolist() == [0]
     assert 20 < sum(int((s == 0).sum()) for scan in made.truth.sources for s in scan) < 45
+    with pytest.raises(InvalidInputError, match="interval: expected at most the shortest turn, 4 s, got 10 s"):
+        simulate("from-tracks", 0, file=str(file), turns="4,5", radars=2)
     for changes in ({"turns": "4,5,6"}, {"turns": "4,x"}, {"turns": "4,-5"}, {"turns": "2,5"}):
         with pytest.raises(InvalidInputError, match="turn"):
             simulate("from-tracks", 0, **({"file": str(file), "radars": 2, "interval": 4.0} | changes))

@@ -74,7 +74,10 @@ def test_tables_can_be_lists_of_designs():
         (lambda: grid("aco", {"ants": [1.5]}), "whole number"),
         (lambda: grid("aco", {"alpha": ["much"]}), "expected a number"),
         (lambda: grid("aco", {"alpha": [float("nan")]}), "alpha"),
-        (lambda: grid("aco", {"alpha": {"low": 1, "high": 2}}), "random design"),
+        (
+            lambda: grid("aco", {"alpha": {"low": 1, "high": 2}}),
+            r"takes \(assoc.sweeps.random_settings\)",
+        ),
         (lambda: random_settings("aco", {"alpha": {"low": 2, "high": 1}}, 3), "low < high"),
         (lambda: random_settings("aco", {"alpha": {"low": 0, "high": 1, "log": True}}, 3), "low > 0"),
         (lambda: random_settings("aco", {}, 3), "no parameter"),
@@ -85,6 +88,8 @@ def test_tables_can_be_lists_of_designs():
         (lambda: read_words(["alpha=1", "alpha=2"], ["aco"]), "twice"),
         (lambda: read_words(["milp.backend=scip"], ["aco"]), "no solver of the study"),
         (lambda: settings_from({"aco": 3}), "expected a table"),
+        (lambda: settings_from({"aco": {"alpha": {"low": 1, "high": 2}}}), r"\[aco\]: alpha is .* \(random = N\)"),
+        (lambda: settings_from({"aco": {"alpha": 1}}, 5), "random: nothing to draw"),
     ],
 )
 def test_bad_designs_are_one_clear_line(make, message):
@@ -96,3 +101,7 @@ def test_bad_designs_are_one_clear_line(make, message):
 def test_a_design_without_end_is_refused_before_it_is_made():
     with pytest.raises(LimitExceededError, match="settings"):
         grid("aco", {name: list(range(1, 2000)) for name in ("ants", "iterations", "patience")})
+    with pytest.raises(LimitExceededError, match="^count: "):
+        random_settings("aco", {"alpha": [1, 2]}, 10**7)
+    with pytest.raises(LimitExceededError, match="^study.toml: random: "):
+        settings_from({"aco": {"alpha": [1, 2]}}, 10**7, label="study.toml: ")

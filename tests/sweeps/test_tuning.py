@@ -56,6 +56,11 @@ def test_the_search_finds_the_better_half_and_reports_held_out_runs(study, tmp_p
     assert again.tuned == report.tuned and (tmp_path / "t" / "runs.jsonl").read_bytes() == log
 
 
+def test_a_default_that_is_no_trial_is_compared_all_the_same(study, tmp_path):
+    report = tune(tmp_path / "t", study.sources, "aco", {"ants": Range(1, 5, whole=True)}, 1, repeats=1)
+    assert report.default.parameters["ants"] == 15 and np.isfinite(report.training).all()
+
+
 def test_nothing_to_tune(study, tmp_path):
     with pytest.raises(InvalidInputError, match="nothing to tune"):
         tune(tmp_path / "t", study.sources, "greedy", trials=2)

@@ -1,15 +1,19 @@
 """Sensors of which none can start a track alone: tracks begin where bearings cross, and ghosts die."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
-from assoc import build_problem
-from assoc.scene import Scan
+from assoc import AssocWarning, build_problem
+from assoc.filters import Gaussian
+from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor
+from assoc.simulation import simulate
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth
-from assoc.tracking import TRACKERS
+from assoc.tracking import TRACKERS, track_scene
 from assoc.tracking.births.joint_starts import crossings
 from tests.sizes import sample
 
@@ -71,3 +75,22 @@ def test_crossings_are_the_tuples_of_what_is_free():
     nothing = [np.zeros(len(z), dtype=np.bool_) for z in scan.measurements]
     assert crossings(one, scan, nothing) is None
     assert crossings(one, Scan(0, 0.0, tuple(z[:0] for z in scan.measurements)), [z[:0] for z in nothing]) is None
+
+
+@pytest.mark.parametrize("name", TRACKERS)
+def test_bearings_that_can_start_no_track_are_told_of_once(name):
+    made = simulate("bearing-only", 1, targets=2, scans=3)
+    times = [[np.full(len(z), time) for z in scan] for time, scan in zip(made.times, made.measurements, strict=True)]
+    alone = Scene(made.sensors[:1], made.times, [scan[:1] for scan in made.measurements], region=made.region)
+    for told, one in (
+        ("all sensors measure angles alone: measurements with times", replace(made, measurement_times=times)),
+        ("the only sensor measures angles alone", alone),
+    ):
+        with pytest.warns(AssocWarning) as caught:
+            table, _ = track_scene(TRACKERS[name].for_scene(one), one)
+        assert len(table) == 0 and len(caught) == 1 and str(caught[0].message).startswith(told)
+        assert caught[0].filename == __file__
+    # from known targets on there are tracks, and nothing to tell
+    tracker = TRACKERS[name].for_scene(made)
+    tracker.begin(0.0, Gaussian(np.zeros((1, 6)), np.eye(6)[None] * 1e4))
+    tracker.step(made.times[0] + 1.0, made.measurements[0], [one + 1.0 for one in times[0]])

@@ -47,11 +47,18 @@ class Options:
         The design as tables, if a file has it.
     config : str
         Name of that file.
+    of_file : frozenset of str
+        Options that have their values from it.
     """
 
     values: Mapping[str, Any]
     tables: Mapping[str, Any]
     config: str
+    of_file: frozenset[str] = frozenset()
+
+    def label(self, name: str) -> str:
+        """What errors call an option: its flag, or its key in the file."""
+        return f"{self.config}: {name}" if name in self.of_file else flag_of(name)
 
     @property
     def output(self) -> str:
@@ -84,7 +91,7 @@ class Options:
     @cached_property
     def spaces(self) -> dict[str, dict[str, Space]]:
         """Values and ranges of the command line for each solver."""
-        return read_words(self.values.get("grid", []), self.solvers)
+        return read_words(self.values.get("grid", []), self.solvers, self.label("grid"))
 
     @cached_property
     def settings(self) -> list[Setting]:
@@ -92,7 +99,7 @@ class Options:
         random, seed = self.values.get("random"), self.values.get("seed", 0)
         if self.tables:
             return settings_from(self.tables, random, seed, f"{self.config}: ")
-        return designed(list(self.spaces.items()), random, seed)
+        return designed(list(self.spaces.items()), random, seed, self.label("grid"))
 
     @cached_property
     def sources(self) -> tuple[StudySource, ...]:
@@ -133,7 +140,8 @@ class Options:
         values = self.values
         scans = None
         if "scans" in values:
-            scans = [scan_range(values["scans"], source.num_scans, source.name) for source in self.sources]
+            chosen, label = values["scans"], self.label("scans")
+            scans = [scan_range(chosen, source.num_scans, source.name, label) for source in self.sources]
         return {
             "seed": values.get("seed", 0),
             "time_limit": values.get("time_limit"),
@@ -154,13 +162,13 @@ def read_options(given: Mapping[str, Any]) -> Options:
     content = read_toml(config) if config else {}
     tables = {key: content.pop(key) for key in [*content] if key in registry.names() and key not in _KNOWN}
     values = {key: _of_file(config, key, value) for key, value in content.items()}
-    for name, value in given.items():
-        if name in _KNOWN and value != []:
-            values[name] = _of_text(name, value)
+    values |= {name: _of_text(name, given[name]) for name in _of_line(given)}
+    options = Options(values, tables, config, frozenset(values) - {*_of_line(given)})
     if tables:
         for name in ("solver", "grid"):
             if name in values:
-                raise InvalidInputError(f"--{name}: {config} has tables of parameters already; give one of the two")
+                label = options.label(name)
+                raise InvalidInputError(f"{label}: {config} has tables of parameters already; give one of the two")
     if not values.get("files"):
         raise InvalidInputError("no scene.npz or problem.npz is given")
     if "output" not in values:
@@ -168,12 +176,18 @@ def read_options(given: Mapping[str, Any]) -> Options:
     if "scheduler" in values and "jobs" in values:
         raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
     if values.get("target", "gap") not in ("gap", "time"):
-        raise InvalidInputError(f"--target: expected gap or time, got {values['target']!r}")
+        raise InvalidInputError(f"{options.label('target')}: expected gap or time, got {values['target']!r}")
     if "target" in values and "tune" not in values:
-        raise InvalidInputError("--target: can be given only with --tune")
+        raise InvalidInputError(f"{options.label('target')}: can be given only with --tune")
     if not 0 < values.get("gate_probability", 1.0) <= 1:
-        raise InvalidInputError(f"--gate-probability: expected a number in (0, 1], got {values['gate_probability']}")
-    return Options(values, tables, config)
+        label = options.label("gate_probability")
+        raise InvalidInputError(f"{label}: expected a number in (0, 1], got {values['gate_probability']}")
+    return options
+
+
+def _of_line(given: Mapping[str, Any]) -> list[str]:
+    """Names of the options that the command line has."""
+    return [name for name, value in given.items() if name in _KNOWN and value != []]
 
 
 def _of_text(name: str, value: Any) -> Any:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import IO, Any
 
 from assoc._cli.options import flag_of
 from assoc._cli.signals import Interruption
@@ -16,6 +18,20 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 from assoc.tracking import LiveTracker, Tracker
 from assoc.tracking.filter_choice import pace_of
+
+
+@contextmanager
+def _named(output: str, stream: IO[str]) -> Iterator[None]:
+    """Say of an output that cannot be written which it is, and close it."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise  # the reader of our output has seen enough
+    except OSError as error:
+        if stream is not sys.stdout:
+            with suppress(OSError):
+                stream.close()
+        raise InvalidInputError(f"{output}: cannot be written ({error.strerror or error})") from None
 
 
 def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], interruption: Interruption) -> None:
@@ -64,13 +80,18 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
     lines = None if speed is not None else Lines(ports["udp"])
     if lines is not None and lines.port is not None:
         say(f"plots: udp 127.0.0.1:{lines.port}")
+    if parsed["verbose"]:
+        say(", ".join(f"{name} {value}" for name, value in settings.items()))
     kept = parsed["output"] not in (None, "-")
     stream = open(parsed["output"], "w", encoding="utf-8", newline="\n") if kept else sys.stdout
-    writer = TrackWriter(stream, tracker.positions)
+    target = parsed["output"] if kept else "stdout"
+    with _named(target, stream):
+        writer = TrackWriter(stream, tracker.positions)
 
     def show(pictures: list[Any]) -> None:
         for picture in pictures:
-            writer.write(picture)
+            with _named(target, stream):
+                writer.write(picture)
             if page is not None:
                 page.show(picture)
 

@@ -50,6 +50,15 @@ _OWN = {
     "max_events": ("joint-probabilistic",),
     "rule": ("nearest-neighbour",),
 }
+# option of the life cycle -> the choice without which it says nothing
+_NEEDS = {
+    "m": ("confirmation", "m-of-n"),
+    "n": ("confirmation", "m-of-n"),
+    "false_probability": ("confirmation", "score"),
+    "deletion_time": ("deletion", "time"),
+    "deletion_count": ("deletion", "count"),
+    "deletion_drop": ("deletion", "score"),
+}
 # option -> what `assoc.recordings.radar_of` calls it, and its unit
 RADAR = {
     "detection_probability": ("detection_probability", 1.0),
@@ -148,7 +157,7 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     given = parsed["cutoff"]
     if parsed["live"] and given is not None:
         raise InvalidInputError("--cutoff: is not for --live")
-    parsed["cutoff"] = CUTOFF if given is None else positive(number(given, "--cutoff"), "--cutoff")
+    parsed["cutoff"] = None if given is None else positive(number(given, "--cutoff"), "--cutoff")
     if not parsed["live"] and parsed["output"] is None:
         parser.error("the following arguments are required: -o/--output")
     check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [parsed["file"]])
@@ -162,13 +171,17 @@ def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
     if parsed["report"]:
         check_extra("plotly", "report")
+    lives = parameter_values(cycle, parsed)
     settings: dict[str, Any] = {
         "solver": solver,
         "solver_parameters": parameter_values(own, parsed),
-        "life_cycle": LifeCycle(**parameter_values(cycle, parsed)),
+        "life_cycle": LifeCycle(**lives),
         "initiation": Initiation(**parameter_values(initiation, parsed)),
         **common_values(parsed),
     }
+    for name, (choice, needed) in _NEEDS.items():
+        if name in lives and getattr(settings["life_cycle"], choice) != needed:
+            raise InvalidInputError(f"{flag_of(name)}: is only for {flag_of(choice)} {needed}")
     if parsed["identity"] not in (None, *IDENTITY):
         raise InvalidInputError(f"--identity: unknown name {parsed['identity']!r}; known: {', '.join(IDENTITY)}")
     trusted = parameter_values(identity, parsed)

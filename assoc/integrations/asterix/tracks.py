@@ -13,6 +13,7 @@ from assoc.errors import InvalidInputError
 from assoc.integrations.asterix.blocks import data_blocks, read_bytes, records, signed, value
 from assoc.integrations.asterix.reading import Source, SourceRows
 from assoc.integrations.asterix.writing import check_source, time_of_day, write_blocks
+from assoc.sensors.base import finite_array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,9 +52,16 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
     for name in COLUMNS[:-1]:
         if name not in tracks:
             raise InvalidInputError(f"tracks: the column {name!r} is missing")
+    times = finite_array(tracks["time"].to_numpy(), "tracks: time", (len(tracks),))
+    ids = finite_array(tracks["track_id"].to_numpy(), "tracks: track_id", (len(tracks),))
+    if (ids != np.round(ids)).any():
+        raise InvalidInputError("tracks: expected whole numbers in the column 'track_id'")
     raw, told = {}, {}
     for name, (step, bits) in _STEPS.items():
-        values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
+        try:
+            values = np.round(tracks[name].to_numpy(dtype=np.float64) / step)
+        except (TypeError, ValueError):
+            raise InvalidInputError(f"tracks: expected numbers in the column {name!r}") from None
         most = 1 << (bits - 1)
         told[name] = ~np.isnan(values)
         if name not in ("x", "y"):
@@ -64,7 +72,7 @@ def write_tracks(path: str | os.PathLike[str], tracks: pd.DataFrame, source: Sou
         raw[name] = values.astype(np.int64) & ((1 << bits) - 1)
     known = tracks["confirmed"].to_numpy() if "confirmed" in tracks else np.ones(len(tracks), dtype=bool)
     contents: list[dict[str, Any]] = []
-    for k, (number, time) in enumerate(zip(tracks["track_id"].tolist(), tracks["time"].tolist(), strict=True)):
+    for k, (number, time) in enumerate(zip(ids.tolist(), times.tolist(), strict=True)):
         contents.append(
             {
                 "010": (("SAC", source[0]), ("SIC", source[1])),

@@ -48,14 +48,15 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     ----------
     path : path-like
     recording : Recording
-        Ranges below 256 nmi, identities of 12 bits, addresses of 24.
+        Ranges below 256 nmi, altitudes within 62 km, identities of 12 bits, addresses of 24.
     source : (int, int)
         System area code and system identification code of the radar.
 
     Raises
     ------
     InvalidInputError
-        A plot is too far for the category, an identity or address too large, or the file cannot be written.
+        A plot is too far for the category or too high, an identity or address too large, or the file cannot be
+        written.
     MissingExtraError
         libasterix is not installed.
     """
@@ -68,9 +69,14 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
     for name, bits in (("identities", 12), ("addresses", 24)):
         most = int(getattr(recording, name).max(initial=0))
         if most >> bits:
-            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}")
+            said = "; octal digits are read from a column mode3_oct" if name == "identities" else ""
+            raise InvalidInputError(f"recording: {name} of category 048 have {bits} bits, got {most}{said}")
     theta = np.round((math.pi / 2 - recording.azimuths) / ANGLE_STEP).astype(np.int64) % 65536
     levels = np.round(recording.altitudes / LEVEL_STEP)
+    wide = ~np.isnan(levels) & ((levels < -8192) | (levels > 8191))
+    if wide.any():
+        got, expected = recording.altitudes[wide][0], f"at most {8191 * LEVEL_STEP:g} m in size for category 048"
+        raise InvalidInputError(f"recording: an altitude of {got:g} m, expected {expected}")
     contents = []
     for k, time in enumerate(recording.times.tolist()):
         content: dict[str, Any] = {
@@ -81,7 +87,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording, source: Sour
         if recording.identities[k] != UNDECODED:
             content["070"] = (0, 0, 0, 0, ("MODE3A", int(recording.identities[k])))
         if not math.isnan(levels[k]):
-            content["090"] = (0, int(recording.garbled[k]), ("FL", int(np.clip(levels[k], -8192, 8191)) & 0x3FFF))
+            content["090"] = (0, int(recording.garbled[k]), ("FL", int(levels[k]) & 0x3FFF))
         if recording.addresses[k]:
             content["220"] = int(recording.addresses[k])
         contents.append(content)

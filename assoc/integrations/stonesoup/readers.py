@@ -24,9 +24,9 @@ EPOCH = datetime(1970, 1, 1)
 """Time 0 of a scene, unless another is given: Unix times, without a time zone as is Stone Soup's custom."""
 
 
-def moment(scene: Scene, k: int, start: datetime) -> datetime:
-    """Time of a scan; datetimes end at microseconds."""
-    return start + timedelta(seconds=float(scene.times[k]))
+def moment(seconds: float, start: datetime) -> datetime:
+    """Time of a scan, or of a measurement; datetimes end at microseconds."""
+    return start + timedelta(seconds=float(seconds))
 
 
 class SceneDetectionReader(DetectionReader):  # type: ignore[misc]
@@ -34,7 +34,8 @@ class SceneDetectionReader(DetectionReader):  # type: ignore[misc]
 
     Each detection has the measurement model of its sensor and metadata: ``sensor`` (its name, or its number if
     it has none), ``measurement`` (1-based number among the sensor's), and ``target`` (id, or -1 for a false
-    alarm) where the scene knows it.
+    alarm) where the scene knows it. Measurements with times of their own keep them as their timestamps; which sectors
+    a sensor looked at is not handed over.
     """
 
     scene: Scene = Property(doc="What to read.")
@@ -49,7 +50,8 @@ class SceneDetectionReader(DetectionReader):  # type: ignore[misc]
         names = [sensor.name or s for s, sensor in enumerate(self.scene.sensors)]
         for k in range(self.scene.num_scans):
             scan = self.scene.scan(k)
-            time = moment(self.scene, k, self.start_time)
+            time = moment(scan.time, self.start_time)
+            stamps = scan.own_times()
             found: OrderedSet[Detection] = OrderedSet()
             for s, (model, name, measured) in enumerate(zip(models, names, scan.measurements, strict=True)):
                 # elevation, bearing, range there; range, azimuth, elevation here
@@ -59,7 +61,8 @@ class SceneDetectionReader(DetectionReader):  # type: ignore[misc]
                     if scan.sources is not None:
                         metadata["target"] = int(scan.sources[s][i])
                     vector = StateVector(z[::-1] if polar else z)
-                    found.add(Detection(vector, timestamp=time, measurement_model=model, metadata=metadata))
+                    when = moment(stamps[s][i], self.start_time)
+                    found.add(Detection(vector, timestamp=when, measurement_model=model, metadata=metadata))
             yield time, found
 
 
@@ -90,7 +93,7 @@ class SceneGroundTruthReader(GroundTruthReader):  # type: ignore[misc]
         velocities = _velocities(self.scene)
         for k in range(self.scene.num_scans):
             scan = self.scene.scan(k)
-            time = moment(self.scene, k, self.start_time)
+            time = moment(scan.time, self.start_time)
             present: OrderedSet[GroundTruthPath] = OrderedSet()
             assert scan.truth_ids is not None and scan.truth_positions is not None
             for target, place in zip(scan.truth_ids.tolist(), scan.truth_positions, strict=True):

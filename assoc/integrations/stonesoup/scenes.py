@@ -32,7 +32,8 @@ def scene_from_detections(
     """Make a scene of what a Stone Soup reader, feeder or simulator yields.
 
     Sets that come with the same time are one scan, as a ``PlatformDetectionSimulator`` yields a set for each
-    sensor. If no sensor measures heights, the scene lies in the plane z = 0.
+    sensor. Detections with other timestamps than their set keep them as times of their own. If no sensor measures
+    heights, the scene lies in the plane z = 0.
 
     Parameters
     ----------
@@ -71,10 +72,23 @@ def scene_from_detections(
         sensors=frame.sensors,
         times=np.array([(moment - zero).total_seconds() for moment in moments]),
         measurements=[frame.measurements(parts) for parts in scans],
+        measurement_times=_own_times(moments, scans, zero),
         region=region_of(frame, region),
         truth=None if truth is None else _truth(sorted_paths(truth), moments, scans, frame),
         name=name,
     )
+
+
+def _own_times(
+    moments: Sequence[datetime], scans: Sequence[Sequence[Sequence[Any]]], zero: datetime
+) -> list[list[Array]] | None:
+    """Seconds of each detection; None where all are of the times of their sets."""
+    stamps = [
+        [[d.timestamp or time for d in part] for part in parts] for time, parts in zip(moments, scans, strict=True)
+    ]
+    if all(one == time for time, parts in zip(moments, stamps, strict=True) for part in parts for one in part):
+        return None
+    return [[np.array([(one - zero).total_seconds() for one in part]) for part in parts] for parts in stamps]
 
 
 def by_time(detections: Iterable[tuple[datetime, Iterable[Any]]]) -> Iterator[tuple[datetime, list[Any]]]:

@@ -58,9 +58,7 @@ class RotatingRadarParameters(Parameters):
     )
     separation: float | None = field(
         default=None,
-        metadata={
-            "help": "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"
-        },
+        metadata={"help": "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"},
     )
 
     def __post_init__(self) -> None:
@@ -75,6 +73,10 @@ class RotatingRadarParameters(Parameters):
                 raise InvalidInputError(f"{name}: expected a share from 0 to below 1, got {getattr(self, name)!r}")
         if self.separation is not None:
             self._number("separation", least=0.0)
+            if self.traffic == "random":
+                raise InvalidInputError(
+                    "separation: is of a pair (traffic crossing, parallel or head-on), not of random"
+                )
         if self.duration > 1e7 * self.rotation:
             raise InvalidInputError(f"duration: expected at most 1e7 rotations, got {self.duration:g} s")
 

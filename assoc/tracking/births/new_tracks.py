@@ -73,6 +73,10 @@ class NewTracks:
         scores = self._appears[s] + self._log_birth(covariances)
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
+    def any_alone(self, measurements: Sequence[Array]) -> bool:
+        """Whether any measurement tells alone where to start a track."""
+        return any(one.any() for one in self.places(measurements).fit)
+
     def places(self, measurements: Sequence[Array]) -> Places:
         """Where each measurement of a scan alone says that its target is."""
         positions, covariances, fit, births = [], [], [], []
