@@ -107,7 +107,10 @@ def _associate(
     bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
     log = SolverLog(bar, parsed["verbose"])
     extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"], "watch": log}
-    plan, items = _plan(sources, files, solver, settings, parameters, extras)
+    plan, items = _plan(sources, solver, settings, parameters, extras)
+    if "scans" in settings:
+        label = f"{parsed['config']}: scans" if parsed["scans"] is None else "--scans"
+        items = _chosen(items, files, settings["scans"], label)
     if parsed["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
     if parsed["verbose"]:
@@ -232,7 +235,6 @@ def _section(config: dict[str, Any], solver: str, choices: list[Option]) -> dict
 
 def _plan(
     sources: list[Source],
-    files: list[str],
     solver: str,
     settings: dict[str, Any],
     parameters: dict[str, Any],
@@ -251,12 +253,14 @@ def _plan(
         settings.get("kbest"),
         **extras,
     )
-    items = plan.items()
-    if "scans" in settings:
-        counts = [sum(number == n for number, _ in items) for n in range(len(files))]
-        chosen = [scan_range(settings["scans"], count, file) for count, file in zip(counts, files, strict=True)]
-        items = [(number, k) for number, k in items if k in chosen[number]]
-    return plan, items
+    return plan, plan.items()
+
+
+def _chosen(items: list[tuple[int, int]], files: list[str], text: str, label: str) -> list[tuple[int, int]]:
+    """The scans of each file that are asked for."""
+    counts = [sum(number == n for number, _ in items) for n in range(len(files))]
+    scans = [scan_range(text, count, file, label) for count, file in zip(counts, files, strict=True)]
+    return [(number, k) for number, k in items if k in scans[number]]
 
 
 def _write_json(path: str | None, association: Association, names: list[str]) -> None:

@@ -156,6 +156,7 @@ def _of_scene(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
+    from assoc.tracking.smoothing import check_smoothable
 
     parsed["filter"] = parsed["filter"] or "imm-cv"
     if parsed["identity"] is not None:
@@ -170,6 +171,10 @@ def _of_scene(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
             raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
         settings["registration"] = "online"
     scene = Scene.load(file)
+    if parsed["cutoff"] is not None and scene.truth is None:
+        raise InvalidInputError(f"--cutoff: {file} has no truth with which tracks are compared")
+    if parsed["smooth"]:
+        check_smoothable(scene, corrects="registration" in settings)
     if parsed["origin"] is not None:
         scene = replace(scene, origin=parsed["origin"])
     elif parsed["map"] and scene.origin is None:

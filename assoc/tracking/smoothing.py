@@ -49,10 +49,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
         Measurements have times of their own, the tracker corrects biases of sensors, or the decisions are those of
         other scans.
     """
-    if tracker.registration is not None:
-        raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
-    if not all(scene.scan(one.scan).at_once for one in decisions):
-        raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
+    check_smoothable(scene, corrects=tracker.registration is not None)
     for one in decisions:
         scan = scene.scan(one.scan)
         if one.time != scan.time or [len(ids) for ids in one.assigned] != scan.sizes.tolist():
@@ -114,6 +111,14 @@ def _track(tracker: Tracker, scene: Scene, track_id: int, found: dict[int, Array
             )  # fmt: skip
         )
     return tracks
+
+
+def check_smoothable(scene: Scene, *, corrects: bool) -> None:
+    """Refuse scenes that `smoothed` cannot take, or a tracker that corrects measurements."""
+    if corrects:
+        raise InvalidInputError("smoothed: the tracker corrects measurements (registration); register the scene first")
+    if not all(scene.scan(k).at_once for k in range(scene.num_scans)):
+        raise InvalidInputError("smoothed: measurements with times of their own cannot be smoothed yet")
 
 
 def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:

@@ -113,6 +113,7 @@ def test_a_density_in_a_file_may_be_text(tmp_path):
         ("seed = -1", "seed: expected a whole number >= 0, got -1"),
         ("jobs = 0", "jobs: expected a whole number >= 1, got 0"),
         ("max_tuples = 0", "max_tuples: expected a whole number >= 1, got 0"),
+        ("scans = '3:99'", "scans: 3:99 is not within the scans"),
     ],
 )
 def test_numbers_of_a_file_are_refused_by_its_name(scene_file, tmp_path, capsys, text, message):
