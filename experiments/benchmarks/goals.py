@@ -255,8 +255,9 @@ def _ghost_proofs(results: Results, size: str, exact: Sequence[Row]) -> list[Ver
             verdict("all in 10 s", True, text, len(proved) == len(exact) and slowest <= 10.0),
         ]
     return [
-        verdict("gap at most 0.01 % in 30 s", False, text, max(gaps) <= 1e-4),
-        verdict("gap at most 0.003 % in 30 s", True, text, max(gaps) <= 3e-5),
+        verdict("gap at most 0.01 % in 30 s (median)", False, text, median(gaps) <= 1e-4),
+        verdict("gap at most 0.01 % in 30 s (each seed)", False, text, max(gaps) <= 1e-4),
+        verdict("gap at most 0.003 % in 30 s (median)", True, text, median(gaps) <= 3e-5),
     ]
 
 
@@ -291,9 +292,12 @@ def _ghost_heuristic(results: Results, size: str, solver: str) -> list[Verdict]:
     after = f"any peer after {longest:g} s"
     # at 20 all are at the optimum long before
     return [
-        Verdict("ghost", size, f"{solver}: in 5 s at or below any peer after 5 s", False, text(early),
+        Verdict("ghost", size, f"{solver}: in 5 s at or below any peer after 5 s (each seed)", False, text(early),
                 max(early) <= 1e-9),
-        Verdict("ghost", size, f"{solver}: in 5 s at or below {after}", False, text(late), max(late) <= 1e-9),
+        Verdict("ghost", size, f"{solver}: in 5 s at or below {after} (median)", False, text(late),
+                median(late) <= 1e-9),
+        Verdict("ghost", size, f"{solver}: in 5 s at or below {after} (each seed)", False, text(late),
+                max(late) <= 1e-9),
         *([] if size == "20" else [
             Verdict("ghost", size, f"{solver}: in 5 s 0.01 % below {after} (median)", True, text(late),
                     median(late) <= -1e-4),
