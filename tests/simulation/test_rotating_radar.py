@@ -160,6 +160,7 @@ def test_scenes_and_recordings_have_their_own_doors():
     [
         ({"traffic": "jam"}, "traffic: expected one of random, crossing, parallel, head-on, got 'jam'"),
         ({"aircraft": 0}, "aircraft: expected a whole number"),
+        ({"traffic": "crossing", "aircraft": 14}, "aircraft: is of random traffic; crossing is a pair"),
         ({"rotation": 0.0}, "rotation: expected a number above 0"),
         ({"identity_loss": 1.0}, "identity_loss: expected a share"),
         ({"range_step": -1.0}, "range_step: expected a number, at least 0"),

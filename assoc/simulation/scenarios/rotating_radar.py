@@ -43,7 +43,7 @@ class RotatingRadarParameters(Parameters):
     traffic: Traffic = field(
         default="random", metadata={"help": "many aircraft at random, or a pair: crossing, parallel, head-on"}
     )
-    aircraft: int = field(default=14, metadata={"help": "number of aircraft of random traffic"})
+    aircraft: int | None = field(default=None, metadata={"help": "number of aircraft of random traffic (default: 14)"})
     duration: float = field(default=1130.0, metadata={"help": "seconds"})
     rotation: float = field(default=9.5, metadata={"help": "seconds for a turn of the antenna"})
     detection_probability: float = field(default=0.78, metadata={"help": "P_d of a look"})
@@ -64,7 +64,10 @@ class RotatingRadarParameters(Parameters):
     def __post_init__(self) -> None:
         if self.traffic not in get_args(Traffic):
             raise InvalidInputError(f"traffic: expected one of {', '.join(get_args(Traffic))}, got {self.traffic!r}")
-        self._whole("aircraft", most=4095)
+        if self.aircraft is not None:
+            self._whole("aircraft", most=4095)
+            if self.traffic != "random":
+                raise InvalidInputError(f"aircraft: is of random traffic; {self.traffic} is a pair")
         self._number("duration", "rotation", "reach", above=0.0)
         self._number("false_plots", "identity_loss", "garbled", "range_step", "bearing_step", "time_step", least=0.0)
         self._probability("detection_probability")
@@ -79,6 +82,13 @@ class RotatingRadarParameters(Parameters):
                 )
         if self.duration > 1e7 * self.rotation:
             raise InvalidInputError(f"duration: expected at most 1e7 rotations, got {self.duration:g} s")
+
+    @property
+    def count(self) -> int:
+        """How many aircraft there are."""
+        if self.traffic != "random":
+            return 2
+        return 14 if self.aircraft is None else self.aircraft
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +118,8 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
     p = parameters
     turns = p.duration / p.rotation
     memory.require(
-        _STEP * p.duration / STEP + _PLOT * turns * (p.aircraft + p.false_plots),
-        f"plots with duration = {p.duration:g}, rotation = {p.rotation:g}, aircraft = {p.aircraft}, "
+        _STEP * p.duration / STEP + _PLOT * turns * (p.count + p.false_plots),
+        f"plots with duration = {p.duration:g}, rotation = {p.rotation:g}, aircraft = {p.count}, "
         f"false_plots = {p.false_plots:g}",
         "shorten the recording, or lower the number of plots",
     )
@@ -166,7 +176,7 @@ def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Arr
 
 def _random_traffic(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
     far = p.reach * NAUTICAL_MILE
-    return [random_flight(rng, 0.08 * far, 0.85 * far, p.duration) for _ in range(p.aircraft)]
+    return [random_flight(rng, 0.08 * far, 0.85 * far, p.duration) for _ in range(p.count)]
 
 
 def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
