@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from experiments.benchmarks import FIRST_SEED, goals, markdown, readme, rows
+import assoc
+from experiments.benchmarks import FIRST_SEED, goals, markdown, ranking, readme, rows
 from experiments.benchmarks.__main__ import FAMILIES, main
 from experiments.benchmarks.families import Case, Entry, Instance, cases
 from experiments.benchmarks.rows import Row
 from experiments.benchmarks.run import run_all, run_case, timed
+from experiments.common import peers
 from experiments.common.instances import synthetic
 
 ROW = Row("gated", "3x300", 1000, 0, 9000, "exact", False, 60.0, -100.0, -100.0, 0.01, "optimal", -100.0, True)
@@ -173,6 +176,47 @@ def test_shares_and_scale_and_kbest() -> None:
     assert all(v.met for v in goals.judge([small, large]))
     found = goals.judge([small, replace(large, seconds=1.6, extra=2100.0)])
     assert [v.met for v in found] == [True, False, False]
+
+
+def test_rankings_are_compared_cost_by_cost() -> None:
+    def ranking_of(solver: str, *costs: float) -> ranking.Ranking:
+        return ranking.Ranking(replace(ROW, solver=solver, cost=costs[0]), list(costs))
+
+    ours, first = ranking_of("kbest", 1.0, 2.0, 2.0, 4.0), ranking_of("exact", 1.0)
+    found = ranking.compared([ours, first, ranking_of("nrl_tracker", 1.0, 2.0, 3.0, 4.0)])
+    assert [row.extra for row in found] == [4, 1, 3]
+    for wrong in (
+        [ranking_of("kbest", 1.0, 3.0, 2.0)],
+        [ours, ranking_of("exact", 0.5)],
+        [ours, ranking_of("nrl_tracker", 1.0, 2.0, 2.0, 3.5)],
+        [ours, ranking_of("nrl_tracker", 1.0, 2.0, 2.0, 4.0, 5.0)],
+    ):
+        with pytest.raises(AssertionError, match="kbest"):
+            ranking.compared(wrong)
+
+
+def test_a_ranking_that_misses_a_solution_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = assoc.kbest
+    monkeypatch.setattr(ranking, "SPATIAL_K", 4)
+    found = ranking.run(True, 1, lambda text: None)
+    assert {row.solver: row.extra for row in found if row.size == ranking.SPATIAL} == {"kbest": 4, "exact": 1}
+    assert all(row.hit and row.cpu > 0 for row in found if row.size != ranking.SMALL)
+    monkeypatch.setattr(assoc, "kbest", lambda problem, k: real(problem, k + 1)[1:])
+    with pytest.raises(AssertionError, match="exact has better"):
+        ranking.run(True, 1, lambda text: None)
+
+
+def test_our_check_of_a_peers_answer_is_none_of_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow_check(*arguments: object) -> float:
+        begin = time.process_time()
+        while time.process_time() - begin < 0.1:
+            pass
+        return 0.0
+
+    monkeypatch.setattr(peers, "check_answer", slow_check)
+    case = Case("planted", "S=3", lambda seed: iter([Instance(*synthetic.planted(3, seed, targets=6))]), (),
+                (Entry("sequential", 5.0),), 1)  # fmt: skip
+    assert run_case(case)[0].cpu < 0.05
 
 
 def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:
