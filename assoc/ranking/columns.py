@@ -58,6 +58,17 @@ class AllColumns:
     offset: float
     single: NDArray[np.int64]
 
+    @property
+    def scale(self) -> float:
+        """Size of the numbers that light solutions are sums of, > 0 where any of them is.
+
+        A column's weight is what its multipliers add up to and its reduced cost, which solutions near the bound do not
+        have: however dear the others are, they do not count.
+        """
+        least = self.reduced[self.reduced > 0.0].min(initial=np.inf)
+        priced = float(np.abs(self.weights - self.reduced).max(initial=0.0))
+        return max(abs(self.bound), priced, float(least) if np.isfinite(least) else 0.0)
+
     def keep(self, excess: float) -> Packing:
         """Return the packing of the columns whose reduced cost is at most ``excess``, by components."""
         chosen = np.flatnonzero(self.reduced <= excess).astype(np.int32)

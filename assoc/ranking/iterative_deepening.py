@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,8 @@ Columns = NDArray[np.int32]
 
 # excess of a round, as a multiple of that of the best solution known
 _AHEAD = 1.1
+# weights this near, as a share of what sums go through, are ties
+_TIE = 1e-12
 
 
 @dataclass(slots=True)
@@ -75,8 +78,7 @@ class Deepening:
         self._run = run
         self._ahead = ahead
         self._nodes = 0
-        scale = max(float(np.abs(columns.weights).max(initial=0.0)), abs(columns.bound))
-        self._tolerance = 1e-12 * scale
+        self._tolerance = _TIE * columns.scale
         self._known: Columns | None = None
         self._known_weight = np.inf
 
@@ -141,7 +143,7 @@ class Deepening:
         )
         if np.isposinf(lower).any():
             return Found([], np.inf)
-        total_lower = float(lower.sum())
+        total_lower = math.fsum(lower)
         unlisted = total_lower + (np.array(lists.proven) - lower)
         rest = min(beyond, float(unlisted.min(initial=np.inf)))
         if any(own.size == 0 for own in lists.weights):

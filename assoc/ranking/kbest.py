@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
 import time
 from dataclasses import dataclass, replace
 
@@ -23,7 +24,7 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.prepare import prepare
+from assoc.packing.prepare import Prepared, prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import AllColumns, price_all_columns
@@ -124,18 +125,10 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
         found = Deepening(columns, most, run, ahead).run()
     if len(found.chosen) == most < k and found.rest < np.inf:
         run.stopped_by = run.stopped_by or "memory_limit"
-    # weights are differences of costs: what they lose to rounding is taken off the bounds
-    rounding = 8.0 * float(
-        np.finfo(float).eps
-        * (
-            np.abs(columns.weights).max(initial=0.0) * max(columns.slack.size, 1)
-            + np.abs(columns.duals).sum()
-            + np.abs(prepared.single_cost).sum()
-        )
-    )
-    rest = found.rest + columns.offset - rounding
+    rest = found.rest + columns.offset
+    rest -= _rounding(columns, prepared, found.rest)
     if not found.chosen:
-        rest = max(rest, ahead.bound + columns.offset - rounding)
+        rest = max(rest, ahead.bound + columns.offset - _rounding(columns, prepared, ahead.bound))
         return Ranking([_unproved(problem, rest, k, run, columns, found.known)], rest, columns)
     answers = _in_order(problem, [columns.indices(own) for own in found.chosen])
     runtime, compile_time = run.runtime(), run.compile_time()
@@ -144,7 +137,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
             tuples=problem.tuples[indices],
             indices=indices,
             cost=cost,
-            lower_bound=min(cost - rounding, rest),
+            lower_bound=min(cost - _rounding(columns, prepared, cost - columns.offset), rest),
             solver="kbest",
             iterations=found.nodes,
             runtime=runtime,
@@ -155,6 +148,18 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
         for place, (cost, indices) in enumerate(answers)
     ]
     return Ranking(solutions, rest, columns)
+
+
+def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:
+    """By how much rounding can have changed the sums that solutions of this weight are compared by.
+
+    Reduced costs are >= 0, so that the negative weights of a solution add up to no more than its multipliers do;
+    weights are differences of costs.
+    """
+    if not math.isfinite(weight):
+        return 0.0
+    size = abs(weight) + 2.0 * float(np.abs(columns.duals).sum()) + float(np.abs(prepared.single_cost).sum())
+    return max(8.0, columns.slack.size) * sys.float_info.epsilon * size
 
 
 def checked_k(k: object) -> int:

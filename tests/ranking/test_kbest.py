@@ -75,6 +75,18 @@ def test_small_problems():
     assert 0 in found and max(found) > 1000
 
 
+def test_a_huge_cost_that_no_good_solution_has_blurs_no_ties():
+    for number, problem in enumerate(small_problems(60, seed=5, dummy=True)):
+        several = np.flatnonzero(np.count_nonzero(problem.tuples, axis=1) > 1)
+        costs = problem.costs.copy()
+        costs[several[number % max(several.size, 1) : number % max(several.size, 1) + 1]] = 10.0 ** (9 + number % 7)
+        dear = AssignmentProblem(problem.tuples, costs, problem.sizes)
+        expected = [solution.cost for solution in all_solutions(dear)[:10]]
+        found = kbest(dear, 10)
+        assert [one.cost for one in found] == pytest.approx(expected, rel=1e-15, abs=1e-9)
+        assert found[0].status == "optimal"
+
+
 def test_two_sensors():
     rng = np.random.default_rng(1)
     for number in range(250):

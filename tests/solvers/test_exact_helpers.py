@@ -5,6 +5,7 @@ import pytest
 from assoc import assign
 from assoc.costs import build_problem
 from assoc.packing.branching import search
+from assoc.packing.run import Run
 from assoc.solvers.exact import proof
 from experiments.common.instances.scenes import ghost
 
@@ -26,3 +27,10 @@ def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
     solution = assign(build_problem(ghost(20, 2018), 0), "exact")
     assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
     assert bool(joined) == (alone == 3) and all(age >= alone for age in joined)
+
+
+def test_bounds_of_many_components_are_added_up_exactly():
+    run = Run(0)
+    parts = [1e16, 1.0, -1e16, 1.0] * 500
+    proof._Done(parts, [-part for part in parts]).record(run, 3, [])
+    assert (run.trace[-1].cost, run.trace[-1].lower_bound) == (1000.0, -1000.0)

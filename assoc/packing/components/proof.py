@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -100,4 +102,4 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
     duals = dual_bound(packing, run=run)
     components = split_components(packing, duals, np.arange(packing.num_columns))
     give_covers(components, packing, Cover.of(packing, columns).owner)
-    return sum((bound_of_component(component, run) for component in components), 0.0), duals
+    return math.fsum(bound_of_component(component, run) for component in components), duals

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
@@ -75,11 +76,12 @@ def search_components(
         parts.extend(split_component(component) or [component])
     components = parts
     columns: list[NDArray[np.int64]] = []
-    bound, weight = 0.0, 0.0
+    bounds: list[float] = []
+    weights: list[float] = []
     done = len(components)
     cut_off = False
-    root_bound = sum(component.bound for component in components)
-    _record_all(run, done, weight, root_bound, components)
+    root_bound = math.fsum(component.bound for component in components)
+    _record_all(run, done, weights, root_bound, components)
     queue: list[tuple[Component, Team | None]] = [(component, None) for component in components]
     workers = parameters.workers
     pool = ThreadPoolExecutor(workers, "assoc-search") if workers > 1 else None
@@ -102,19 +104,22 @@ def search_components(
                 if component.best is None and over:
                     complete_greedily(component, run)
                 if component.weight < before:
-                    _record_all(run, done, weight, root_bound, [component, *(other for other, _ in queue)])
+                    waiting = [component, *(other for other, _ in queue)]
+                    _record_all(run, done, weights, root_bound, waiting)
                 smaller = None if over else split_component(component)
                 if smaller is not None:
                     queue.extend((one, None) for one in smaller)
                     continue
             if over:
                 columns.append(component.origin[component.best_columns()])
-                bound += bound_of_component(component, run)
-                weight += component.weight
+                bounds.append(bound_of_component(component, run))
+                weights.append(component.weight)
             else:
                 queue.append((component, team))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    run.record(done, weight, bound)
+    # thousands of parts: a plain sum would lose more than the bounds' margins for rounding
+    bound = math.fsum(bounds)
+    run.record(done, math.fsum(weights), bound)
     if cut_off:
         # said only now: a run that is stopped neither searches other components nor raises their bounds
         run.stopped_by = run.stopped_by or "iterations"
@@ -137,8 +142,8 @@ def _take_turn(component: Component, team: Team, run: Run, limits: SearchParamet
     return False
 
 
-def _record_all(run: Run, iterations: int, weight: float, bound: float, components: list[Component]) -> None:
-    known = weight + sum(component.weight for component in components)
+def _record_all(run: Run, iterations: int, weights: list[float], bound: float, components: list[Component]) -> None:
+    known = math.fsum([*weights, *(component.weight for component in components)])
     if known < np.inf:
         run.record(iterations, known, bound)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,6 +39,22 @@ _SHORT = 20
 _HARD = 500
 # columns for each row from which it surely is
 _DENSE = 15
+
+
+@dataclass(slots=True)
+class _Done:
+    """Weights and bounds of the components that are done.
+
+    They are added up exactly: over thousands of them a plain sum loses more than the bounds' margins for rounding.
+    """
+
+    weights: list[float]
+    bounds: list[float]
+
+    def record(self, run: Run, nodes: int, tasks: list[_Task]) -> None:
+        """Add a point to the trace, with what is known of the components that are not done."""
+        weight = math.fsum([*self.weights, *(task.component.weight for task in tasks)])
+        run.record(nodes, weight, math.fsum([*self.bounds, *(task.bound for task in tasks)]))
 
 
 @dataclass(slots=True)
@@ -87,10 +104,11 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         compile_branching_ahead(surely=packing.num_columns > _DENSE * packing.num_rows)
     reduction = Reduction(packing, run)
     components = reduction.reduce()
-    columns, weight, bound = reduction.closed_columns, reduction.closed_weight, reduction.closed_bound
+    columns = reduction.closed_columns
+    done = _Done([reduction.closed_weight], [reduction.closed_bound])
     if components:
         # what is known before the search of hard ones: worth seeing where the search takes long
-        _record(run, 0, weight, bound, [_Task(one) for one in components])
+        done.record(run, 0, [_Task(one) for one in components])
     tasks: list[_Task] = []
     settled: list[_Task] = []
     nodes = 0
@@ -106,7 +124,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
             tasks.extend(_Task(one) for one in _sharpen(component, run))
 
     def show(tasks: list[_Task]) -> None:
-        _record(run, nodes, weight, bound, settled + tasks)
+        done.record(run, nodes, settled + tasks)
 
     show(tasks)
     tasks = settled + _improve(tasks, patience, run, show)
@@ -139,10 +157,10 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
                 tasks.extend([task] if smaller is None else task.parts(smaller))
                 risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
                 if better or risen or run.is_silent():
-                    _record(run, nodes, weight, bound, tasks)
+                    done.record(run, nodes, tasks)
                 continue
             if better:
-                _record(run, nodes, weight, bound, [task, *tasks])
+                done.record(run, nodes, [task, *tasks])
         if component.best is None:
             if task.search is not None and task.search.done and not task.search.out_of_memory:
                 raise infeasible(component.packing)
@@ -150,11 +168,12 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
         assert component.best is not None
         short = short or (task.search is not None and task.search.out_of_memory)
         columns.append(component.origin[component.best_columns()])
-        weight += component.weight
-        bound += task.bound
+        done.weights.append(component.weight)
+        done.bounds.append(task.bound)
+    weight, bound = math.fsum(done.weights), math.fsum(done.bounds)
     if (short or nodes >= node_limit) and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if short else "iterations"
-    _record(run, nodes, weight, bound, [])
+    done.record(run, nodes, [])
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
@@ -246,7 +265,3 @@ def _search_better(task: _Task, run: Run) -> bool:
     component.refine(run, TabuParameters.clusters)
     component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
     return component.stalled == 0
-
-
-def _record(run: Run, nodes: int, weight: float, bound: float, tasks: list[_Task]) -> None:
-    run.record(nodes, weight + sum(task.component.weight for task in tasks), bound + sum(task.bound for task in tasks))
