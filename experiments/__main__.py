@@ -58,10 +58,10 @@ EXPERIMENTS = (
     ),
     Experiment(
         "pages",
-        "nothing: writes the tables of twelve pages from the result files",
+        "nothing: writes the tables of thirteen pages from the result files",
         "docs/papers.md, docs/filters.md, docs/recordings.md, docs/start.md, docs/dependencies.md, docs/sweeps.md, "
         "docs/solvers.md, docs/which_solver.md, docs/ant_colony.md, docs/concepts.md, docs/tracking.md, "
-        "docs/registration.md",
+        "docs/registration.md, docs/stonesoup.md",
     ),
     Experiment(
         "papers.ant_colony",
@@ -132,7 +132,7 @@ EXPERIMENTS = (
     Experiment(
         "trackers.fusion_in_stone_soup",
         "fusion before tracking, in Stone Soup",
-        "docs/stonesoup.md, docs/images/stonesoup-fusion.png",
+        "docs/stonesoup.md; with --publish experiments/results/trackers.fusion_in_stone_soup.json",
     ),
     Experiment(
         "metaheuristics.ablation",
@@ -163,6 +163,11 @@ EXPERIMENTS = (
         "cold_start",
         "what a user waits for after an installation: make bench-cold",
         "docs/start.md (first-call), once published with --publish",
+    ),
+    Experiment(
+        "scan_time",
+        "one scan from its measurements to a proven answer, part by part",
+        "docs/which_solver.md (a scan); with --publish experiments/results/scan_time.json",
     ),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),

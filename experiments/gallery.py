@@ -199,13 +199,13 @@ def surfaces(kind: str) -> Callable[[Any], None]:
 
 
 def stonesoup_fusion(figure: Any) -> None:
-    """Draw three ways to track in Stone Soup, on the first three scenes of the experiment's full run; takes minutes."""
+    """Draw three ways to track in Stone Soup, on the ten scenes of the experiment's full run; takes minutes."""
     import numpy as np
 
     from experiments.trackers import fusion_in_stone_soup as fusion
 
     figure.set_size_inches(11, 4.6)
-    seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()[:3]
+    seeds = np.random.default_rng(0).integers(2**31, size=10).tolist()
     fusion.draw(figure, (fusion.compare(seeds)[0][:, :, :, 0], fusion.simulate(seeds[0])))
 
 

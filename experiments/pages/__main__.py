@@ -24,11 +24,12 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "dependencies.md": measured.DEPENDENCIES,
     "sweeps.md": measured.SWEEPS,
     "solvers.md": metaheuristics.SOLVERS,
-    "which_solver.md": benchmarks.WHICH_SOLVER,
+    "which_solver.md": {**benchmarks.WHICH_SOLVER, **measured.WHICH_SOLVER},
     "ant_colony.md": metaheuristics.ANT_COLONY,
     "concepts.md": measured.CONCEPTS,
     "tracking.md": {**measured.TRACKING, **trackers.TRACKING},
     "registration.md": trackers.REGISTRATION,
+    "stonesoup.md": trackers.STONE_SOUP,
 }
 """Page -> name of the table -> what makes it."""
 

@@ -152,6 +152,15 @@ def overhead() -> str:
     return table(["ms", *parts], rows)
 
 
+def scan_time() -> str:
+    """From one scan's measurements to a proven answer, part by part."""
+    r = Results("scan_time")
+    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": HiGHS / exact")]
+    parts = ("build_problem and exact", "build_problem", "exact", "AssignmentProblem", "greedy", "HiGHS")
+    rows = [[kind, *(_judged(r[f"{kind}: {part}"]) for part in (*parts, "HiGHS / exact"))] for kind in kinds]
+    return table(["ms", "both", *parts[1:], "HiGHS / exact"], rows)
+
+
 def first_call() -> str:
     """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
     if not result_file("cold_start").exists():
@@ -306,6 +315,7 @@ FILTERS = {
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
 START = {"first-call": first_call}
+WHICH_SOLVER = {"scan-time": scan_time}
 DEPENDENCIES = {"sizes": sizes}
 CONCEPTS = {"prior": prior}
 TRACKING = {"warm-starts": warm_starts}

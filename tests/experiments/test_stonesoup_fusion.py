@@ -14,6 +14,7 @@ from experiments.trackers import fusion_in_stone_soup as fusion
 @pytest.fixture
 def small(monkeypatch):
     monkeypatch.setattr(fusion, "SCANS", 6)
+    monkeypatch.setattr(fusion, "SETTLED", 3)
     monkeypatch.setattr(fusion, "TARGETS", 3)
     monkeypatch.setattr(fusion, "CLUTTER", 1.0)
 
@@ -23,7 +24,7 @@ def test_program(small, tmp_path):
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
     assert fusion.program(["--quick", "--json", files[0], "--figure", files[1]]) == 0
     claims = {c.quantity: c for c in load_json(files[0])}
-    assert len(claims) == 3 * 4 + 2 + 3
+    assert len(claims) == 3 * 4 + 2 + 2 + 3 + 2
     for way in fusion.WAYS:
         whole = claims[f"{way.name}: GOSPA"].ours
         parts = [claims[f"{way.name}: GOSPA, {part}"].ours for part in fusion.PARTS[1:]]

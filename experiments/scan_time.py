@@ -1,0 +1,129 @@
+"""From one scan's measurements to a proven answer: what a tracker without tracks waits for, part by part.
+
+    python -m experiments.scan_time [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+
+Each scene is taken apart as often as it takes a tenth of a second, and the median counts: ``build_problem`` (the tuples
+within the gates, their positions and costs), ``AssignmentProblem`` of tuples and costs that are there already (for
+users with costs of their own), ``exact`` and ``greedy``, both with their bounds. A problem prepares itself at the
+first call of a solver: each call has a new one. HiGHS, from the tuples to the chosen tuples, is there to compare with:
+ratios say more than times of one machine. Processor time of one thread, pinned to a core, kernels compiled.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import assoc
+from assoc.problem import AssignmentProblem
+from assoc.scene import Scene
+from assoc.simulation import simulate
+from experiments.benchmarks.run import one_core
+from experiments.common.claims import Claim
+from experiments.common.command import main
+from experiments.common.instances import scenes
+from experiments.common.peers import highs
+
+
+class Kind(NamedTuple):
+    """Scenes that are alike.
+
+    Attributes
+    ----------
+    make : callable seed -> Scene
+    goal : float or None
+        Milliseconds that building and solving may take.
+    """
+
+    make: Callable[[int], Scene]
+    goal: float | None = None
+
+
+KINDS = {
+    "three radars, 3 targets": Kind(lambda seed: simulate("three-radar", seed, scans=1)),
+    "3 sensors x 100 targets": Kind(lambda seed: scenes.gated(3, 100, seed)),
+    "3 sensors x 300 targets": Kind(lambda seed: scenes.gated(3, 300, seed)),
+    "3 sensors x 1,000 targets": Kind(lambda seed: scenes.gated(3, 1000, seed), 15.0),
+}
+PARTS = ("build_problem", "exact", "AssignmentProblem", "greedy", "HiGHS")
+TOGETHER = "build_problem and exact"
+_SCENES = 10
+_SECONDS, _MOST = 0.1, 40
+
+
+def median_ms(call: Callable[[Any], Any], prepare: Callable[[], Any] = lambda: None) -> float:
+    """Median of the processor time of a call, milliseconds; what it is given is made anew each time, and not timed."""
+    call(prepare())
+    spent: list[float] = []
+    while len(spent) < 3 or (sum(spent) < _SECONDS and len(spent) < _MOST):
+        given = prepare()
+        begin = time.thread_time()
+        call(given)
+        spent.append(time.thread_time() - begin)
+    return 1e3 * float(np.median(spent))
+
+
+def parts_of(scene: Scene) -> dict[str, float]:
+    """Milliseconds of each part, for the first scan of a scene."""
+    problem = assoc.build_problem(scene, 0)
+
+    def fresh() -> AssignmentProblem:
+        return AssignmentProblem(problem.tuples, problem.costs, problem.sizes, dummy=problem.dummy)
+
+    return {
+        "build_problem": median_ms(lambda _: assoc.build_problem(scene, 0)),
+        "exact": median_ms(assoc.assign, lambda: assoc.build_problem(scene, 0)),
+        "AssignmentProblem": median_ms(lambda _: fresh()),
+        "greedy": median_ms(lambda one: assoc.assign(one, "greedy"), fresh),
+        "HiGHS": median_ms(lambda one: highs(one, 60.0), fresh),
+    }
+
+
+def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+    """Take scenes of every kind apart."""
+    claims, shown = [], {}
+    with one_core():
+        for name, kind in KINDS.items():
+            seeds = rng.integers(2**31, size=2 if quick else _SCENES)
+            found = [parts_of(kind.make(int(seed))) for seed in seeds]
+            medians = {part: float(np.median([one[part] for one in found])) for part in PARTS}
+            both = [one["build_problem"] + one["exact"] for one in found]
+            ratio = float(np.median([one["HiGHS"] / one["exact"] for one in found]))
+            source = "" if kind.goal is None else "goal chosen by us"
+            band = None if kind.goal is None else (None, kind.goal)
+            claims += [
+                Claim(f"{name}: {TOGETHER}", "ms", None, float(np.median(both)), None, band, source=source),
+                *(Claim(f"{name}: {part}", "ms", None, value) for part, value in medians.items()),
+                Claim(f"{name}: HiGHS / exact", "", None, ratio),
+            ]
+            shown[name] = medians
+    return claims, shown
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw building, solving, and what HiGHS takes for the solving alone."""
+    axes = figure.subplots()
+    places = np.arange(len(shown))
+    parts = ("build_problem", "exact", "HiGHS")
+    for number, part in enumerate(parts):
+        bars = axes.bar(places + 0.27 * (number - 1), [one[part] for one in shown.values()], 0.25, label=part)
+        axes.bar_label(bars, [f"{one[part]:.2g}" for one in shown.values()], fontsize=8)
+    axes.set_xticks(places, [name.replace(", ", "\n").replace(" x ", "\nx ") for name in shown])
+    axes.set(ylabel="ms", yscale="log")
+    axes.margins(y=0.15)
+    axes.legend()
+
+
+TITLE = "From one scan's measurements to a proven answer"
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the measurement; returns its exit code."""
+    return main("scan_time", TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
