@@ -117,7 +117,7 @@ def search_components(
             else:
                 queue.append((component, team))
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    # thousands of parts: a plain sum would lose more than the bounds' margins for rounding
+    # thousands of parts: a plain sum can lose more than the bounds' margins for rounding
     bound = math.fsum(bounds)
     run.record(done, math.fsum(weights), bound)
     if cut_off:

@@ -45,7 +45,7 @@ _DENSE = 15
 class _Done:
     """Weights and bounds of the components that are done.
 
-    They are added up exactly: over thousands of them a plain sum loses more than the bounds' margins for rounding.
+    They are added up exactly: over thousands of them a plain sum can lose more than the bounds' margins for rounding.
     """
 
     weights: list[float]
@@ -173,7 +173,7 @@ def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome
     weight, bound = math.fsum(done.weights), math.fsum(done.bounds)
     if (short or nodes >= node_limit) and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
         run.stopped_by = "memory_limit" if short else "iterations"
-    done.record(run, nodes, [])
+    run.record(nodes, weight, bound)
     chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
     return Outcome(chosen, nodes, bound, None if components else reduction.proof)
 
