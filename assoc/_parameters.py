@@ -13,6 +13,9 @@ from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hin
 
 from assoc.errors import InvalidInputError
 
+# seconds, thirty years
+_FOREVER = 1e9
+
 
 class Option:
     """One parameter as an option of the command line or a key of a configuration file.
@@ -155,8 +158,8 @@ def checked_time_limit(time_limit: object) -> float | None:
         return None
     limit: Any = time_limit
     if isinstance(limit, Real) and not isinstance(limit, bool) and limit > 0:  # type: ignore[operator]
-        # a whole number may be larger than any float
-        return float(limit) if limit <= sys.float_info.max else math.inf
+        # clocks of libraries end before that
+        return float(limit) if limit <= _FOREVER else math.inf
     raise InvalidInputError(f"time_limit: expected seconds > 0, got {time_limit!r}")
 
 

@@ -28,7 +28,7 @@ import sys
 from collections import Counter
 
 DECIMALS = 60
-NUMBER = re.compile(r"[+-]?[0-9]{1,60}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
+NUMBER = re.compile(r"[+-]?[0-9]{1,400}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
 MOST_ROWS, MOST_BYTES, DEEPEST = 1_000_000, 200_000_000, 1_000
 Row = tuple[int, int]  # sensor, index from 1; cuts are (-1, number)
 Column = tuple[int, tuple[Row, ...]]  # cost, rows
@@ -109,7 +109,7 @@ def read_problem(path: str) -> Problem:
     if [line[0] for line in head] != ["assoc-problem", "sizes", "dummies", "tuples"] or head[0][1:] != ["1"]:
         raise ValueError("the first lines must be 'assoc-problem 1', 'sizes N ...', 'dummies yes|no', 'tuples N'")
     sizes, dummies, count = list(map(_whole, head[1][1:])), head[2][1:] == ["yes"], _whole("".join(head[3][1:]))
-    if not 0 < sum(sizes) <= MOST_ROWS or head[2][1:] not in (["yes"], ["no"]):
+    if not sizes or sum(sizes) > MOST_ROWS or head[2][1:] not in (["yes"], ["no"]):
         raise ValueError(f"expected sizes, up to {MOST_ROWS} measurements in all, and 'dummies yes' or 'dummies no'")
     costs: dict[tuple[int, ...], int] = {}
     for words in lines:
@@ -215,7 +215,8 @@ def tree_bound(tree: dict[str, object], columns: list[Column], rows: list[Row], 
                 continue
             columns = cheap(columns, u, target - unit - bound)  # no solution below the target has the others
         (a, b), children = map(_as_row, _listed(node["pair"], 2)), list(map(_whole, _listed(node.get("children"), 2)))
-        if a == b or not {a, b} <= inside or min(children) <= at or len({*children, *seen}) != len(seen) + 2:
+        new = len({*children}) == 2 and seen.isdisjoint(children) and min(children) > at
+        if a == b or not {a, b} <= inside or not new:
             raise ValueError(f"node {at} of a tree must name two rows of it, and two children of its own after it")
         seen.update(children)
         states[children[0]] = [one for one in columns if (a in one[1]) == (b in one[1])], needed | {a, b}
@@ -260,9 +261,11 @@ def check(problem: Problem, text: str) -> list[str]:
         lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
         if not lines or lines[0] != ["assoc-solution", "1"]:
             raise ValueError("the first line must be 'assoc-solution 1'")
-        claims = [line[1] for line in lines if line[0] == "cost" and len(line) == 2]
+        claims = [word for line in lines if line[0] == "cost" for word in line[1:] or [""]]
         chosen = [tuple(map(_whole, line)) for line in lines[1:] if line[0] != "cost"]
-        return [f"feasible, cost {shown(cost_of(problem, chosen, claims[0] if claims else None))}"]
+        if len(claims) > 1:
+            raise ValueError("expected at most one line 'cost C'")
+        return [f"feasible, cost {shown(cost_of(problem, chosen, *claims))}"]
     proof = json.loads(text, parse_float=str, parse_int=str)
     if proof.get("format") != "assoc-proof" or proof.get("version") != "1":
         raise ValueError("expected the format 'assoc-proof', version 1")

@@ -103,6 +103,7 @@ def _associate(
 
     files, jobs = parsed["files"], settings.get("jobs", 1)
     sources = [load_source(file) for file in files]
+    _refuse_gates_of_problems(sources, parsed)
     started = time.perf_counter()
     bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
     log = SolverLog(bar, parsed["verbose"])
@@ -254,6 +255,19 @@ def _plan(
         **extras,
     )
     return plan, plan.items()
+
+
+def _refuse_gates_of_problems(sources: list[Source], parsed: dict[str, Any]) -> None:
+    """Refuse options of the command line that change nothing where no file is a scene."""
+    from assoc.scene.scene import Scene
+
+    if any(isinstance(source, Scene) for source in sources):
+        return
+    for name in (*_GATING, "gate_loss"):
+        if parsed[name]:
+            raise InvalidInputError(
+                f"{flag_of(name)}: is of scenes, and a problem has its tuples already; leave it out"
+            )
 
 
 def _chosen(items: list[tuple[int, int]], files: list[str], text: str, label: str) -> list[tuple[int, int]]:

@@ -16,14 +16,14 @@ from assoc.solvers.assign import assign
 _SECONDS = 10.0
 
 
-def gate_loss(scene: Scene, scan: Scan, cost: float, gating: Mapping[str, Any], time_limit: float | None) -> float:
-    """Bound from above what an association of this cost loses to the best one of all tuples of negative cost.
+def bound_without_gates(scene: Scene, scan: Scan, gating: Mapping[str, Any], time_limit: float | None) -> float:
+    """Bound from below what an association of any tuples of negative cost can cost, gated or not.
+
+    What an association costs above it is at most what the gates may have cost (``ScanAssociation.gate_loss``).
 
     Parameters
     ----------
     scene, scan
-    cost : float
-        Of the association that was found with the gates.
     gating : mapping
         Options of `assoc.build_problem`, of which ``gate_probability`` has no effect.
     time_limit : float, optional
@@ -32,11 +32,11 @@ def gate_loss(scene: Scene, scan: Scan, cost: float, gating: Mapping[str, Any], 
     Returns
     -------
     float
-        In the unit of costs, 0 or more; infinite if there are more tuples than ``max_tuples`` without gates.
+        In the unit of costs; -infinite if there are more tuples than ``max_tuples`` without gates.
     """
     try:
         everything = build_problem(scene, scan, **{**gating, "gate_probability": 1.0})
     except LimitExceededError:
-        return math.inf
+        return -math.inf
     limit = _SECONDS if time_limit is None else time_limit
-    return max(0.0, cost - assign(everything, "exact", time_limit=limit, advise=False).lower_bound)
+    return assign(everything, "exact", time_limit=limit, advise=False).lower_bound

@@ -14,10 +14,11 @@ from assoc._system.compile_time import compile_seconds
 from assoc._system.processes import ordered_map
 from assoc._text.near import did_you_mean
 from assoc.association.association import Association
-from assoc.association.gate_loss import gate_loss
+from assoc.association.gate_loss import bound_without_gates
 from assoc.association.scan import ScanAssociation
 from assoc.association.source import Source
 from assoc.costs import build_problem, positions_and_covariances
+from assoc.costs.range_rates import SPEED
 from assoc.errors import InvalidInputError
 from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
@@ -110,11 +111,13 @@ class Plan:
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
         solutions, history = self._solve(problem, seed, scan.index)
-        best = self._best([_of_scan(scene, scan, problem, one) for one in solutions], history, compiled)
-        if not self.gate_loss:
-            return best
-        loss = gate_loss(scene, scan, best.solution.cost, self.gating, self.time_limit)
-        return replace(best, gate_loss=loss, compile_time=compile_seconds() - compiled)
+        # a position at another time than the measurements' depends on how fast targets usually fly
+        speed = self.gating.get("speed", SPEED)
+        scans = [_of_scan(scene, scan, problem, one, speed) for one in solutions]
+        if self.gate_loss:
+            bound = bound_without_gates(scene, scan, self.gating, self.time_limit)
+            scans = [replace(one, gate_loss=max(0.0, one.solution.cost - bound)) for one in scans]
+        return self._best(scans, history, compiled)
 
     def problem(self, item: tuple[int, int]) -> AssignmentProblem:
         """The assignment problem of scan ``item[1]`` of source ``item[0]``."""
@@ -139,9 +142,7 @@ class Plan:
         watch = self.watch
         return None if watch is None else lambda point: watch(scan, point) and None
 
-    def _best(
-        self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float
-    ) -> ScanAssociation:
+    def _best(self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float) -> ScanAssociation:
         """Return the first of ranked associations, which carries all of them where they were asked for."""
         scans = [replace(one, pheromone=history, compile_time=compile_seconds() - compiled) for one in scans]
         return scans[0] if self.kbest is None else replace(scans[0], ranked=tuple(scans))
@@ -183,9 +184,11 @@ def _of_problem(problem: AssignmentProblem, solution: Solution) -> ScanAssociati
     return ScanAssociation(0, None, sizes, solution, targets, costs=costs)
 
 
-def _of_scan(scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution) -> ScanAssociation:
+def _of_scan(
+    scene: Scene, scan: Scan, problem: AssignmentProblem, solution: Solution, speed: float | Sequence[float]
+) -> ScanAssociation:
     targets, costs = _targets(problem, solution)
-    positions, covariances = positions_and_covariances(scene, scan, targets)
+    positions, covariances = positions_and_covariances(scene, scan, targets, speed=speed)
     truth = scan.true_tuples()
     correct = None if truth is None else len({*map(tuple, truth.tolist())} & {*map(tuple, targets.tolist())})
     return ScanAssociation(

@@ -104,6 +104,11 @@ def plot_gates(
     Returns
     -------
     Axes
+
+    Raises
+    ------
+    InvalidInputError
+        Measurements of the scene have times of their own: their gates are those of predicted motion.
     """
     from scipy.special import gammainc
 
@@ -127,6 +132,10 @@ def plot_gates(
 def _squares(scene: Scene, one: ScanAssociation) -> tuple[Array, Array]:
     """Normalised squared residuals of the targets, and their degrees of freedom (0 left out)."""
     scan = scan_of(scene, one)
+    if scan.times is not None:
+        raise InvalidInputError(
+            f"scene: scan {scan.index} has measurements with times of their own, whose gates are of predicted motion"
+        )
     total, freedom = np.zeros(len(one.targets)), np.zeros(len(one.targets))
     heights = np.zeros(len(one.targets), dtype=np.bool_)
     for s, sensor in enumerate(scene.sensors):

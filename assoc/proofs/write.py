@@ -132,12 +132,27 @@ def _proved(
         stages.append([whole[first:last].tolist() for first, last in zip(offsets[:-1], offsets[1:], strict=True)])
         u = {row: check.number(repr(value)) for row, value in zip(exact.rows, whole.tolist(), strict=True)}
         bound = check.bounded(columns, exact.needed, u, {})
-        if bound is None or cost - bound <= max(CLOSED * max(abs(cost), _ONE), exact.unit - 1):
+        if bound is None or cost - bound <= max(max(abs(cost), _ONE) // round(1.0 / CLOSED), exact.unit - 1):
             return stages, []
         left = check.cheap(columns, u, cost - bound)
         if len(stages) == _STAGES or len(left) == len(columns):
             break
         columns = left
         packing = packing_of(columns, exact, alone, prepared.packing.granularity)
-    own = {tuple((s, i) for s, i in enumerate(one) if i): exact.costs[one] for one in chosen}
-    return stages, trees_of(Parts(packing, duals, alone, exact.rows, exact.unit / _ONE), own, aim)
+    return stages, trees_of(
+        Parts(packing, duals, alone, exact.rows, exact.unit / _ONE), _of_columns(exact, chosen), aim
+    )
+
+
+def _of_columns(exact: check.Problem, chosen: list[tuple[int, ...]]) -> dict[tuple[check.Row, ...], int]:
+    """What a solution's columns cost; a tuple that is none, as it costs no less, stands for its false alarms.
+
+    Its measurements may be in several components.
+    """
+    cost_of = {own: cost for cost, own in exact.columns}
+    columns: dict[tuple[check.Row, ...], int] = {}
+    for one in chosen:
+        own = tuple((s, i) for s, i in enumerate(one) if i)
+        for part in [own] if own in cost_of else [(row,) for row in own]:
+            columns[part] = cost_of[part]
+    return columns

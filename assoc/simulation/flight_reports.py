@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,8 @@ SPEED_UNITS = {"m/s": (1.0, 1.0), "kt": (1852.0 / 3600.0, 0.3048 / 60.0)}
 
 HIGH = 18_000.0
 """Metres that aircraft seldom fly at: where a tenth of all reports lies above, feet were taken for metres."""
+
+_MISSING = ["", "nan", "NaN", "-nan", "-NaN", "NA", "<NA>", "#N/A", "N/A", "n/a", "null", "NULL", "None"]
 
 _LIMITS = {"latitude": 90.0, "longitude": 360.0, "altitude": 1e6, "time": 1e12}
 
@@ -93,7 +96,8 @@ def read_flight_reports(
     columns = {"time": _times(path, chosen["time"], table[chosen["time"]])}
     for meaning in ("latitude", "longitude", "altitude"):
         columns[meaning] = _numbers(path, chosen[meaning], table[chosen[meaning]])
-    known_id = table[chosen["id"]].notna().to_numpy()
+    identity = table[chosen["id"]]
+    known_id = (identity.notna() & (identity.astype(str).str.strip() != "")).to_numpy()
     placed = ~np.isnan(np.stack([columns[meaning] for meaning in ("time", "latitude", "longitude")])).any(axis=0)
     high = ~np.isnan(columns["altitude"])
     known = known_id & placed & high
@@ -108,7 +112,7 @@ def read_flight_reports(
                 f"expected at most {limit:g} in size, got {columns[meaning][row]:g}"
             )
     # known ones alone: beside a missing one pandas cuts texts to their first letter
-    ids, target = np.unique(table[chosen["id"]][known].astype(str).to_numpy(dtype=str), return_inverse=True)
+    ids, target = np.unique(identity[known].astype(str).to_numpy(dtype=str), return_inverse=True)
     time, lat, lon, height = (columns[meaning][known] for meaning in ("time", "latitude", "longitude", "altitude"))
     height = height * ALTITUDE_UNITS[altitude_unit]
     if len(height) >= 10 and float(np.quantile(height, 0.9)) > HIGH:
@@ -157,8 +161,17 @@ def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, di
             chosen = choose_columns(path, [str(name) for name in table.columns], named)
         else:
             chosen = choose_columns(path, list(pd.read_csv(path, nrows=0).columns), named)
-            kinds: Any = {chosen[meaning]: str for meaning in ("id", "name") if meaning in chosen}
-            table = pd.read_csv(path, usecols=list(chosen.values()), dtype=kinds, low_memory=False)
+            # nan and null are numbers that are missing, but names as good as others
+            texts: Any = {chosen[meaning]: str for meaning in ("id", "name") if meaning in chosen}
+            missing = {column: [""] if column in texts else _MISSING for column in chosen.values()}
+            table = pd.read_csv(
+                path,
+                usecols=list(chosen.values()),
+                dtype=texts,
+                low_memory=False,
+                keep_default_na=False,
+                na_values=missing,
+            )
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except InvalidInputError:
@@ -212,8 +225,13 @@ def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Arra
 
 
 def _place(path: str, row: int, column: str) -> str:
-    number = f"row {row}" if Path(path).suffix.lower() in (".parquet", ".pq") else f"line {row + 2}"
-    return f"{path}: {number}, column {column!r}"
+    if Path(path).suffix.lower() in (".parquet", ".pq"):
+        return f"{path}: row {row}, column {column!r}"
+    with open(path, "rb") as file:
+        # lines without anything are no rows
+        filled = (number for number, line in enumerate(file, start=1) if line.strip())
+        line = next(islice(filled, row + 1, None), row + 2)
+    return f"{path}: line {line}, column {column!r}"
 
 
 def _numbers(path: str, column: str, text: pd.Series) -> Array:

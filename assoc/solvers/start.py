@@ -30,7 +30,9 @@ def start_columns(problem: AssignmentProblem, prepared: Prepared, start: object)
         raise InvalidInputError("start: names measurements that the problem does not have")
     for s, size in enumerate(problem.sizes.tolist()):
         used = np.bincount(tuples[:, s], minlength=size + 1)[1:]
-        wrong = np.flatnonzero(used != 1) if problem.dummy else np.flatnonzero(used > 1)
+        # without dummies only the measurements of the smallest sensors must be used
+        needed = problem.dummy or size == problem.sizes.min()
+        wrong = np.flatnonzero(used != 1) if needed else np.flatnonzero(used > 1)
         if wrong.size:
             count = used[wrong[0]]
             raise InvalidInputError(

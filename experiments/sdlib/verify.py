@@ -84,7 +84,9 @@ def read_solution(path: str) -> tuple[list[tuple[int, ...]], Fraction | None]:
     claim = None
     chosen = []
     for line in lines[1:]:
-        if line[0] == "cost" and len(line) == 2:
+        if line[0] == "cost":
+            if claim is not None or len(line) != 2:
+                raise ValueError("expected at most one line 'cost C'")
             claim = number(line[1])
         else:
             chosen.append(tuple(index(word) for word in line))

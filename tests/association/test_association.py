@@ -11,6 +11,7 @@ import assoc
 from assoc.association import Association, associate
 from assoc.association.plan import Plan
 from assoc.association.table import to_csv
+from assoc.costs import positions_and_covariances
 from assoc.scene import Scene, Truth
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
@@ -35,9 +36,7 @@ def by_hand():
     second = [[102, 98, 101], [900, 10, 700]]
     third = [[101, 101, 99], [503, 499, 502], [10, 900, 10]]
     sources = [[np.array([9, 4]), np.array([4, -1]), np.array([4, 9, 2])]]
-    truth = Truth(
-        [np.array([2, 4, 9])], [np.array([[10, 900, 10], [100, 100, 100], [500, 500, 500]])], sources
-    )
+    truth = Truth([np.array([2, 4, 9])], [np.array([[10, 900, 10], [100, 100, 100], [500, 500, 500]])], sources)
     sensors = [sensor(1.0), sensor(2.0), sensor(2.0)]
     return Scene(sensors, [7.0], [[np.array(first), np.array(second), np.array(third)]], REGION, truth)
 
@@ -52,9 +51,7 @@ def test_by_hand(by_hand, solver):
     assert scan.false_alarms == 2
     assert (scan.correct_tuples, scan.true_tuples) == (2, 2)
     # of direct measurements the maximum-likelihood position is the mean weighted by inverse variances
-    np.testing.assert_allclose(
-        scan.positions[0], np.average([[500] * 3, [503, 499, 502]], 0, [4, 1]), atol=1e-6
-    )
+    np.testing.assert_allclose(scan.positions[0], np.average([[500] * 3, [503, 499, 502]], 0, [4, 1]), atol=1e-6)
     wanted = np.average([[100] * 3, [102, 98, 101], [101, 101, 99]], 0, [4, 1, 1])
     np.testing.assert_allclose(scan.positions[1], wanted, atol=1e-6)
     np.testing.assert_allclose(scan.covariances[0], np.eye(3) / 1.25, atol=1e-9)
@@ -77,9 +74,7 @@ def test_true_tuples(by_hand):
     totals = associate(scene, "greedy").totals()
     assert totals["true_tuples"] is None and totals["share_correct"] is None
     # one sensor with two measurements of target 4: it has no tuple
-    twice = Truth(
-        [np.array([4])], [np.zeros((1, 3))], [[np.array([4, 4]), np.array([4, -1]), np.full(3, -1)]]
-    )
+    twice = Truth([np.array([4])], [np.zeros((1, 3))], [[np.array([4, 4]), np.array([4, -1]), np.full(3, -1)]])
     scene = Scene(by_hand.sensors, by_hand.times, by_hand.measurements, REGION, twice)
     assert scene.scan(0).true_tuples().tolist() == []
 
@@ -201,3 +196,14 @@ def test_a_file_name_is_no_formula_in_a_spreadsheet(by_hand, name):
     row = to_csv(scans, [name] * len(scans)).splitlines()[1]
     assert row.split(",")[0] == "'" + name
     assert to_csv(scans, ["a=b.npz"] * len(scans)).splitlines()[1].startswith("a=b.npz,")
+
+
+def test_positions_at_another_time_follow_the_speed():
+    """Where measurements have times of their own: as `positions_and_covariances` with that speed has them."""
+    scene = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
+    for speed in (100.0, 400.0):
+        (one,) = associate(scene, gating={"speed": speed}).scans[1:]
+        expected = positions_and_covariances(scene, 1, one.targets, speed=speed)
+        assert len(one.targets) > 2
+        np.testing.assert_allclose(one.positions, expected[0])
+        np.testing.assert_allclose(one.covariances, expected[1])

@@ -3,6 +3,7 @@ import math
 import pytest
 
 from assoc.association import associate
+from assoc.association.plan import Plan
 from assoc.costs import build_problem
 from assoc.simulation import simulate
 from assoc.solvers.assign import assign
@@ -24,9 +25,7 @@ def test_loss_is_the_distance_to_the_optimum_without_gates(probability):
 
 def test_narrow_gates_cost_more():
     scene = simulate("crowd", 3, targets=15, scans=4)
-    loss = [
-        associate(scene, gating={"gate_probability": one}, gate_loss=True).totals()["gate_loss"] for one in GATES
-    ]
+    loss = [associate(scene, gating={"gate_probability": one}, gate_loss=True).totals()["gate_loss"] for one in GATES]
     assert loss[0] > loss[1] > loss[2] >= 0.0
 
 
@@ -54,3 +53,13 @@ def test_bound_of_a_solver_that_is_not_exact_holds():
     for scan in associate(scene, "greedy", gate_loss=True).scans:
         free = assign(build_problem(scene, scan.scan, gate_probability=1.0), "milp")
         assert scan.gate_loss >= scan.solution.cost - free.cost - 1e-9
+
+
+def test_each_ranked_association_has_its_own_loss():
+    scene = simulate("crowd", 3, targets=8, scans=1)
+    plan = Plan((scene,), "exact", gating={"gate_probability": 0.9}, kbest=3, gate_loss=True)
+    best = plan((0, 0))
+    free = assign(build_problem(scene, 0, gate_probability=1.0), "milp").cost
+    assert best.gate_loss == best.ranked[0].gate_loss and len(best.ranked) == 3
+    for one in best.ranked:
+        assert one.gate_loss == pytest.approx(one.solution.cost - free, abs=1e-6)

@@ -154,6 +154,7 @@ GOOD = "assoc-problem 1\nsizes 1 2\ndummies yes\ntuples 4\n-3.5 1 1\n0.0 1 0\n0.
         (GOOD, "assoc-solution 1\n1 1\n0 1\n0 2\n", 1, "measurement 1 of sensor 2 is used twice"),
         (GOOD, "assoc-solution 1\n1 2\n0 1\n", 1, "is not in the instance"),
         (GOOD, "assoc-solution 1\ncost -3.6\n1 1\n0 2\n", 1, "it costs -3.5, not -3.6"),
+        (GOOD, "assoc-solution 1\ncost -3.6\ncost -3.5\n1 1\n0 2\n", 2, "expected at most one line 'cost C'"),
         (GOOD, "1 1\n0 2\n", 2, "the first line must be 'assoc-solution 1'"),
         (GOOD.replace("tuples 4", "tuples 5"), "", 2, "number of tuples"),
         (GOOD.replace("-3.5", "nan"), "", 2, "expected a decimal number"),

@@ -243,3 +243,11 @@ def test_scenes_on_the_earth_show_coordinates(tmp_path):
     # elsewhere there are none
     write_association_report(tmp_path / "b.html", association, replace(scene, origin=None))
     assert "degrees" not in data_of(tmp_path / "b.html")["scans"][0]["view"]
+
+
+def test_measurements_with_times_of_their_own_have_no_residuals(tmp_path):
+    """The target was elsewhere when they were made: what is between them and its position is no error."""
+    radars = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
+    write_association_report(tmp_path / "p.html", assoc.associate(radars), radars, ["s.npz"] * radars.num_scans)
+    views = [scan["view"] for scan in data_of(tmp_path / "p.html")["scans"]]
+    assert len(views) == radars.num_scans and all(view["residuals"] is None for view in views)

@@ -272,3 +272,9 @@ def test_every_name_is_there_and_matplotlib_is_asked_for(scene, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ImportError, match=r"python -m pip install 'assoc\[plot\]'"):
         plotting.plot_scene(scene)
+
+
+def test_gates_of_measurements_with_times_of_their_own_are_refused(ax):
+    scene = simulate("rotating-radars", 0, aircraft=5, duration=8.0, interval=4.0)
+    with pytest.raises(assoc.InvalidInputError, match="scan 0 has measurements with times of their own"):
+        plotting.plot_gates(scene, assoc.associate(scene), ax=ax)

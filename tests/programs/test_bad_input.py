@@ -10,6 +10,7 @@ import pytest
 
 import assoc
 from assoc.simulation import simulate
+from assoc.solve import main
 from tests.sizes import sample
 
 
@@ -96,9 +97,7 @@ def check(done, folder, message, before, code=2):
 
 def solve(run, folder, *words):
     before = {entry.name for entry in folder.iterdir()}
-    return run(
-        "assoc.solve", *words, "--solver", "greedy", "--json", "o.json", "--csv", "o.csv", cwd=folder
-    ), before
+    return run("assoc.solve", *words, "--solver", "greedy", "--json", "o.json", "--csv", "o.csv", cwd=folder), before
 
 
 @sample("case", [*SCENES], every=3)
@@ -202,3 +201,16 @@ def test_a_failure_leaves_an_older_result_as_it_was(run, tmp_path, scene_fields)
     done, _ = solve(run, tmp_path, "s.npz", "--max-tuples", 1)
     assert done.returncode == 3
     assert (tmp_path / "o.json").read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    "words", [["--gate-probability", "0.9"], ["--max-tuples", "99"], ["--target-density", "auto"], ["--gate-loss"]]
+)
+def test_options_of_scenes_are_refused_for_problems(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1]).save("p.npz")
+    simulate("three-radar", scans=1).save("s.npz")
+    assert main(["p.npz", *words]) == 2
+    assert f"{words[0]}: is of scenes, and a problem has its tuples already" in capsys.readouterr().err
+    # beside a scene they are of use
+    assert main(["p.npz", "s.npz", *words]) == 0

@@ -323,6 +323,42 @@ def test_costs_of_many_decimals(tmp_path):
         write_proof(tmp_path / "proof.json", problem, assoc.assign(problem))
 
 
+def test_chosen_tuples_that_cost_no_less_than_false_alarms(tmp_path):
+    """They are no columns, and their measurements may be in several components, each of which has a proof."""
+    pairs = np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
+    alone, tie = np.eye(6, dtype=int), [[1, 0, 0, 0, 0, 1]]
+    tuples = np.vstack([np.hstack([pairs, 0 * pairs]), np.hstack([0 * pairs, pairs]), alone, tie])
+    costs = np.array([7.0, 7.0, 7.5, 7.0, 7.0, 7.5, *[5.0] * 6, 10.0])
+    problem = assoc.AssignmentProblem(tuples, costs, [1] * 6)
+    # the same with a tie that is worth its while
+    costs[-1] = 9.9
+    solution = assoc.assign(assoc.AssignmentProblem(tuples, costs, [1] * 6))
+    assert tie[0] in solution.tuples.tolist()
+    assert write_proof(tmp_path / "proof.json", problem, solution) == 24.0 == assoc.assign(problem).cost
+
+
+def test_costs_above_the_digits_of_sixty_and_no_measurements(tmp_path):
+    for cost in (-1e62, -1e100, -3e299):
+        problem = assoc.AssignmentProblem([[1, 1, 0], [0, 1, 1], [1, 0, 1]], [cost, cost, -2.5], [1, 1, 1])
+        assert write_proof(tmp_path / "proof.json", problem, assoc.assign(problem)) == pytest.approx(cost)
+        problem.save(tmp_path / "problem.txt")
+        assert run_alone(tmp_path, "problem.txt", "proof.json").returncode == 0
+    for dummy in (True, False):
+        empty = assoc.AssignmentProblem(np.zeros((0, 2), int), [], [0, 0], dummy=dummy)
+        assert write_proof(tmp_path / "proof.json", empty, assoc.assign(empty)) == 0.0
+        empty.save(tmp_path / "problem.txt")
+        done = run_alone(tmp_path, "problem.txt", "proof.json")
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_second_claim_of_cost_is_refused(tmp_path):
+    odd_cycle().save(tmp_path / "problem.txt")
+    for claims in ("cost -3\ncost -9\n", "cost -9\ncost -3\n", "cost -3 -9\n", "cost\n"):
+        (tmp_path / "solution.txt").write_text(f"assoc-solution 1\n{claims}1 1 0\n0 0 1\n")
+        done = run_alone(tmp_path, "problem.txt", "solution.txt")
+        assert done.returncode == 2 and "expected" in done.stderr, claims
+
+
 def test_bad_arguments(tmp_path):
     problem = odd_cycle()
     other = assoc.assign(random_problem(np.random.default_rng(1)))

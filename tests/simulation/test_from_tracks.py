@@ -10,6 +10,7 @@ import pytest
 from assoc.errors import InvalidInputError, LimitExceededError
 from assoc.scene.geodesy import earth_centered, east_north_up
 from assoc.simulation import simulate
+from assoc.simulation.flight_reports import read_flight_reports
 
 A, B = 6378137.0, 6356752.314245
 """WGS-84 semi-axes, metres."""
@@ -41,9 +42,7 @@ def test_plane_agrees_with_the_radii_of_curvature():
     east = east_north_up(np.array([lat]), np.array([lon + step]), np.array([0.0]), origin)[0]
     np.testing.assert_allclose(north, [0, meridian * step, -meridian * step**2 / 2], atol=0.05)
     across = prime * math.cos(lat) * step
-    np.testing.assert_allclose(
-        east, [across, across * step * math.sin(lat) / 2, -(across**2) / prime / 2], atol=0.05
-    )
+    np.testing.assert_allclose(east, [across, across * step * math.sin(lat) / 2, -(across**2) / prime / 2], atol=0.05)
     up = east_north_up(np.array([lat]), np.array([lon]), np.array([9000.0]), origin)[0]
     np.testing.assert_allclose(up, [0, 0, 9000], atol=1e-6)
 
@@ -126,6 +125,7 @@ def test_columns_by_name(tmp_path):
         (b"time,id,lat,lon,altitude\n0,a,here,3,4\n", "line 2, column 'lat': expected a number, got 'here'"),
         (b"time,id,lat,lon,altitude\n0,a,inf,3,4\n", "line 2, column 'lat': expected a number"),
         (b"time,id,lat,lon,altitude\n0,a,3,3,4\n0,b,99,3,4\n", "line 3, column 'lat': expected at most 90"),
+        (b"\ntime,id,lat,lon,altitude\n\n0,a,3,3,4\n \n0,b,x,3,4\n", "line 6, column 'lat': expected a number"),
         (b"time,id,lat,lon\n0,a,3,3\n", "no column altitude or geoaltitude or baroaltitude"),
     ],
 )
@@ -165,3 +165,11 @@ def test_speeds_in_knots(tmp_path):
     assert any(np.abs(a - b).max(initial=0.0) > 1.0 for a, b in pairs)
     with pytest.raises(InvalidInputError, match="speed_unit: expected 'm/s' or 'kt'"):
         simulate("from-tracks", 1, file=str(tmp_path / "kt.csv"), speed_unit="mph")
+
+
+def test_any_text_but_none_is_an_identity(tmp_path):
+    rows = [f"{t},{name},47.{t},8,3000" for name in ("nan", "null", "NA", "", " ", "a") for t in (0, 10)]
+    (tmp_path / "t.csv").write_text("\n".join(["time,id,lat,lon,altitude", *rows]))
+    reports = read_flight_reports(str(tmp_path / "t.csv"), {})
+    assert sorted(reports.names.values()) == ["NA", "a", "nan", "null"]
+    assert reports.notes["rows left out, without identity"] == 4

@@ -98,3 +98,11 @@ def test_parameters_are_checked():
     for workers in (0, 1.5, True):
         with pytest.raises(InvalidInputError, match="workers: expected"):
             assign(problem, "milp", workers=workers)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("seconds", [1e10, 1e14, 1e300, float("inf")])
+def test_a_limit_of_ages_is_none(backend, seconds):
+    """Clocks of the libraries end before that, each elsewhere."""
+    problem, optimum = planted(4, seed=100, targets=4)
+    assert assign(problem, "milp", backend=backend, time_limit=seconds).cost == pytest.approx(optimum, abs=1e-6)

@@ -106,3 +106,10 @@ def test_what_is_no_solution_is_refused(problem, axial):
     keep = ~(problem.tuples == pair).all(axis=1)
     fewer = assoc.AssignmentProblem(problem.tuples[keep], problem.costs[keep], problem.sizes)
     refused(best, rf"start: the tuple \({', '.join(map(str, pair))}\) is no candidate of this problem", fewer)
+    # without dummies the smallest sensors' measurements must be used, and only they
+    some = assoc.assign(axial)
+    refused(replace(some, tuples=some.tuples[1:]), "every measurement exactly once; .* is in 0 tuples", axial)
+    wide = assoc.AssignmentProblem.from_dense(np.random.default_rng(1).normal(size=(3, 4, 5)), dummy=False)
+    best = assoc.assign(wide)
+    assert assoc.assign(wide, "tabu", start=best).cost == pytest.approx(best.cost)
+    refused(replace(best, tuples=best.tuples[1:]), "every measurement exactly once; .* is in 0 tuples", wide)

@@ -129,7 +129,10 @@ def scan_view(source: Source, number_of_source: int, one: ScanAssociation) -> di
 
 
 def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, Any]:
-    """Return what is drawn of a scan: truth, measurements, targets with residuals and covariances."""
+    """Return what is drawn of a scan: truth, measurements, targets with residuals and covariances.
+
+    Measurements that have times of their own have no residuals: the target was elsewhere when they were made.
+    """
     scan = scene.scan(one.scan)
     positions = np.zeros((0, 3)) if one.positions is None else one.positions
     spreads = np.zeros((0, 3, 3)) if one.covariances is None else one.covariances
@@ -163,7 +166,7 @@ def scene_view(scene: Scene, one: ScanAssociation, decimals: int) -> dict[str, A
         "positions": plain_numbers(positions, decimals),
         "sigmas": plain_numbers(sigmas, 1),
         "ellipses": _significant(spreads[:, [0, 0, 1], [0, 1, 1]]),
-        "residuals": residuals,
+        "residuals": residuals if scan.times is None else None,
     }
 
 

@@ -39,13 +39,13 @@ const drawScene = () => {
 };
 
 // One heading a sensor, under it the residuals of its measurement.
-const residualTable = (rows) => {
+const residualTable = (rows, caption) => {
   const body = [];
   for (const [name, component, shown, sigmas] of rows) {
     if (name !== '') body.push(element('tr', [element('th', shown === '' ? `${name}: ${component}` : name, { colspan: '3', scope: 'rowgroup' })]));
     if (shown !== '') body.push(element('tr', [element('td', component), ...[shown, sigmas].map((cell) => element('td', cell, { class: 'number' }))]));
   }
-  return element('table', [element('caption', 'Residuals, measured less expected'), element('tbody', body)]);
+  return element('table', [element('caption', caption), element('tbody', body)]);
 };
 
 const drawDetail = () => {
@@ -63,7 +63,8 @@ const drawDetail = () => {
     const place = scan.view.positions[target];
     const sigma = scan.view.sigmas[target];
     lines.push(simpleTable(['', 'position', '\u03c3'], ['x', 'y', 'z'].map((axis, i) => [axis, metres(place[i]), `${short(sigma[i], 3)} m`])));
-    lines.push(residualTable(residualRows(source, scan, target)));
+    const caption = scan.view.residuals ? 'Residuals, measured less expected' : 'Measurements of different times: no residuals';
+    lines.push(residualTable(residualRows(source, scan, target), caption));
   } else {
     lines.push(simpleTable(['sensor', 'measurement'], scan.tuples[target].map((index, s) => [source.sensors[s].name, index || 'missed'])));
   }

@@ -25,7 +25,7 @@ const residualRows = (source, scan, target) => {
   scan.tuples[target].forEach((index, s) => {
     const sensor = source.sensors[s];
     if (index === 0) { rows.push([sensor.name, 'missed', '', '']); return; }
-    if (!scan.view) { rows.push([sensor.name, `no. ${index}`, '', '']); return; }
+    if (!scan.view?.residuals) { rows.push([sensor.name, `no. ${index}`, '', '']); return; }
     let before = 0;
     for (let t = 0; t < target; t += 1) if (scan.tuples[t][s] !== 0) before += 1;
     scan.view.residuals[s][before].forEach((value, c) => {
