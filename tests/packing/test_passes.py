@@ -7,6 +7,8 @@ from assoc.costs import build_problem
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
+from assoc.problem import AssignmentProblem
+from assoc.solvers.assign import assign
 from experiments.common.instances.scenes import ghost
 from experiments.common.instances.synthetic import axial_random
 
@@ -62,3 +64,24 @@ def test_passes_over_whole_numbers_end_at_the_optimum_itself():
             nodes += search.nodes
         assert set(found) == {found[0]}
     assert nodes > 100
+
+
+def test_a_gap_of_few_roundings_is_closed():
+    """A share of it is no step: the next aim is the old one, and the same pass would be made again for ever."""
+    tuples = [
+        [2, 1, 2, 2, 1], [1, 2, 1, 2, 2], [2, 2, 2, 2, 1], [1, 2, 2, 2, 1], [2, 1, 1, 2, 2], [2, 1, 1, 1, 1],
+        [2, 1, 1, 2, 1], [2, 1, 2, 1, 1], [1, 1, 2, 2, 1], [1, 1, 2, 1, 2], [1, 1, 2, 1, 1],
+    ]  # fmt: skip
+    costs = [
+        534717956.5867999, -78.21682207598427, -5.159143142792697e-12, 1.5074410662039698e-07, -2176348.4286549557,
+        0.00021004083834822964, -4.708665738726913e-10, 15277910879.285505, -6.606517070637708e-11, -3378.50670718536,
+        -4.4795837356531726e-09,
+    ]  # fmt: skip
+    # as it stands in a tensor: the order of columns decides what rounding leaves
+    problem = AssignmentProblem.from_dense(
+        AssignmentProblem(tuples, costs, [2] * 5, dummy=False).to_dense(), dummy=False
+    )
+    solution = assign(problem, "exact", nodes=2000)
+    assert solution.stopped_by == "converged" and solution.iterations < 1000
+    # the second and the eighth are the only two that use everything
+    assert solution.cost == pytest.approx(costs[1] + costs[7], rel=1e-15)

@@ -235,5 +235,6 @@ class BranchAndBound:
         root = self._root_bound
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
-        # without an incumbent there is nothing to go by
-        self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf
+        # without an incumbent there is nothing to go by; where the gap is rounding, a share of it may be no step at all
+        farther = max(root, self._floor) < aim < root + _LAST * gap
+        self._aim = aim if 0.0 < gap < np.inf and farther else np.inf
