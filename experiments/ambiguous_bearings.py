@@ -72,8 +72,8 @@ def _ratio(part: Any, whole: Any) -> tuple[float, tuple[float, float]]:
     share = part.sum() / whole.sum()
     # of a ratio of sums: the spread of what each scene has above the common ratio
     off = (part - share * whole) / whole.mean()
-    half = 1.96 * off.std(ddof=1) / len(off) ** 0.5
-    return 100.0 * share, (100.0 * (share - half), 100.0 * (share + half))
+    low, high = mean_interval(off)
+    return 100.0 * share, (100.0 * (share + low), 100.0 * (share + high))
 
 
 def draw(figure: Any, shown: Any) -> None:

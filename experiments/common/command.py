@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from assoc._files.output import write_atomically
 from assoc._types import Array
@@ -141,8 +142,8 @@ def save_figure(path: Path, draw: Draw, shown: Any, size: tuple[float, float]) -
 
 
 def mean_interval(values: Array) -> tuple[float, float]:
-    """95 % interval of a mean over independent runs (n,)."""
-    half = 1.96 * float(np.std(values, ddof=1)) / len(values) ** 0.5
+    """95 % interval of a mean over independent runs (n,), by Student's t: runs are often few."""
+    half = float(stdtrit(len(values) - 1, 0.975) * np.std(values, ddof=1)) / len(values) ** 0.5
     middle = float(np.mean(values))
     return middle - half, middle + half
 

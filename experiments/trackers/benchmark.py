@@ -23,7 +23,7 @@ from assoc._types import Array
 from assoc.metrics import gospa
 from assoc.tracking import JointProbabilisticTracker, NearestNeighbourTracker, TrackOrientedMHT
 from experiments.common.claims import Claim
-from experiments.common.command import make_parser, run
+from experiments.common.command import make_parser, mean_interval, run
 from experiments.trackers import labelled
 from experiments.trackers.judging import GOAL
 from experiments.trackers.plane import DETECTION, Plane, simulate
@@ -120,10 +120,7 @@ def _paired(ours: list[Result], peer: list[Result]) -> tuple[float, tuple[float,
     """Ratio of the median times, difference of the mean GOSPA with its interval over seeds, and scans compared."""
     mine = [Result(a.seconds[: len(b.seconds)], a.gospa[: len(b.gospa)]) for a, b in zip(ours, peer, strict=True)]
     differences = np.array([a.gospa.mean() - b.gospa.mean() for a, b in zip(mine, peer, strict=True)])
-    interval = None
-    if len(differences) > 1:
-        half = 1.96 * float(differences.std(ddof=1)) / len(differences) ** 0.5
-        interval = (float(differences.mean()) - half, float(differences.mean()) + half)
+    interval = mean_interval(differences) if len(differences) > 1 else None
     scans = sum(len(one.seconds) for one in peer)
     return _median(peer) / _median(mine), (float(differences.mean()), interval), scans
 

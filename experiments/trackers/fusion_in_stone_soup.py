@@ -242,10 +242,8 @@ def draw(figure: Any, shown: Any) -> None:
     left.legend(fontsize=8, loc="lower left")
     times = INTERVAL * np.arange(SCANS)
     for way, mine, style in zip(WAYS, gospas, ("o-", "s-", "x--"), strict=True):
-        middle = mine.mean(axis=0)
-        half = 1.96 * mine.std(axis=0, ddof=1) / len(mine) ** 0.5
-        right.plot(times, middle, style, markersize=4, label=way.name)
-        right.fill_between(times, middle - half, middle + half, alpha=0.2)
+        right.plot(times, mine.mean(axis=0), style, markersize=4, label=way.name)
+        right.fill_between(times, *np.transpose([mean_interval(scan) for scan in mine.T]), alpha=0.2)
     right.set(xlabel="time (s)", ylabel="GOSPA (m)", ylim=(0, None), title=f"mean of {gospas.shape[1]} scenes, 95 %")
     right.legend(fontsize=8)
 

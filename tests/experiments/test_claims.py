@@ -6,11 +6,13 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy import stats
 
 from experiments.common import claims
 from experiments.common.claims import Claim
-from experiments.common.command import replaced
+from experiments.common.command import mean_interval, replaced, rmse_interval
 
 SAMPLE = [
     Claim("mean cycles", "", 4.03, 4.9, (4.8, 5.0), (3.5, 5.5)),
@@ -83,3 +85,14 @@ def test_rows_of_a_partial_run_replace_those_of_the_file() -> None:
     assert [c.quantity for c in found] == ["mean cycles", "time of a scan", "p99 of a scan", "no accepted band"]
     assert found[1] is newer[0] and found[0] is SAMPLE[0] and len(SAMPLE) == 3
     assert replaced([], newer) == newer
+
+
+@pytest.mark.parametrize("runs", [2, 3, 10])
+def test_intervals_of_few_runs_cover_as_often_as_they_say(runs):
+    """Of 4,000 means of normal values 95 % lie inside, to three standard deviations of such a count."""
+    values = np.random.default_rng(0).normal(7.0, 2.0, (4000, runs))
+    inside = [low <= 7.0 <= high for low, high in map(mean_interval, values)]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.0104)
+    one = values[0]
+    assert mean_interval(one) == pytest.approx(stats.t.interval(0.95, runs - 1, one.mean(), stats.sem(one)))
+    assert rmse_interval(one[None] ** 2)[1] ** 2 == pytest.approx(mean_interval(one**2)[1])

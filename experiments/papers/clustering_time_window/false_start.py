@@ -21,6 +21,7 @@ from assoc.simulation import simulate_recording
 from assoc.simulation.antenna import bearings_in_steps, in_steps
 from assoc.simulation.scenarios.rotating_radar import BEARING_STEP
 from experiments.common.claims import Claim
+from experiments.common.command import mean_interval
 from experiments.papers.clustering_time_window.hypotheses import HypothesisTracker
 from experiments.papers.clustering_time_window.judging import Taken, run
 from experiments.papers.clustering_time_window.traffic import MISSES, ROTATION, nearest
@@ -152,5 +153,5 @@ def beginning(recording: Recording, taken: Taken) -> tuple[float, float, float]:
 
 
 def _interval(values: Array) -> tuple[float, float]:
-    half = 1.96 * float(values.std(ddof=1)) / len(values) ** 0.5 if len(values) > 1 else 0.0
-    return float(values.mean()) - half, float(values.mean()) + half
+    middle = float(values.mean())
+    return mean_interval(values) if len(values) > 1 else (middle, middle)

@@ -173,8 +173,15 @@ FAULTS = (
     Fault(
         "branch and bound makes no passes",
         _BRANCHING,
-        "self._aim = aim if 0.0 < gap < np.inf and aim < root + _LAST * gap else np.inf",
+        "self._aim = aim if 0.0 < gap < np.inf and farther else np.inf",
         "self._aim = np.inf",
+        _OF_PASSES,
+    ),
+    Fault(
+        "the aim of a pass may be that of the last one",
+        _BRANCHING,
+        "farther = max(root, self._floor) < aim < root + _LAST * gap",
+        "farther = aim < root + _LAST * gap",
         _OF_PASSES,
     ),
     Fault(
