@@ -9,6 +9,7 @@ from experiments.common.results import Results, number, table
 from experiments.metaheuristics import parts, sweep
 from experiments.metaheuristics.ablation import WORKERS
 from experiments.metaheuristics.against_peers import BESIDE, CORES, Entry
+from experiments.metaheuristics.problems import PROBLEMS
 
 
 def _cell(claim: Claim) -> str:
@@ -21,9 +22,10 @@ def _cell(claim: Claim) -> str:
 
 
 def _groups(results: Results, words: str) -> list[str]:
-    """Problems with their budgets, in the order of the file, for which a variant was measured."""
-    found = [claim.quantity.split(": ")[0] for claim in results.claims if f", {words}, " in claim.quantity]
-    return list(dict.fromkeys(found))
+    """Problems with their budgets for which a variant was measured, in the order in which they are defined."""
+    found = {claim.quantity.split(": ")[0] for claim in results.claims if f", {words}, " in claim.quantity}
+    names = list(PROBLEMS)
+    return sorted(found, key=lambda group: (names.index(group.split(", ")[0]), group))
 
 
 def _of_solver(solver: str) -> Callable[[], str]:
