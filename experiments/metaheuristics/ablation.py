@@ -20,6 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+import assoc
 from assoc._types import Floats
 from assoc.sweeps.bootstrap import mean_interval
 from experiments.common.claims import Claim, load_json, print_table, save_json
@@ -57,13 +58,12 @@ def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]
 
 def _warm_up(name: str, number: int, chosen: Sequence[parts.Part]) -> None:
     """Compile what all parts call, on a problem that is not measured."""
+    assoc.warm_up({solver for part in chosen for solver in part.solvers})
     one = problem(name, number)
     for part in chosen:
         for solver in part.solvers:
             with part.without():
-                # what is compiled is in processor time, too: a second time with all of it
-                for _ in range(2 if part.words == parts.WHOLE else 1):
-                    run(one, solver, 1.5 if part.words == parts.WHOLE else 0.3, 0, **part.parameters)
+                run(one, solver, 0.3, 0, **part.parameters)
 
 
 def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -> list[Claim]:
@@ -125,9 +125,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     if chosen.count < 2 or not 0.0 < chosen.seconds < 1e5:
         parser.error("expected --count of at least 2 and --seconds above 0")
     taken = (parts.PARTS[0], parts.TWO_WORKERS) if chosen.workers else parts.PARTS
-    taken = tuple(
-        part._replace(solvers=tuple(one for one in part.solvers if one in chosen.solvers)) for part in taken
-    )
+    taken = tuple(part._replace(solvers=tuple(one for one in part.solvers if one in chosen.solvers)) for part in taken)
     claims: list[Claim] = []
     for name in chosen.problems:
         _warm_up(name, chosen.count, taken)

@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+import assoc
 from assoc._files.output import write_text
 from assoc.problem import AssignmentProblem
 from assoc.sweeps.bootstrap import mean_interval
@@ -176,7 +177,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
         parser.error("expected --count of at least 2")
     answers = Answers(chosen.answers)
     entries = [entry for entry in ENTRIES if entry.who in chosen.only]
-    _warm_up(chosen.problems[0], entries)
+    _warm_up(entries)
     claims: list[Claim] = []
     for name in chosen.problems:
         numbers = range(FIRST, FIRST + chosen.count)
@@ -196,12 +197,10 @@ def program(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _warm_up(name: str, entries: Sequence[Entry]) -> None:
-    """Compile the kernels and load the packages on a problem that is not measured."""
+def _warm_up(entries: Sequence[Entry]) -> None:
+    """Compile the kernels and load the packages."""
     peers.warm_up(sorted({entry.who for entry in entries if not entry.ours}))
-    for solver in sorted({entry.who for entry in entries if entry.ours}):
-        for _ in range(2):
-            run(problem(name, FIRST - 1), solver, 1.5, 0)
+    assoc.warm_up(sorted({entry.who for entry in entries if entry.ours}))
 
 
 if __name__ == "__main__":

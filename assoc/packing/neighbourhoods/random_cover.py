@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from assoc._system.clock import now
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Prices
 from assoc.packing.kernels.columns import first_row, fits
@@ -48,6 +48,15 @@ class Trail(NamedTuple):
     def without_pheromone(cls, prices: Prices, strictness: float, temperature: float) -> Trail:
         """Return the trail that only reduced costs draw."""
         return cls(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
+
+
+@inner_njit
+def _first_fitting(packing: PackingArrays, owner: Any, r: int) -> int:
+    """The first column of a row that fits; -1: none does."""
+    for k in range(packing.row_ptr[r], packing.row_ptr[r + 1]):
+        if fits(packing.cols, owner, packing.row_cols[k]):
+            return int(packing.row_cols[k])
+    return -1
 
 
 @njit
@@ -102,7 +111,8 @@ def walk(
             total = stay[r]
             for k in range(row_ptr[r], row_ptr[r + 1]):
                 j = row_cols[k]
-                if fits(cols, owner, j):
+                # most have none, and that is quicker to see
+                if value[j] > 0.0 and fits(cols, owner, j):
                     total += value[j]
             draw = rng.random() * total - stay[r]
             if draw < 0.0:
@@ -110,12 +120,13 @@ def walk(
             chosen = -1
             for k in range(row_ptr[r], row_ptr[r + 1]):
                 j = row_cols[k]
-                if fits(cols, owner, j):
+                if value[j] > 0.0 and fits(cols, owner, j):
                     draw -= value[j]
-                    if value[j] > 0.0 or chosen < 0:
-                        chosen = j
+                    chosen = j
                     if draw < 0.0:
                         break
+            if chosen < 0:
+                chosen = _first_fitting(packing, owner, r)
             if chosen >= 0:
                 for s in range(num_sensors):
                     if cols[chosen, s] >= 0:

@@ -36,6 +36,8 @@ class Basis(NamedTuple):
     ----------
     variable : int32 array, shape (m,)
         What is in each place: column j as j, the slack of row r as n + r, the anchor of row r as n + m + r.
+    free : bool array, shape (m,)
+        Whether what is in each place may be above 0 (dual.py: `note_free`).
     place, slack_place : int32 arrays, shapes (n,) and (m,)
         Where each column and each slack is, -1: not in the basis.
     inverse : float array, shape (m, m)
@@ -57,6 +59,7 @@ class Basis(NamedTuple):
     """
 
     variable: NDArray[np.int32]
+    free: NDArray[np.bool_]
     place: NDArray[np.int32]
     slack_place: NDArray[np.int32]
     inverse: NDArray[np.float64]
@@ -80,7 +83,8 @@ def basis_without(program: Program, columns: int) -> Basis:
     """Room for a basis of whose inverse there are so many columns alone."""
     num, size = program.weights.size, program.sides.size
     return Basis(
-        np.zeros(size, np.int32), np.full(num, -1, np.int32), np.full(size, -1, np.int32), np.zeros((columns, size)),
+        np.zeros(size, np.int32), np.zeros(size, np.bool_), np.full(num, -1, np.int32), np.full(size, -1, np.int32),
+        np.zeros((columns, size)),
         np.empty(size), np.empty(size), np.empty(size), np.zeros(size),
         np.empty(size), np.empty(size), np.empty(size), new_pricing(program), np.zeros(1, np.int64),
     )  # fmt: skip
@@ -181,6 +185,7 @@ def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
     elif old < num + size:
         basis.slack_place[old - num] = -1
     basis.variable[p] = variable
+    basis.free[p] = True
     if variable < num:
         basis.place[variable] = p
     elif variable < num + size:

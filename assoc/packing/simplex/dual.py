@@ -30,7 +30,7 @@ from assoc.packing.simplex.basis import (
     refactor,
     residual,
 )
-from assoc.packing.simplex.pricing import list_columns, price, sum_rows
+from assoc.packing.simplex.pricing import Pricing, list_columns, price, sum_rows
 from assoc.packing.simplex.program import Allowed, Program, make_feasible
 
 # how a search ends: at the optimum, at the cutoff, without any solution, or before
@@ -84,23 +84,25 @@ def bound_of(program: Program, basis: Basis) -> float:
 
 
 @inner_njit
-def leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
-    """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
+def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
+    """Note which places have a variable that may be above 0: columns and slacks that are allowed."""
     num, size = program.weights.size, program.sides.size
-    values, variable, norms, columns, slack = basis.values, basis.variable, basis.norms, allowed.columns, allowed.slack
+    variable, columns, slack = basis.variable, allowed.columns, allowed.slack
+    for i in range(size):
+        code = variable[i]
+        basis.free[i] = columns[code] if code < num else code < num + size and slack[code - num]
+
+
+@inner_njit
+def leaving(basis: Basis) -> int:
+    """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
+    values, norms, free = basis.values, basis.norms, basis.free
     best = -1.0
     place = -1
-    for i in range(size):
+    for i in range(values.size):
         value = values[i]
-        if -_VALUE <= value <= _VALUE:
+        if value >= -_VALUE and (free[i] or value <= _VALUE):
             continue
-        if value > 0.0:
-            code = variable[i]
-            if code < num:
-                if columns[code]:
-                    continue
-            elif code < num + size and slack[code - num]:
-                continue
         score = value * value / norms[i]
         # whatever rounding made of the norms, what is outside its limits must be found
         if not score <= best:
@@ -110,45 +112,62 @@ def leaving(program: Program, allowed: Allowed, basis: Basis) -> int:
 
 
 @inner_njit
+def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
+    """Fill ``entries`` with the row of the tableau and ``reduced`` with what slacks cost; how many there are."""
+    row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
+    entries, reduced, count = pricing.entries, pricing.reduced, pricing.listed[0]
+    sum_rows(row, sign, pricing, entries)
+    for r in range(row.size):
+        entries[count + r] = sign * row[r]
+        reduced[count + r] = -duals[r] if slack[r] and in_basis[r] < 0 else np.inf
+    return int(count + row.size)
+
+
+@inner_njit
+def _least_ratio(pricing: Pricing, count: int, tolerance: float) -> float:
+    """How far the multipliers can move until the first reduced cost is below 0 by the tolerance."""
+    entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
+    # all of them, with nothing to decide: processors do several divisions at a time
+    for a in range(count):
+        room = reduced[a] + tolerance
+        room = 0.0 if room < 0.0 else room
+        ratios[a] = room / entries[a] if entries[a] > _ENTRY else np.inf
+    # four at a time, as each comparison waits for the one before; what is no number is no ratio
+    first, second, third, fourth = np.inf, np.inf, np.inf, np.inf
+    whole = count - count % 4
+    for a in range(0, whole, 4):
+        first = ratios[a] if ratios[a] < first else first
+        second = ratios[a + 1] if ratios[a + 1] < second else second
+        third = ratios[a + 2] if ratios[a + 2] < third else third
+        fourth = ratios[a + 3] if ratios[a + 3] < fourth else fourth
+    for a in range(whole, count):
+        first = ratios[a] if ratios[a] < first else first
+    return min(min(first, second), min(third, fourth))
+
+
+@inner_njit
 def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
     """The variable that first limits the step of the multipliers, and the step; -1: none does.
 
-    Fills ``entries`` with the row of the tableau, of the listed columns.
+    Fills ``entries`` with the row of the tableau, of the listed columns and the slacks.
     """
-    row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
-    entries, reduced, count = pricing.entries, pricing.reduced, pricing.listed[0]
-    entries[:count] = 0.0
-    sum_rows(row, pricing, entries)
-    least = np.inf
-    for a in range(count):
-        value = sign * entries[a]
-        entries[a] = value
-        if value > _ENTRY and reduced[a] + tolerance < least * value:
-            least = max(reduced[a] + tolerance, 0.0) / value
-    for r in range(row.size):
-        value = sign * row[r]
-        if value > _ENTRY and slack[r] and in_basis[r] < 0:
-            least = min(least, max(tolerance - duals[r], 0.0) / value)
-    chosen = -1
+    pricing = basis.pricing
+    entries, reduced, listed = pricing.entries, pricing.reduced, pricing.listed[0]
+    count = _fill_entries(allowed, basis, sign)
+    least = _least_ratio(pricing, count, tolerance)
     if least == np.inf:
-        return chosen, 0.0
+        return -1, 0.0
+    place = -1
     largest = _ENTRY
-    step = 0.0
     for a in range(count):
-        value = entries[a]
-        if value > largest and reduced[a] <= least * value:
-            largest = value
-            chosen = a
-    if chosen >= 0:
-        step = max(reduced[chosen], 0.0) / largest
-        chosen = pricing.column[chosen]
-    for r in range(row.size):
-        value = sign * row[r]
-        if value > largest and slack[r] and in_basis[r] < 0 and -duals[r] <= least * value:
-            largest = value
-            chosen = program.weights.size + r
-            step = max(-duals[r], 0.0) / value
-    return chosen, step
+        # few pass the first test, so that processors foresee it; a product may be too large for a number
+        if reduced[a] <= least * entries[a] and entries[a] > largest and reduced[a] < np.inf:
+            largest = entries[a]
+            place = a
+    if place < 0:
+        return -1, 0.0
+    step = max(reduced[place], 0.0) / largest
+    return (pricing.column[place] if place < listed else program.weights.size + place - listed), step
 
 
 @inner_njit
@@ -192,7 +211,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
         bound = bound_of(program, basis)
         if bound >= effort.cutoff:
             return CUT, done
-        p = leaving(program, allowed, basis)
+        p = leaving(basis)
         if p < 0:
             if age[0] > 0 and not residual(program, basis) <= _RESIDUAL:
                 stale = True
@@ -228,7 +247,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
 
 @inner_njit
 def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
-    """Compute the reduced costs; where the multipliers are not feasible, begin from others."""
+    """Compute what depends on what is allowed; where the multipliers are not feasible, begin from others."""
     least = price(program, basis.duals, basis.place, basis.pricing)
     for r in range(basis.duals.size):
         if allowed.slack[r]:
@@ -238,3 +257,4 @@ def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float
         make_feasible(program, allowed, duals)
         begin_from_duals(program, allowed, duals, basis)
         price(program, basis.duals, basis.place, basis.pricing)
+    note_free(program, allowed, basis)

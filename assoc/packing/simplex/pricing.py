@@ -2,7 +2,7 @@
 
 Whatever the simplex method asks of all columns, the sum of something over the rows of each, is then a few sums of whole
 arrays, which processors do several at a time. Columns in the basis, and those that a trial leaves out, have the reduced
-cost ``inf``: no ratio test chooses them, and nothing has to ask.
+cost ``inf``: no ratio test chooses them, and nothing has to ask. Slacks follow the columns where a ratio test looks.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Floats
-from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.program import Allowed, Program
 
 
 class Pricing(NamedTuple):
-    """Room for ``n`` columns, of which ``listed[0]`` are listed.
+    """Room for ``n`` columns, of which ``listed[0]`` are listed, and after these for the ``m`` slacks.
 
     Attributes
     ----------
@@ -28,13 +27,13 @@ class Pricing(NamedTuple):
     position : int32 array, shape (n,)
         The position of each column that is listed; of others anything.
     codes : uint32 array, shape (width, n)
-        Rows of the columns, by position; the number of rows, m, where a column has fewer.
+        Rows of the columns, by position; the number of rows, m, where a column has fewer. At least three of them.
     extra_position, extra_row : uint32 arrays
         Further rows: those of cuts; ``listed[1]`` of them.
-    reduced : float array, shape (n,)
+    reduced : float array, shape (n + m,)
         Reduced costs by position; ``inf``: not to be chosen.
-    entries : float array, shape (n,)
-        A row of the tableau, by position.
+    entries, ratios : float arrays, shape (n + m,)
+        A row of the tableau, by position, and how far the multipliers can move before each reduced cost is 0.
     terms : float array, shape (m + 1,)
         Room for what is summed up, row by row; the last is 0.
     listed : int64 array, shape (2,)
@@ -48,6 +47,7 @@ class Pricing(NamedTuple):
     extra_row: NDArray[np.uint32]
     reduced: Floats
     entries: Floats
+    ratios: Floats
     terms: Floats
     listed: NDArray[np.int64]
 
@@ -57,9 +57,9 @@ def new_pricing(program: Program) -> Pricing:
     num, size = program.weights.size, program.sides.size
     extra = int(np.maximum(np.diff(program.start) - program.width, 0).sum())
     return Pricing(
-        np.empty(num, np.int32), np.empty(num, np.int32), np.empty((program.width, num), np.uint32),
-        np.empty(extra, np.uint32), np.empty(extra, np.uint32), np.empty(num), np.empty(num),
-        np.zeros(size + 1), np.zeros(2, np.int64),
+        np.empty(num, np.int32), np.empty(num, np.int32), np.empty((max(program.width, 3), num), np.uint32),
+        np.empty(extra, np.uint32), np.empty(extra, np.uint32),
+        np.empty(num + size), np.empty(num + size), np.empty(num + size), np.zeros(size + 1), np.zeros(2, np.int64),
     )  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def new_pricing(program: Program) -> Pricing:
 def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
     """List the allowed columns."""
     codes, columns, positions = pricing.codes, pricing.column, pricing.position
-    active, start, rows, width = allowed.active, program.start, program.rows, program.width
+    active, start, rows, width = allowed.active, program.start, program.rows, codes.shape[0]
     extra_position, extra_row, none = pricing.extra_position, pricing.extra_row, np.uint32(program.sides.size)
     extra = 0
     for a in range(active.size):
@@ -92,11 +92,15 @@ def list_columns(program: Program, allowed: Allowed, pricing: Pricing) -> None:
 
 
 @inner_njit
-def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
-    """Add to ``sums``, by position, the terms of the rows of each column."""
-    copy_to(pricing.terms[: terms.size], terms)
+def sum_rows(terms: Floats, factor: float, pricing: Pricing, sums: Floats) -> None:
+    """Fill ``sums``, by position, with the terms of the rows of each column, times a factor."""
     padded, codes, count = pricing.terms, pricing.codes, pricing.listed[0]
-    for s in range(codes.shape[0]):
+    for r in range(terms.size):
+        padded[r] = factor * terms[r]
+    # most columns have three rows or fewer: one pass
+    for a in range(count):
+        sums[a] = padded[codes[0, a]] + padded[codes[1, a]] + padded[codes[2, a]]
+    for s in range(3, codes.shape[0]):
         for a in range(count):
             sums[a] += padded[codes[s, a]]
     position, row = pricing.extra_position, pricing.extra_row
@@ -108,8 +112,7 @@ def sum_rows(terms: Floats, pricing: Pricing, sums: Floats) -> None:
 def price(program: Program, duals: Floats, place: NDArray[np.int32], pricing: Pricing) -> float:
     """Compute the reduced costs of the listed columns; the least of those that are not in the basis."""
     reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]
-    reduced[:count] = 0.0
-    sum_rows(duals, pricing, reduced)
+    sum_rows(duals, 1.0, pricing, reduced)
     least = 0.0
     for a in range(count):
         j = column[a]

@@ -32,6 +32,7 @@ from assoc.packing.simplex.dual import (
     cost_tolerance,
     entering,
     leaving,
+    note_free,
     step_along,
 )
 from assoc.packing.simplex.pricing import list_columns, price
@@ -148,9 +149,8 @@ def _exchange(trial: Trial, done: int, p: int) -> None:
     for i in range(column.size):
         ratio = column[i] / pivot
         etas[done, i] = -ratio
-        if ratio != 0.0:
-            values[i] -= step * column[i]
-            norms[i] = max(norms[i], ratio * ratio * own)
+        values[i] -= step * column[i]
+        norms[i] = max(norms[i], ratio * ratio * own)
     etas[done, p] = 1.0 / pivot
     trial.pivots[done] = p
     values[p] = step
@@ -166,6 +166,7 @@ def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effo
     """
     basis, num = trial.basis, program.weights.size
     copy_without_inverse(base, basis)
+    note_free(program, allowed, basis)
     pricing, columns, at_first = basis.pricing, allowed.columns, trial.reduced
     reduced, column = pricing.reduced, pricing.column
     for a in range(pricing.listed[0]):
@@ -176,7 +177,7 @@ def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effo
         bound = bound_of(program, basis)
         if bound >= effort.cutoff:
             return CUT
-        p = leaving(program, allowed, basis)
+        p = leaving(basis)
         if p < 0:
             return OPTIMAL
         if done >= min(effort.exchanges, trial.pivots.size):

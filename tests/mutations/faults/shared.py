@@ -159,8 +159,8 @@ FAULTS = (
     Fault(
         "columns are priced by the rows of one sensor less",
         _PRICING,
-        "for s in range(codes.shape[0]):",
-        "for s in range(codes.shape[0] - 1):",
+        "padded[codes[0, a]] + padded[codes[1, a]] + padded[codes[2, a]]",
+        "padded[codes[0, a]] + padded[codes[1, a]]",
         _OF_TRIALS,
     ),
     Fault(
