@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Floats
+from assoc.packing.branching.kept_bases import KeptBases, keep_basis, kept_memory, no_kept_bases, take_kept
 from assoc.packing.branching.open_nodes import Stack, push_node, take_node
 from assoc.packing.branching.pairs import Trials, answer, new_trials
 from assoc.packing.kernels.copying import copy_to
@@ -44,6 +45,8 @@ class Work(NamedTuple):
     node : Allowed
         What it allows; ``active`` is room.
     trials : Trials
+    kept : KeptBases
+        Of the latest branchings.
     duals : float array, shape (rows of the program,)
         Multipliers of the node's bound, feasible.
     key : float array, shape (N,)
@@ -60,6 +63,7 @@ class Work(NamedTuple):
     basis: Basis
     node: Allowed
     trials: Trials
+    kept: KeptBases
     duals: Floats
     key: Floats
     found: NDArray[np.int32]
@@ -68,9 +72,9 @@ class Work(NamedTuple):
 
 
 def work_memory(rows: float, columns: int) -> float:
-    """Bytes that `new_work` takes: an inverse by columns and by rows, and what is known of pairs."""
+    """Bytes that `new_work` takes: an inverse by columns and by rows, those kept, and what is known of pairs."""
     # of a column: two lists for pricing, masks, and its rows, of up to eight sensors
-    return 34.0 * rows * rows + 200.0 * columns
+    return 34.0 * rows * rows + kept_memory(rows) + 200.0 * columns
 
 
 def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
@@ -78,7 +82,7 @@ def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
     num_rows = packing.slack.size
     return Work(
         packing.cols, packing.weights, program, new_basis(program), all_allowed(program, slack),
-        new_trials(program, num_rows), np.empty(slack.size), np.empty(program.weights.size),
+        new_trials(program, num_rows), no_kept_bases(program), np.empty(slack.size), np.empty(program.weights.size),
         np.empty(num_rows, np.int32), np.empty(num_rows, np.int32), weight_limit(program),
     )  # fmt: skip
 
@@ -123,7 +127,8 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
         copy_to(basis.variable, stack.variable[top])
         copy_to(basis.duals, stack.duals[top])
         copy_to(basis.anchors, stack.duals[top])
-        refactor(work.program, allowed_at(work, num), basis)
+        if not take_kept(work.kept, work.program, basis):
+            refactor(work.program, allowed_at(work, num), basis)
     return num
 
 
@@ -152,6 +157,7 @@ def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
 def branch(work: Work, stack: Stack, top: int, num: int, pair: Any, likely: bool, lower: float) -> int:
     """Put both sides of the node at work on the stack, the likelier one last: searched first; the open nodes."""
     side = work.trials.side
+    keep_basis(work.kept, work.basis)
     for turn in range(2):
         # the likelier side: together or apart
         joined = likely if turn == 1 else not likely

@@ -35,7 +35,7 @@ class SearchParameters(Parameters):
     refinement: str = field(
         default="full", metadata={"help": "what improves covers: none, local search, or full (exact sub-steps, too)"}
     )
-    clusters: int = field(default=10, metadata={"help": "exact sub-steps on each new cover (refinement full)"})
+    clusters: int = field(default=5, metadata={"help": "exact sub-steps on each new cover (refinement full)"})
     workers: int = field(default=1, metadata={"help": "searches at a time, on threads, that exchange their best"})
 
     def __post_init__(self) -> None:

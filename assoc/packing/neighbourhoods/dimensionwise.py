@@ -169,15 +169,16 @@ def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> 
     """Which half on a side column j has in full: -1 none at all, -2 only some rows or several halves."""
     found = -1
     members = 0
+    one = True
+    # one way out: with several, numba counts references to the arrays at each call, which takes longer than all of it
     for s in range(cols.shape[1]):
         q = cols[j, s]
         if q >= 0 and (mask >> s) & 1 == side:
-            if found >= 0 and half[q] != found:
-                return -2
+            one = one and (found < 0 or half[q] == found)
             found = half[q]
             members += 1
-    if found >= 0 and members != size[found]:
-        return -2
+    if not one or (found >= 0 and members != size[found]):
+        found = -2
     return found
 
 

@@ -149,12 +149,12 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
     for r in range(size):
         f = row[r]
         if f != 0.0:
+            change = f / pivot
             for i in range(size):
-                sums[i] += f * inverse[r, i]
-            f /= pivot
-            for i in range(size):
-                inverse[r, i] -= f * column[i]
-            inverse[r, p] = f
+                entry = inverse[r, i]
+                sums[i] += f * entry
+                inverse[r, i] = entry - change * column[i]
+            inverse[r, p] = change
     own = norms[p]
     step = values[p] / pivot
     for i in range(size):

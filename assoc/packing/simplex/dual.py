@@ -20,6 +20,7 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc.packing.kernels.copying import copy_to
+from assoc.packing.kernels.extremes import place_of_largest, smallest
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
     Basis,
@@ -96,19 +97,15 @@ def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
 @inner_njit
 def leaving(basis: Basis) -> int:
     """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
-    values, norms, free = basis.values, basis.norms, basis.free
-    best = -1.0
-    place = -1
+    values, norms, free, scores = basis.values, basis.norms, basis.free, basis.sums
     for i in range(values.size):
         value = values[i]
-        if value >= -_VALUE and (free[i] or value <= _VALUE):
-            continue
+        inside = value >= -_VALUE and (free[i] or value <= _VALUE)
         score = value * value / norms[i]
         # whatever rounding made of the norms, what is outside its limits must be found
-        if not score <= best:
-            best = score
-            place = i
-    return place
+        score = score if score > 0.0 else np.inf
+        scores[i] = 0.0 if inside else score
+    return int(place_of_largest(scores, values.size))
 
 
 @inner_njit
@@ -124,25 +121,24 @@ def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
 
 
 @inner_njit
-def _least_ratio(pricing: Pricing, count: int, tolerance: float) -> float:
-    """How far the multipliers can move until the first reduced cost is below 0 by the tolerance."""
+def _fill_ratios(pricing: Pricing, count: int, tolerance: float) -> None:
+    """Fill ``ratios`` with how far the multipliers can move until each reduced cost is below 0 by the tolerance."""
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
-    # all of them, with nothing to decide: processors do several divisions at a time
     for a in range(count):
         room = reduced[a] + tolerance
-        room = 0.0 if room < 0.0 else room
-        ratios[a] = room / entries[a] if entries[a] > _ENTRY else np.inf
-    # four at a time, as each comparison waits for the one before; what is no number is no ratio
-    first, second, third, fourth = np.inf, np.inf, np.inf, np.inf
-    whole = count - count % 4
-    for a in range(0, whole, 4):
-        first = ratios[a] if ratios[a] < first else first
-        second = ratios[a + 1] if ratios[a + 1] < second else second
-        third = ratios[a + 2] if ratios[a + 2] < third else third
-        fourth = ratios[a + 3] if ratios[a + 3] < fourth else fourth
-    for a in range(whole, count):
-        first = ratios[a] if ratios[a] < first else first
-    return min(min(first, second), min(third, fourth))
+        ratio = (room if room > 0.0 else 0.0) / entries[a]
+        # what is no number is no ratio
+        ratios[a] = ratio if entries[a] > _ENTRY and ratio >= 0.0 else np.inf
+
+
+@inner_njit
+def _fill_pivots(pricing: Pricing, count: int, least: float) -> None:
+    """Fill ``ratios`` with the entries of those whose reduced costs reach 0 by then, and 0 for all others."""
+    entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
+    for a in range(count):
+        # a product may be too large for a number
+        passed = reduced[a] <= least * entries[a] and reduced[a] < np.inf and entries[a] > _ENTRY
+        ratios[a] = entries[a] if passed else 0.0
 
 
 @inner_njit
@@ -152,22 +148,18 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     Fills ``entries`` with the row of the tableau, of the listed columns and the slacks.
     """
     pricing = basis.pricing
-    entries, reduced, listed = pricing.entries, pricing.reduced, pricing.listed[0]
+    listed = pricing.listed[0]
     count = _fill_entries(allowed, basis, sign)
-    least = _least_ratio(pricing, count, tolerance)
-    if least == np.inf:
-        return -1, 0.0
-    place = -1
-    largest = _ENTRY
-    for a in range(count):
-        # few pass the first test, so that processors foresee it; a product may be too large for a number
-        if reduced[a] <= least * entries[a] and entries[a] > largest and reduced[a] < np.inf:
-            largest = entries[a]
-            place = a
-    if place < 0:
-        return -1, 0.0
-    step = max(reduced[place], 0.0) / largest
-    return (pricing.column[place] if place < listed else program.weights.size + place - listed), step
+    _fill_ratios(pricing, count, tolerance)
+    least = smallest(pricing.ratios, count)
+    chosen, step = -1, 0.0
+    if least < np.inf:
+        _fill_pivots(pricing, count, least)
+        place = place_of_largest(pricing.ratios, count)
+        if place >= 0:
+            step = max(pricing.reduced[place], 0.0) / pricing.entries[place]
+            chosen = pricing.column[place] if place < listed else program.weights.size + place - listed
+    return chosen, step
 
 
 @inner_njit

@@ -39,7 +39,7 @@ class AcoParameters(SearchParameters):
 
     mode: str = field(default="mmas", metadata={"help": "mmas (strong) or paper (equations 7-11)"})
     ants: int = field(default=15, metadata={"help": "ants in a cycle"})
-    divers: int = field(default=1, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
+    divers: int = field(default=2, metadata={"help": "mode mmas: ants in a cycle that dive in the linear program"})
     alpha: float = field(default=2.0, metadata={"help": "exponent of the pheromone, eq. 8"})
     beta: float = field(default=1.0, metadata={"help": "exponent of the visibility, eq. 8"})
     rho: float = field(default=0.3, metadata={"help": "share of pheromone that stays after a cycle, eq. 9"})

@@ -16,6 +16,10 @@ _PRICING = "assoc/packing/simplex/pricing.py"
 _TRIAL = "assoc/packing/simplex/trial.py"
 _BRANCHING = "assoc/packing/branching/search.py"
 _OF_TRIALS = "tests/packing/test_trial.py"
+_KEPT = "assoc/packing/branching/kept_bases.py"
+_OF_KEPT = "tests/packing/test_kept_bases.py"
+_EXTREMES = "assoc/packing/kernels/extremes.py"
+_OF_EXTREMES = "tests/packing/test_extremes.py"
 _OF_PASSES = "tests/packing/test_passes.py"
 _COUNTS = "assoc/packing/branching/counts.py"
 _OF_COUNTS = "tests/packing/test_counts_small.py"
@@ -155,6 +159,28 @@ FAULTS = (
         "duals[r] += sign * step * row[r]",
         "duals[r] -= sign * step * row[r]",
         _OF_DIVES,
+    ),
+    Fault(
+        "a kept basis has the values of other right-hand sides",
+        _KEPT,
+        "basis.values[i] += program.sides[r] * entry",
+        "basis.values[i] += entry",
+        _OF_KEPT,
+    ),
+    Fault(
+        "a basis that was taken back is kept on",
+        _KEPT,
+        "kept.latest[0] = (place + count - 1) % count",
+        "pass",
+        _OF_KEPT,
+    ),
+    Fault("the basis of a branching is not kept", _KEPT, "place = (kept.latest[0] + 1) % count", "return", _OF_KEPT),
+    Fault("any kept basis will do", _KEPT, "        if i == size:\n", "        if i >= 0:\n", _OF_KEPT),
+    Fault(
+        "the last of the largest is taken", _EXTREMES, "place = min(place, a if", "place = max(-1, a if", _OF_EXTREMES
+    ),
+    Fault(
+        "the smallest of the first is missed", _EXTREMES, "least = min(least, bits[a])", "least = bits[a]", _OF_EXTREMES
     ),
     Fault(
         "columns are priced by the rows of one sensor less",

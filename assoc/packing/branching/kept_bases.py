@@ -1,0 +1,108 @@
+"""The bases of the latest branchings, so that their other sides do not have to compute them anew.
+
+Depth first, the other side of a branching is taken up when all below the first one is done. To compute the inverse of
+its basis anew takes as long as dozens of exchanges, to copy it as long as one. Which basis a place holds is told by its
+variables, as all else follows from them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._system.compiled import inner_njit
+from assoc._types import Floats
+from assoc.packing.kernels.copying import copy_to
+from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.program import Program
+
+# bases at the most, and elements of their inverses together
+_BASES, _ELEMENTS = 8, 4_000_000
+
+
+class KeptBases(NamedTuple):
+    """``K`` bases of ``m`` rows at the most, the oldest of which makes room for a new one.
+
+    Attributes
+    ----------
+    variable : int32 array, shape (K, m)
+        As of a `Basis`; -1 where there is none.
+    inverse : float array, shape (K, m, m)
+    norms : float array, shape (K, m)
+    age : int64 array, shape (K,)
+    latest : int64 array, shape (1,)
+        The place of the latest one.
+    """
+
+    variable: NDArray[np.int32]
+    inverse: Floats
+    norms: Floats
+    age: NDArray[np.int64]
+    latest: NDArray[np.int64]
+
+
+def kept_memory(rows: float) -> float:
+    """Bytes that the inverses take."""
+    return 8.0 * min(_BASES * rows * rows, _ELEMENTS)
+
+
+def no_kept_bases(program: Program) -> KeptBases:
+    """Room for bases of a program, fewer where they are large."""
+    size = program.sides.size
+    count = min(_BASES, _ELEMENTS // max(size * size, 1))
+    return KeptBases(
+        np.full((count, size), -1, np.int32), np.empty((count, size, size)), np.empty((count, size)),
+        np.zeros(count, np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip
+
+
+@inner_njit
+def keep_basis(kept: KeptBases, basis: Basis) -> None:
+    """Keep a copy of a basis."""
+    count = kept.age.size
+    if count > 0:
+        place = (kept.latest[0] + 1) % count
+        kept.latest[0] = place
+        copy_to(kept.variable[place], basis.variable)
+        for r in range(basis.values.size):
+            copy_to(kept.inverse[place, r], basis.inverse[r])
+        copy_to(kept.norms[place], basis.norms)
+        kept.age[place] = basis.age[0]
+
+
+@inner_njit
+def take_kept(kept: KeptBases, program: Program, basis: Basis) -> bool:
+    """Make ``basis`` the kept one of its variables, but for its multipliers; False: there is none."""
+    count, num, size = kept.age.size, program.weights.size, program.sides.size
+    place = -1
+    for back in range(count):
+        candidate = (kept.latest[0] + count - back) % count
+        i = 0
+        while i < size and kept.variable[candidate, i] == basis.variable[i]:
+            i += 1
+        if i == size:
+            place = candidate
+            break
+    if place >= 0:
+        # what was kept after it belongs to nodes that are done
+        kept.latest[0] = (place + count - 1) % count
+        # right-hand sides may be others by now (counts.py)
+        basis.values[:] = 0.0
+        for r in range(size):
+            for i in range(size):
+                entry = kept.inverse[place, r, i]
+                basis.inverse[r, i] = entry
+                basis.values[i] += program.sides[r] * entry
+        copy_to(basis.norms, kept.norms[place])
+        basis.age[0] = kept.age[place]
+        basis.place[:] = -1
+        basis.slack_place[:] = -1
+        for i in range(size):
+            code = basis.variable[i]
+            if code < num:
+                basis.place[code] = i
+            elif code < num + size:
+                basis.slack_place[code - num] = i
+    return place >= 0

@@ -1,0 +1,131 @@
+"""Bases kept for the other side of a branching, against inverses by numpy and searches that keep none."""
+
+import numpy as np
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import kept_bases, search
+from assoc.packing.branching.kept_bases import keep_basis, kept_memory, no_kept_bases, take_kept
+from assoc.packing.branching.node import branch, new_work, open_node, relax
+from assoc.packing.branching.open_nodes import OpenNodes
+from assoc.packing.branching.root import plain_root
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.prepare import prepare
+from assoc.packing.simplex.basis import new_basis
+from experiments.common.oracles import axial_problem
+from tests.packing.test_trial import packings, part, solved
+
+
+def inverse_of(program, basis):
+    """The transposed inverse of the columns, slacks and anchors in a basis."""
+    num, size = program.weights.size, program.sides.size
+    matrix = np.zeros((size, size))
+    for i, code in enumerate(basis.variable):
+        rows = program.rows[program.start[code] : program.start[code + 1]] if code < num else [(code - num) % size]
+        np.add.at(matrix[:, i], rows, 1.0)
+    return np.linalg.inv(matrix).T
+
+
+def assert_basis(program, basis):
+    inverse = inverse_of(program, basis)
+    np.testing.assert_allclose(basis.inverse, inverse, atol=1e-9)
+    np.testing.assert_allclose(basis.values, program.sides @ inverse, atol=1e-9)
+    np.testing.assert_allclose(basis.norms, (inverse**2).sum(axis=0), rtol=1e-6)
+    num = program.weights.size
+    for j in range(num):
+        assert basis.place[j] == (np.flatnonzero(basis.variable == j).tolist() or [-1])[0]
+    for r in range(program.sides.size):
+        assert basis.slack_place[r] == (np.flatnonzero(basis.variable == num + r).tolist() or [-1])[0]
+
+
+def test_what_is_taken_back_is_the_basis_that_was_kept():
+    for packing in packings(6, 21):
+        root = plain_root(packing, dual_bound(packing))
+        program = root.program
+        basis, _ = solved(packing, program)
+        kept = no_kept_bases(program)
+        keep_basis(kept, basis)
+        other = new_basis(program)
+        other.variable[:] = basis.variable
+        # with twice as much to cover the values are others, and all else is the same
+        for factor in (1.0, 2.0):
+            changed = program._replace(sides=factor * program.sides)
+            other.inverse[:] = other.norms[:] = other.values[:] = np.nan
+            kept.latest[0] = 1
+            assert take_kept(kept, changed, other)
+            assert_basis(changed, other)
+            assert other.age[0] == basis.age[0]
+
+
+def test_a_basis_that_was_not_kept_is_not_taken():
+    packing = next(packings(1, 22))
+    root = plain_root(packing, dual_bound(packing))
+    basis, _ = solved(packing, root.program)
+    kept = no_kept_bases(root.program)
+    before = basis.inverse.copy()
+    assert not take_kept(kept, root.program, basis)
+    keep_basis(kept, basis)
+    basis.variable[[0, 1]] = basis.variable[[1, 0]]
+    assert not take_kept(kept, root.program, basis)
+    np.testing.assert_array_equal(basis.inverse, before)
+
+
+def test_the_oldest_makes_room_and_what_came_later_is_done():
+    packing = next(packings(1, 23))
+    root = plain_root(packing, dual_bound(packing))
+    basis, _ = solved(packing, root.program)
+    kept = no_kept_bases(root.program)
+    count = kept.age.size
+    first = basis.variable.copy()
+    # the kept ones differ in the order of their variables
+    for turn in range(count + 1):
+        basis.variable[:] = np.roll(first, turn)
+        keep_basis(kept, basis)
+    basis.variable[:] = first
+    assert not take_kept(kept, root.program, basis)
+    basis.variable[:] = np.roll(first, 3)
+    assert take_kept(kept, root.program, basis)
+    # the next one takes its place, and not that of the oldest
+    basis.variable[:] = np.roll(first, -1)
+    keep_basis(kept, basis)
+    basis.variable[:] = np.roll(first, 1)
+    assert take_kept(kept, root.program, basis)
+
+
+def test_the_other_side_of_a_branching_starts_from_its_basis():
+    rng = np.random.default_rng(24)
+    for packing in packings(6, 25):
+        root = plain_root(packing, dual_bound(packing))
+        stack = OpenNodes(root).arrays
+        work = new_work(packing.arrays, root.program, root.slack)
+        num = open_node(work, stack, 0, -1)
+        relax(work, num, np.inf, np.inf)
+        at_first = work.basis.variable.copy()
+        one, two = packing.cols[0][packing.cols[0] >= 0][:2]
+        assert branch(work, stack, 0, num, (one, two), True, -np.inf) == 2
+        # below the first side the basis changes
+        side = part(root.program, work.node, rng, 0.5)
+        num = open_node(work, stack, 1, 1)
+        work.node.active[: side.active.size] = side.active
+        work.node.columns[:] = side.columns
+        relax(work, side.active.size, np.inf, np.inf)
+        open_node(work, stack, 0, -1)
+        np.testing.assert_array_equal(work.basis.variable, at_first)
+        assert_basis(root.program, work.basis)
+        np.testing.assert_array_equal(work.basis.duals, stack.duals[0])
+
+
+def test_large_bases_are_not_kept(monkeypatch):
+    """The search is the same, only slower; and memory is bounded."""
+    problem = axial_problem(np.random.default_rng(26), (9, 9, 9))
+    packing = prepare(problem).packing
+    weights = []
+    for elements in (kept_bases._ELEMENTS, 0):
+        monkeypatch.setattr(kept_bases, "_ELEMENTS", elements)
+        assert kept_memory(1e5) == 8.0 * elements
+        assert (no_kept_bases(plain_root(packing, dual_bound(packing)).program).age.size == 0) is (elements == 0)
+        found = BranchAndBound(packing, dual_bound(packing), np.inf, 1e-9)
+        found.run(100_000)
+        assert found.done and found.nodes > 3
+        weights.append(found.weight)
+    assert weights[0] == weights[1] or abs(weights[0] - weights[1]) < 1e-12
+    assert search.work_memory(100, 10) >= kept_memory(100)
