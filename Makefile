@@ -87,7 +87,7 @@ audit: $(VENV)/.installed-release
 	$(PY) -m pip freeze --exclude-editable > $(VENV)/frozen.txt
 	$(PY) -m pip_audit --strict --disable-pip --no-deps -r $(VENV)/frozen.txt
 
-bench: $(VENV)/.installed-test
+bench: $(VENV)/.installed-peers
 	$(PY) -m experiments.benchmarks
 
 bench-quick: $(VENV)/.installed-test
@@ -111,6 +111,10 @@ $(VENV)/.installed: $(VENV)/.created pyproject.toml
 
 $(VENV)/.installed-test: $(VENV)/.installed
 	$(PIP) -e ".[test]"
+	@touch $@
+
+$(VENV)/.installed-peers: $(VENV)/.installed
+	$(PIP) -e ".[test,peers]"
 	@touch $@
 
 $(VENV)/.installed-lint: $(VENV)/.installed

@@ -28,7 +28,7 @@ import numpy as np
 
 # elements of a call's arrays, all together, up to which it may be interpreted; and of kernels that search a tree,
 # whose work grows faster than their arrays
-SMALL, SMALL_SEARCH = 6000, 4000
+SMALL, SMALL_SEARCH = 6000, 4800
 # processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
 PATIENCE = 6.0
 # how far the process that compiles beside stands back

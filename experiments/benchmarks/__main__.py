@@ -85,6 +85,16 @@ def main(argv: list[str] | None = None) -> int:
     from experiments.benchmarks import markdown as reporting
     from experiments.benchmarks import readme
     from experiments.benchmarks import rows as storage
+    from experiments.common import peers
+
+    part = options.report_only or options.update or options.families or options.sizes or options.solvers
+    missing = [] if part or table != TABLE else peers.not_installed()
+    if missing:
+        # without them the tables would be fairer to us than they are
+        parser.error(
+            f"{TABLE} is of all other solvers; not installed: {', '.join(missing)} "
+            "(pip install -e '.[test,peers]', or write elsewhere with --csv)"
+        )
 
     def write(minutes: float | None) -> None:
         command = _command(options)

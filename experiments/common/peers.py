@@ -321,6 +321,12 @@ def warm_up(names: Iterable[str]) -> None:
             PEERS[name](problem, 1.0)
 
 
+def not_installed() -> list[str]:
+    """Packages of peers that are not installed (extra ``peers``)."""
+    packages = {"chszlablib": "chszlablib", "kap": "kap", "pytcl": "nrl-tracker"}
+    return [package for module, package in packages.items() if importlib.util.find_spec(module) is None]
+
+
 def available(name: str, problem: AssignmentProblem) -> bool:
     """Whether a peer is installed and can take this problem."""
     if name == "nrl_tracker":

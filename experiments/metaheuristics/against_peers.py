@@ -177,7 +177,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
         parser.error("expected --count of at least 2")
     answers = Answers(chosen.answers)
     entries = [entry for entry in ENTRIES if entry.who in chosen.only]
-    _warm_up(entries)
+    _warm_up(chosen.problems[0], entries)
     claims: list[Claim] = []
     for name in chosen.problems:
         numbers = range(FIRST, FIRST + chosen.count)
@@ -197,10 +197,13 @@ def program(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _warm_up(entries: Sequence[Entry]) -> None:
-    """Compile the kernels and load the packages."""
+def _warm_up(name: str, entries: Sequence[Entry]) -> None:
+    """Compile the kernels, load the packages, and learn how fast the machine is (running.py)."""
     peers.warm_up(sorted({entry.who for entry in entries if not entry.ours}))
-    assoc.warm_up(sorted({entry.who for entry in entries if entry.ours}))
+    solvers = sorted({entry.who for entry in entries if entry.ours})
+    assoc.warm_up(solvers)
+    for solver in solvers:
+        run(problem(name, FIRST - 1), solver, 0.3, 0)
 
 
 if __name__ == "__main__":

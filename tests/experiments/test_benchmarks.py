@@ -266,7 +266,9 @@ def test_cases_cover_the_families() -> None:
     assert {case.family for case in cases(quick=True)} == {case.family for case in full}
 
 
-def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_program_refuses_and_reports(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["--families", "gatd"])
     assert stop.value.code == 2
@@ -275,6 +277,11 @@ def test_program_refuses_and_reports(tmp_path: Path, capsys: pytest.CaptureFixtu
         main(["--processes", "0"])
     assert stop.value.code == 2
     assert "--processes: expected at least 1, got 0" in capsys.readouterr().err
+    monkeypatch.setattr(peers, "not_installed", lambda: ["kap"])
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
+    assert "docs/benchmarks.csv is of all other solvers; not installed: kap" in capsys.readouterr().err
     path = tmp_path / "b.csv"
     with pytest.raises(SystemExit):
         main(["--report-only", "--csv", str(path)])

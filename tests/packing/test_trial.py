@@ -70,8 +70,9 @@ def test_prices_are_weights_less_the_multipliers_of_the_rows():
             np.testing.assert_allclose(found[free], expected[free], atol=1e-12)
             assert np.isposinf(found[~free]).all() and least == min(0.0, found[free].min(initial=0.0))
             sums = np.zeros(program.weights.size)
-            sum_rows(duals, 1.0, pricing, sums)
-            np.testing.assert_allclose(sums[: allowed.active.size], (duals @ matrix)[allowed.active], atol=1e-12)
+            sum_rows(duals, -2.0, pricing, sums)
+            expected = -2.0 * (duals @ matrix)[allowed.active]
+            np.testing.assert_allclose(sums[: allowed.active.size], expected, atol=1e-12)
             np.testing.assert_array_equal(pricing.position[allowed.active], np.arange(allowed.active.size))
 
 

@@ -30,6 +30,7 @@ _FAMILIES = {
     "ISC": r"\bISC\b",
     "Zlib": r"(?i)\bzlib\b",
     "CC0": r"\bCC0",
+    "public domain": r"(?i)public[- ]domain",
 }
 _PURPOSES = {
     "base": "always",
@@ -41,6 +42,7 @@ _PURPOSES = {
     "parquet": "`assoc[parquet]`",
     "asterix": "`assoc[asterix]`",
     "bench": "`assoc[bench]`, comparisons",
+    "peers": "`assoc[peers]`, comparisons",
     "docs": "pages",
     "test": "tests",
     "lint": "checks",

@@ -2,7 +2,7 @@
 
 Depth first, the other side of a branching is taken up when all below the first one is done. To compute the inverse of
 its basis anew takes as long as dozens of exchanges, to copy it as long as one. Which basis a place holds is told by its
-variables, as all else follows from them.
+variables: the inverse follows from them.
 """
 
 from __future__ import annotations
@@ -73,8 +73,11 @@ def keep_basis(kept: KeptBases, basis: Basis) -> None:
 
 
 @inner_njit
-def take_kept(kept: KeptBases, program: Program, basis: Basis) -> bool:
-    """Make ``basis`` the kept one of its variables, but for its multipliers; False: there is none."""
+def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> bool:
+    """Make ``basis`` the kept one of its variables, but for multipliers and anchors; False: there is none.
+
+    ``again``: it will be asked for once more.
+    """
     count, num, size = kept.age.size, program.weights.size, program.sides.size
     place = -1
     for back in range(count):
@@ -87,7 +90,7 @@ def take_kept(kept: KeptBases, program: Program, basis: Basis) -> bool:
             break
     if place >= 0:
         # what was kept after it belongs to nodes that are done
-        kept.latest[0] = (place + count - 1) % count
+        kept.latest[0] = place if again else (place + count - 1) % count
         # right-hand sides may be others by now (counts.py)
         basis.values[:] = 0.0
         for r in range(size):

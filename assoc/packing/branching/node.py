@@ -127,7 +127,11 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
         copy_to(basis.variable, stack.variable[top])
         copy_to(basis.duals, stack.duals[top])
         copy_to(basis.anchors, stack.duals[top])
-        if not take_kept(work.kept, work.program, basis):
+        # below the first side of a branching, taken up anew, waits the other one with the same basis
+        again = top > 0
+        for i in range(basis.variable.size):
+            again = again and stack.variable[top - 1, i] == basis.variable[i]
+        if not take_kept(work.kept, work.program, basis, again):
             refactor(work.program, allowed_at(work, num), basis)
     return num
 

@@ -111,7 +111,7 @@ def walk(
             total = stay[r]
             for k in range(row_ptr[r], row_ptr[r + 1]):
                 j = row_cols[k]
-                # most have none, and that is quicker to see
+                # most values are 0, which is quicker to see than whether a column fits
                 if value[j] > 0.0 and fits(cols, owner, j):
                     total += value[j]
             draw = rng.random() * total - stay[r]

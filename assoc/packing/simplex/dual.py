@@ -126,7 +126,7 @@ def _fill_ratios(pricing: Pricing, count: int, tolerance: float) -> None:
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
     for a in range(count):
         room = reduced[a] + tolerance
-        ratio = (room if room > 0.0 else 0.0) / entries[a]
+        ratio = (0.0 if room < 0.0 else room) / entries[a]
         # what is no number is no ratio
         ratios[a] = ratio if entries[a] > _ENTRY and ratio >= 0.0 else np.inf
 

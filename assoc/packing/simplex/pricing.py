@@ -1,4 +1,4 @@
-"""The allowed columns laid out for pricing: one contiguous pass over them for each of the sensors.
+"""The allowed columns laid out for pricing: whole arrays, one for each sensor.
 
 Whatever the simplex method asks of all columns, the sum of something over the rows of each, is then a few sums of whole
 arrays, which processors do several at a time. Columns in the basis, and those that a trial leaves out, have the reduced
@@ -26,14 +26,15 @@ class Pricing(NamedTuple):
         The column at each position.
     position : int32 array, shape (n,)
         The position of each column that is listed; of others anything.
-    codes : uint32 array, shape (width, n)
-        Rows of the columns, by position; the number of rows, m, where a column has fewer. At least three of them.
+    codes : uint32 array, shape (max(width, 3), n)
+        Rows of the columns, by position; the number of rows, m, where a column has fewer.
     extra_position, extra_row : uint32 arrays
         Further rows: those of cuts; ``listed[1]`` of them.
     reduced : float array, shape (n + m,)
         Reduced costs by position; ``inf``: not to be chosen.
     entries, ratios : float arrays, shape (n + m,)
-        A row of the tableau, by position, and how far the multipliers can move before each reduced cost is 0.
+        A row of the tableau, by position, and how far the multipliers can move before each reduced cost is 0; then
+        the entries that may be pivots.
     terms : float array, shape (m + 1,)
         Room for what is summed up, row by row; the last is 0.
     listed : int64 array, shape (2,)

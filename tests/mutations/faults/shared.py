@@ -16,6 +16,7 @@ _PRICING = "assoc/packing/simplex/pricing.py"
 _TRIAL = "assoc/packing/simplex/trial.py"
 _BRANCHING = "assoc/packing/branching/search.py"
 _OF_TRIALS = "tests/packing/test_trial.py"
+_NODE = "assoc/packing/branching/node.py"
 _KEPT = "assoc/packing/branching/kept_bases.py"
 _OF_KEPT = "tests/packing/test_kept_bases.py"
 _EXTREMES = "assoc/packing/kernels/extremes.py"
@@ -170,17 +171,23 @@ FAULTS = (
     Fault(
         "a basis that was taken back is kept on",
         _KEPT,
-        "kept.latest[0] = (place + count - 1) % count",
+        "kept.latest[0] = place if again else (place + count - 1) % count",
         "pass",
         _OF_KEPT,
     ),
     Fault("the basis of a branching is not kept", _KEPT, "place = (kept.latest[0] + 1) % count", "return", _OF_KEPT),
+    Fault("what both sides of a branching need is taken once", _KEPT, "place if again else ", "", _OF_KEPT),
+    Fault("branchings keep no basis", _NODE, "    keep_basis(work.kept, work.basis)\n", "", _OF_KEPT),
     Fault("any kept basis will do", _KEPT, "        if i == size:\n", "        if i >= 0:\n", _OF_KEPT),
     Fault(
-        "the last of the largest is taken", _EXTREMES, "place = min(place, a if", "place = max(-1, a if", _OF_EXTREMES
+        "the last of the largest is taken",
+        _EXTREMES,
+        "place = min(place, a if bits[a] == most else count)",
+        "place = a if bits[a] == most else place",
+        _OF_EXTREMES,
     ),
     Fault(
-        "the smallest of the first is missed", _EXTREMES, "least = min(least, bits[a])", "least = bits[a]", _OF_EXTREMES
+        "only the last is looked at", _EXTREMES, "least = min(least, bits[a])", "least = bits[a]", _OF_EXTREMES
     ),
     Fault(
         "columns are priced by the rows of one sensor less",
