@@ -7,27 +7,26 @@ a branch, for several at a time; of floating point they may not, as among these 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
-from assoc._types import Floats
 
 
 @inner_njit
-def smallest(values: Floats, count: int) -> float:
-    """The smallest of the first ``count`` numbers, none of them negative; ``inf`` where there are none."""
-    bits = values.view(np.int64)
-    found = np.full(1, np.inf)
-    least = found.view(np.int64)[0]
+def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
+    """The first place of the smallest of the first ``count`` numbers, given as their bits; ``count`` where it is 0."""
+    least = np.int64(2**63 - 1)
     for a in range(count):
         least = min(least, bits[a])
-    found.view(np.int64)[0] = least
-    return float(found[0])
+    place = count
+    for a in range(count):
+        place = min(place, a if bits[a] == least else count)
+    return place
 
 
 @inner_njit
-def place_of_largest(values: Floats, count: int) -> int:
-    """The first place of the largest of the first ``count`` numbers, none of them negative; -1 where all are 0."""
-    bits = values.view(np.int64)
+def place_of_largest(bits: NDArray[np.int64], count: int) -> int:
+    """The first place of the largest of the first ``count`` numbers, given as their bits; -1 where all are 0."""
     most = np.int64(0)
     for a in range(count):
         most = max(most, bits[a])

@@ -51,7 +51,7 @@ class Basis(NamedTuple):
     anchors : float array, shape (m,)
         Costs of the anchors.
     row, column, sums : float arrays, shape (m,)
-        Room for a row and a column of the tableau, and for sums and scores of all places.
+        Room for a row and a column of the tableau, and for sums over all places.
     pricing : Pricing
         The columns that are allowed, and their reduced costs.
     age : int64 array, shape (1,)

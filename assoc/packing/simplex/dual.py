@@ -20,7 +20,7 @@ import numpy as np
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit
 from assoc.packing.kernels.copying import copy_to
-from assoc.packing.kernels.extremes import place_of_largest, smallest
+from assoc.packing.kernels.extremes import place_of_largest, place_of_smallest
 from assoc.packing.simplex.basis import (
     SMALL_PIVOT,
     Basis,
@@ -97,7 +97,7 @@ def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
 @inner_njit
 def leaving(basis: Basis) -> int:
     """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
-    values, norms, free, scores = basis.values, basis.norms, basis.free, basis.sums
+    values, norms, free, scores = basis.values, basis.norms, basis.free, basis.pricing.ratios
     for i in range(values.size):
         value = values[i]
         inside = value >= -_VALUE and (free[i] or value <= _VALUE)
@@ -105,7 +105,7 @@ def leaving(basis: Basis) -> int:
         # whatever rounding made of the norms, what is outside its limits must be found
         score = score if score > 0.0 else np.inf
         scores[i] = 0.0 if inside else score
-    return int(place_of_largest(scores, values.size))
+    return int(place_of_largest(basis.pricing.bits, values.size))
 
 
 @inner_njit
@@ -151,11 +151,11 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
     listed = pricing.listed[0]
     count = _fill_entries(allowed, basis, sign)
     _fill_ratios(pricing, count, tolerance)
-    least = smallest(pricing.ratios, count)
+    first = place_of_smallest(pricing.bits, count)
     chosen, step = -1, 0.0
-    if least < np.inf:
-        _fill_pivots(pricing, count, least)
-        place = place_of_largest(pricing.ratios, count)
+    if first < count and pricing.ratios[first] < np.inf:
+        _fill_pivots(pricing, count, pricing.ratios[first])
+        place = place_of_largest(pricing.bits, count)
         if place >= 0:
             step = max(pricing.reduced[place], 0.0) / pricing.entries[place]
             chosen = pricing.column[place] if place < listed else program.weights.size + place - listed

@@ -34,7 +34,9 @@ class Pricing(NamedTuple):
         Reduced costs by position; ``inf``: not to be chosen.
     entries, ratios : float arrays, shape (n + m,)
         A row of the tableau, by position, and how far the multipliers can move before each reduced cost is 0; then
-        the entries that may be pivots.
+        the entries that may be pivots. Scores of places, where a variable is to leave.
+    bits : int64 array, shape (n + m,)
+        The same numbers as ``ratios``, in the same memory, read as whole numbers (kernels/extremes.py).
     terms : float array, shape (m + 1,)
         Room for what is summed up, row by row; the last is 0.
     listed : int64 array, shape (2,)
@@ -49,6 +51,7 @@ class Pricing(NamedTuple):
     reduced: Floats
     entries: Floats
     ratios: Floats
+    bits: NDArray[np.int64]
     terms: Floats
     listed: NDArray[np.int64]
 
@@ -57,10 +60,12 @@ def new_pricing(program: Program) -> Pricing:
     """Room for the columns of a program."""
     num, size = program.weights.size, program.sides.size
     extra = int(np.maximum(np.diff(program.start) - program.width, 0).sum())
+    ratios = np.empty(num + size)
     return Pricing(
         np.empty(num, np.int32), np.empty(num, np.int32), np.empty((max(program.width, 3), num), np.uint32),
         np.empty(extra, np.uint32), np.empty(extra, np.uint32),
-        np.empty(num + size), np.empty(num + size), np.empty(num + size), np.zeros(size + 1), np.zeros(2, np.int64),
+        np.empty(num + size), np.empty(num + size), ratios, ratios.view(np.int64),
+        np.zeros(size + 1), np.zeros(2, np.int64),
     )  # fmt: skip
 
 
