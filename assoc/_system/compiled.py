@@ -23,6 +23,7 @@ import numpy as np
 from numba.core import caching, event, types
 
 from assoc._system import compile_time, shipped, temporary
+from assoc._system.inner_library import InnerCompiler
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
 from assoc._system.interrupts import signals_held
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
@@ -168,12 +169,13 @@ def inner_njit(function: Callable[..., Any]) -> Any:
     """Compile a kernel that other kernels alone call, without what lets Python call it.
 
     That takes arrays out of their objects and puts them in again: most of the code of a small kernel of many arrays.
+    It is optimised and translated in the kernels that call it alone (inner_library.py).
     Where Python calls it (tests do) it is interpreted.
     """
     if _CONFIG.DISABLE_JIT:
         return njit(function)
     _inner.add(function)
-    kernel: Any = numba.njit(**_INNER_OPTIONS)(function)
+    kernel: Any = numba.njit(**_INNER_OPTIONS, pipeline_class=InnerCompiler)(function)
     kernel.get_call_template = _called_with_common_types(kernel)
 
     @functools.wraps(function)

@@ -7,6 +7,7 @@ import sys
 
 _PROGRAM = """
 import json
+import os
 import numpy as np
 from numba.core import event
 from assoc._system.compiled import inner_njit, literal_njit, njit
@@ -26,6 +27,8 @@ def paired(pair, up):
 
 @inner_njit
 def inner(values):
+    if values.size == 0:
+        raise ValueError("nothing to add")
     total = 0.0
     for i in range(values.size):
         total += values[i]
@@ -42,6 +45,10 @@ def outer(values, rows):
         done += 1
     return total + plain(2, False) + paired((rows.size, rows.size), True) + literal(3) + literal(rows.size)
 
+@njit
+def other(values):
+    return 2.0 * inner(values)
+
 compiled = event.RecordingListener()
 event.register("numba:compile", compiled)
 rows = np.arange(3, dtype=np.int32)
@@ -49,6 +56,12 @@ found = [outer(np.ones(4), rows)]
 # compiled code is silent about overflow
 np.seterr(over="raise")
 found += [inner(np.ones(3)), inner(np.array([1e308, 1e308]))]
+if "OTHER" in os.environ:
+    found.append(other(np.ones(4)))
+try:
+    outer(np.ones(0), rows)
+except ValueError as problem:
+    found.append(str(problem))
 overloads = [len(one.signatures) for one in (plain, literal, paired, inner, outer)]
 print(json.dumps([found, overloads, sum(one.is_start for _, one in compiled.buffer)]))
 """
@@ -64,7 +77,25 @@ def run(tmp_path, **variables):
 
 def test_one_overload_for_all_whole_numbers_and_inner_kernels_from_python(tmp_path):
     # 4; 1 + 2 + 3 and 1 + 2 + 3; 1 + 2; 2; 7; 4 and 4
-    expected = [36.0, 3.0, float("inf")]
+    expected = [36.0, 3.0, float("inf"), "nothing to add"]
     assert run(tmp_path) == [expected, [1, 2, 1, 1, 1], 6]
     # what was kept is loaded, with all that it calls in it
     assert run(tmp_path) == [expected, [0, 0, 0, 0, 1], 0]
+
+
+def test_a_kept_inner_kernel_is_linked_into_a_new_one(tmp_path):
+    run(tmp_path)
+    found, overloads, compiled = run(tmp_path, OTHER="1")
+    assert found == [36.0, 3.0, float("inf"), 8.0, "nothing to add"]
+    # the new one alone is compiled; the inner one is loaded for it
+    assert compiled == 1
+    assert overloads == [0, 0, 0, 1, 1]
+
+
+def test_an_inner_kernel_is_not_translated_by_itself(tmp_path):
+    run(tmp_path)
+    kept = {path.name: path.read_bytes() for path in tmp_path.rglob("*.nbc")}
+    # object files begin with this
+    translated = {name.split("-")[0].split(".")[-1]: b"\x7fELF" in code for name, code in kept.items()}
+    assert translated["outer"]
+    assert not translated["inner"]
