@@ -99,9 +99,11 @@ def main(argv: list[str] | None = None) -> int:
     def write(minutes: float | None) -> None:
         command = _command(options)
         storage.save(table, rows)
-        write_text(report, reporting.render(rows, minutes, command, options.remark))
+        # of the figures as they are saved, in so many digits: whoever reads the table comes to the same ones
+        saved = storage.load(table)
+        write_text(report, reporting.render(saved, minutes, command, options.remark))
         if table == TABLE and README.exists():
-            write_text(README, readme.insert(README.read_text(encoding="utf-8"), rows))
+            write_text(README, readme.insert(README.read_text(encoding="utf-8"), saved))
 
     rows: list[Row] = []
     if options.report_only:
