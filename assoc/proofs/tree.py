@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.branching.pairs import Trials, answer, any_open_pair, decide, doubtful_pairs, new_trials
-from assoc.packing.branching.root import basis_of, root_with_cuts
+from assoc.packing.branching.root import root_with_cuts
 from assoc.packing.packing import Packing
-from assoc.packing.simplex.basis import Basis
+from assoc.packing.simplex.basis import Basis, basis_of
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Allowed, Program, all_allowed, all_reduced_costs, certified, make_feasible
 

@@ -16,6 +16,7 @@ from assoc.packing.components.component import Component
 from assoc.packing.components.proof import Branching
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
+from assoc.packing.neighbourhoods.diving import Diver
 from assoc.solvers.aco import max_min
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu import moves
@@ -158,6 +159,7 @@ OWN = (
 
 SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
+    Part("no dives in parts split on counts", SOLVERS, without=_replaced(Diver, "_split", lambda *_: [])),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
     Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
     Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),

@@ -57,14 +57,14 @@ def test_dives_are_near_the_bound(priced):
 def test_what_is_drawn_is_fixed(priced, monkeypatch):
     """Column after column: what was drawn stays whole in all programs that follow."""
     diver = Diver(priced, np.inf)
-    solve, masks = diver._program.solve, []
+    solve, masks = diver._all.program.solve, []
 
     def spy(**words):
         relaxed = solve(**words)
         masks.append((words["columns"].copy(), words["slack"].copy(), relaxed))
         return relaxed
 
-    monkeypatch.setattr(diver._program, "solve", spy)
+    monkeypatch.setattr(diver._all.program, "solve", spy)
     diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(1), np.inf, np.inf)
     assert masks
     core = diver._core
@@ -81,7 +81,7 @@ def test_what_is_drawn_is_fixed(priced, monkeypatch):
 def test_pheromone_and_values_decide(priced, monkeypatch):
     """The first draw has the probabilities of the docstring: counted over many dives."""
     diver = Diver(priced, np.inf)
-    core, primal = diver._core, diver._root.primal
+    core, primal = diver._core, diver._all.relaxed.primal
     open_columns = np.flatnonzero((primal > 1e-6) & (primal < 1.0 - 1e-6))
     # halves all of them in this program: other values tell more
     primal[open_columns] = np.linspace(0.1, 0.9, open_columns.size)
@@ -114,9 +114,9 @@ def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
     for cutoff in (np.inf, priced.bound + 1e-6):
         diver = Diver(priced, np.inf)
         diver.share = diving._LOWEST
-        solve, count = diver._program.solve, []
+        solve, count = diver._all.program.solve, []
         monkeypatch.setattr(
-            diver._program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
+            diver._all.program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
         )
         diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), cutoff, np.inf)
         steps.append(len(count))
@@ -179,11 +179,11 @@ def test_others_dive_once_an_iteration(searcher, monkeypatch):
 def test_columns_are_fixed_in_their_order(priced):
     """Those that fit, until they cover enough rows; the program is then that of what is left."""
     diver = Diver(priced, np.inf)
-    root, core = diver._root, diver._core
-    drawn = np.random.default_rng(0).permutation(_Descent(core, diver._program, root, np.inf).open_columns())
+    root, core = diver._all.relaxed, diver._core
+    drawn = np.random.default_rng(0).permutation(_Descent(core, diver._all.program, root, np.inf).open_columns())
     for rows in (0.0, 5.0, 100.0):
-        diver._program.back()
-        at = _Descent(core, diver._program, root, np.inf)
+        diver._all.program.back()
+        at = _Descent(core, diver._all.program, root, np.inf)
         assert at.fix(drawn, rows, np.inf)
         covered, fixed = set(), []
         for j in drawn:
@@ -203,17 +203,17 @@ def test_columns_are_fixed_in_their_order(priced):
 def test_what_leaves_nothing_better_is_not_fixed(priced):
     """Then all is as it was before."""
     diver = Diver(priced, np.inf)
-    root, core = diver._root, diver._core
+    root, core = diver._all.relaxed, diver._core
     fixed = refused = 0
-    for j in _Descent(core, diver._program, root, np.inf).open_columns()[:12]:
-        diver._program.back()
+    for j in _Descent(core, diver._all.program, root, np.inf).open_columns()[:12]:
+        diver._all.program.back()
         alone = LinearProgram(core).solve(columns=_left(core, j), slack=_covered(core, j)).bound
         for cutoff in (alone + 1.0, alone - 1e-6):
             # no cover below the cutoff has columns of larger reduced cost: they go, too
             light = root.reduced <= cutoff - root.bound
             least = LinearProgram(core).solve(columns=_left(core, j) & light, slack=_covered(core, j)).bound
-            diver._program.back()
-            at = _Descent(core, diver._program, root, cutoff)
+            diver._all.program.back()
+            at = _Descent(core, diver._all.program, root, cutoff)
             assert at.fix(np.array([j]), 1.0, np.inf) is (least < cutoff)
             if least < cutoff:
                 assert at._fixed == [j] and at.relaxed.bound == pytest.approx(least, abs=1e-7)
@@ -230,8 +230,8 @@ def test_the_rest_is_covered_as_well_as_can_be(priced, monkeypatch):
     diver = Diver(priced, np.inf)
     core = diver._core
     for cutoff in (np.inf, -1.0):
-        diver._program.back()
-        at = _Descent(core, diver._program, diver._root, np.inf)
+        diver._all.program.back()
+        at = _Descent(core, diver._all.program, diver._all.relaxed, np.inf)
         assert at.fix(at.open_columns()[::3], 15.0, np.inf)
         fixed = list(at._fixed)
         columns = np.logical_and.reduce([_left(core, j) for j in fixed])

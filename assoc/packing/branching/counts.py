@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._types import Floats
-from assoc.packing.branching.root import Root, basis_of
+from assoc.packing.branching.root import Root
 from assoc.packing.packing import Packing, PackingArrays
-from assoc.packing.simplex.basis import primal_values
+from assoc.packing.simplex.basis import basis_of, primal_values
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, weight_limit
 
@@ -124,6 +124,19 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
     # a second solution may stop short of the first one's bound
     leaves = [new._replace(bound=max(new.bound, part.leaf.bound)) for new, part in zip(solved, parts, strict=True)]
     return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
+
+
+def are_whole(packing: Packing, primal: Floats) -> bool:
+    """Whether a linear program's solution has whole counts, so that there is nothing to split.
+
+    Parameters
+    ----------
+    packing : Packing
+    primal : float array, shape (N,)
+        How much of each column it takes.
+    """
+    values = _counts_of(packing).times @ primal
+    return bool((np.abs(values - np.round(values)) <= _WHOLE).all())
 
 
 def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._types import Floats
 from assoc.packing.packing import Packing
-from assoc.packing.simplex.basis import Basis, begin_from_duals, new_basis, refactor
+from assoc.packing.simplex.basis import Basis, basis_of, begin_from_duals, new_basis
 from assoc.packing.simplex.cuts import odd_sets, with_cuts
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
-from assoc.packing.simplex.program import Allowed, Program, all_allowed, make_feasible, program_of, weight_limit
+from assoc.packing.simplex.program import Program, all_allowed, make_feasible, program_of, weight_limit
 
 # rounds of cuts at the most; of them in a row that may gain less than this share of the gap; cuts for each row
 _ROUNDS, _IN_VAIN, _GAIN = 30, 3, 0.01
@@ -112,16 +112,6 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
         before, bound = bound, _bound(program, basis)
         in_vain = in_vain + 1 if bound - before < _GAIN * (cutoff - bound) else 0
     return Root(program, allowed.slack, basis.variable, basis.duals, sets)
-
-
-def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], duals: Floats) -> Basis:
-    """The basis of these variables, its anchors with these costs."""
-    basis = new_basis(program)
-    basis.variable[:] = variable
-    basis.duals[:] = duals
-    basis.anchors[:] = duals
-    refactor(program, allowed, basis)
-    return basis
 
 
 def _renumbered(

@@ -13,6 +13,10 @@ the fault. So the dive ends while a share of the rows is open, or before the cho
 cover, and branch and bound (branching/search.py) covers what is left. The share grows while these searches end early,
 and shrinks when they do not end at all.
 
+Where the program mixes solutions of different kinds (branching/counts.py), dives end in whichever kind fits what they
+fixed first, and hardly ever in another. So after some dives every second one begins in a part of the solutions, one
+after the other: those with at most so many triples, say, and those with more.
+
 References
 ----------
 V. Maniezzo, "Exact and approximate nondeterministic tree-search procedures for the quadratic assignment problem",
@@ -21,17 +25,23 @@ INFORMS Journal on Computing 11 (1999), 358-369 (ants guided by bounds).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
+from assoc.packing.branching.counts import are_whole, split_on_counts
+from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
+from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED
 from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
+from assoc.packing.simplex.program import all_allowed
 
 # rows for which a dive pays: fewer are solved exactly, and the inverse of more takes too long
 _LEAST, _MOST = 30, 900
@@ -46,8 +56,17 @@ _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
 # nodes of one such search
 _NODES = 8
+# dives before the first one that begins in a part of the solutions: a split is judged by the best cover
+_BEFORE_PARTS = 8
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
+
+
+class _Start(NamedTuple):
+    """A linear program, marked where it is solved."""
+
+    program: LinearProgram
+    relaxed: Relaxation
 
 
 class Diver:
@@ -68,9 +87,12 @@ class Diver:
         # rows that must be covered keep a column each: what the program leaves out insertion may bring back
         self._core: Packing = packing.restrict(priced.reduced <= limit)
         self._packing, self._tolerance = packing, priced.tolerance
-        self._program = LinearProgram(self._core)
-        self._root = self._program.solve(duals=priced.duals[self._core.row_origin], deadline=deadline)
-        self._program.mark()
+        program = LinearProgram(self._core)
+        relaxed = program.solve(duals=priced.duals[self._core.row_origin], deadline=deadline)
+        program.mark()
+        self._all = _Start(program, relaxed)
+        self._parts: list[_Start] = []
+        self._dives = 0
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     @staticmethod
@@ -98,8 +120,9 @@ class Diver:
         deadline : float
             When time is over (clock.py).
         """
-        self._program.back()
-        at = _Descent(self._core, self._program, self._root, cutoff)
+        start = self._next_start(cutoff, deadline)
+        start.program.back()
+        at = _Descent(self._core, start.program, start.relaxed, cutoff)
         left = self.share * self._core.num_rows
         while at.open_rows > left and at.relaxed.status == OPTIMAL:
             columns = at.open_columns()
@@ -113,6 +136,35 @@ class Diver:
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         own_all(self._packing.cols, self._core.origin[np.concatenate([at.fixed, found])], owner)
         return owner
+
+    def _next_start(self, cutoff: float, deadline: float) -> _Start:
+        """Where a dive begins: by turns in the program of all solutions and in those of its parts."""
+        if self._dives == _BEFORE_PARTS:
+            self._parts = self._split(cutoff, deadline)
+        self._parts = [part for part in self._parts if part.relaxed.bound < cutoff]
+        turn, whole = divmod(self._dives, 2)
+        self._dives += 1
+        return self._all if whole or not self._parts else self._parts[turn % len(self._parts)]
+
+    def _split(self, cutoff: float, deadline: float) -> list[_Start]:
+        """The programs of the parts of the solutions, where a split on counts pays and there is memory for them."""
+        core, relaxed = self._core, self._all.relaxed
+        if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal):
+            return []
+        leaves = split_on_counts(core, plain_root(core, relaxed.duals), cutoff, cutoff, deadline)
+        # without rows of counts there is but the program of all solutions; with them, each has the mark of its root
+        leaves = [leaf for leaf in leaves if leaf.root.slack.size > core.num_rows]
+        room = sum(2.0 * LinearProgram.memory(core.num_columns, leaf.root.slack.size) for leaf in leaves)
+        if not memory_allows(room):
+            return []
+        parts = []
+        for leaf in leaves:
+            root = leaf.root
+            basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
+            program = LinearProgram.extended(core, root.program, root.slack, basis)
+            parts.append(_Start(program, program.solve(deadline=deadline)))
+            program.mark()
+        return parts
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -277,6 +277,16 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
         basis.duals[r] = total
 
 
+def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], duals: Floats) -> Basis:
+    """The basis of these variables, its anchors with these costs."""
+    basis = new_basis(program)
+    basis.variable[:] = variable
+    basis.duals[:] = duals
+    basis.anchors[:] = duals
+    refactor(program, allowed, basis)
+    return basis
+
+
 @inner_njit
 def residual(program: Program, basis: Basis) -> float:
     """How far the values in the basis are from satisfying the rows."""

@@ -23,6 +23,7 @@ from assoc.packing.simplex.basis import Basis, begin_from_duals, copy_basis, new
 from assoc.packing.simplex.dual import INFEASIBLE, Effort, solve_dual
 from assoc.packing.simplex.program import (
     Allowed,
+    Program,
     all_reduced_costs,
     certified,
     least_reduced,
@@ -49,8 +50,8 @@ class Relaxation:
     bound : float
         No solution that uses what is allowed weighs less, whatever the status. ``inf``: there is none.
     duals, reduced : float arrays, shapes (R,) and (N,)
-        Multipliers that give the bound (<= 0 on rows that may stay uncovered), and the reduced costs that they give:
-        at least 0 on the columns that are allowed, but for rounding.
+        Multipliers that give the bound (<= 0 on rows that may stay uncovered; those of further rows come last), and
+        the reduced costs that they give: at least 0 on the columns that are allowed, but for rounding.
     primal : float array, shape (N,)
         How much of each column the LP takes; the optimum's where the status is ``OPTIMAL``.
     exchanges : int
@@ -77,9 +78,28 @@ class LinearProgram:
     def __init__(self, packing: Packing) -> None:
         self._packing = packing
         self._program = program_of(packing.arrays)
+        self._slack = packing.slack
         self._basis: Basis = new_basis(self._program)
         self._marked: dict[int, Basis] = {}
         self._begun = False
+
+    @classmethod
+    def extended(cls, packing: Packing, program: Program, slack: NDArray[np.bool_], basis: Basis) -> LinearProgram:
+        """The program of a packing with further rows and columns after its own, warm from a basis.
+
+        Parameters
+        ----------
+        packing : Packing
+        program : Program
+        slack : bool array, shape (rows of the program,)
+            Whether a row may stay uncovered.
+        basis : Basis
+            Is changed from now on.
+        """
+        self = cls.__new__(cls)
+        self._packing, self._program, self._slack, self._basis = packing, program, slack, basis
+        self._marked, self._begun = {}, True
+        return self
 
     @staticmethod
     def memory(columns: int, rows: int) -> float:
@@ -115,8 +135,12 @@ class LinearProgram:
             When to stop (clock.py).
         """
         packing, program, basis = self._packing, self._program, self._basis
-        mask = np.ones(packing.num_columns, dtype=np.bool_) if columns is None else columns
-        may_stay = packing.slack if slack is None else slack
+        mask = np.ones(program.weights.size, dtype=np.bool_)
+        may_stay = self._slack.copy()
+        if columns is not None:
+            mask[: columns.size] = columns
+        if slack is not None:
+            may_stay[: slack.size] = slack
         allowed = Allowed(np.flatnonzero(mask).astype(np.int32), mask, may_stay)
         limit = float(weight_limit(program))
         most = 10_000 + 100 * packing.num_rows if exchanges is None else exchanges
@@ -130,9 +154,9 @@ class LinearProgram:
         found = basis.duals.copy()
         make_feasible(program, allowed, found)
         bound = float(certified(program, allowed, found))
-        primal = np.empty(packing.num_columns)
+        primal = np.empty(program.weights.size)
         primal_values(program, basis, primal)
-        reduced = all_reduced_costs(program, found)
+        primal, reduced = primal[: packing.num_columns], all_reduced_costs(program, found)[: packing.num_columns]
         return Relaxation(status, np.inf if bound >= limit else bound, found, reduced, primal, done)
 
     def mark(self, number: int = 0) -> None:

@@ -28,6 +28,7 @@ _OF_COUNTS = "tests/packing/test_counts_small.py"
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
 _OF_DIVES = "tests/packing/test_diving.py"
+_OF_PARTS = "tests/packing/test_dives_in_parts.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
 FAULTS = (
@@ -85,6 +86,17 @@ FAULTS = (
         "at.relaxed.primal[columns] ** strictness",
         "1.0",
         _OF_DIVES,
+    ),
+    Fault("divers begin in no part", _DIVER, "if whole or not self._parts else", "if True else", _OF_PARTS),
+    Fault(
+        "divers begin in parts alone", _DIVER, "if whole or not self._parts else", "if not self._parts else", _OF_PARTS
+    ),
+    Fault(
+        "parts without better covers are kept",
+        _DIVER,
+        "[part for part in self._parts if part.relaxed.bound < cutoff]",
+        "list(self._parts)",
+        _OF_PARTS,
     ),
     Fault("divers fix nothing", _DIVER, "            self._covered[own_rows] = True\n", "", _OF_DIVES),
     Fault(
