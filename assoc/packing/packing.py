@@ -85,6 +85,11 @@ class Packing:
         return int(self.slack.size)
 
     @property
+    def num_sensors(self) -> int:
+        """Number of sensors S: rows that a column has at the most."""
+        return int(self.cols.shape[1])
+
+    @property
     def num_components(self) -> int:
         """Number of independent components C."""
         return int(self.col_start.size - 1)

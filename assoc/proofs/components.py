@@ -85,9 +85,9 @@ def trees_of(parts: Parts, chosen: dict[tuple[check.Row, ...], int], aim: Aim) -
         rows = packing.row_origin[packing.row_start[c] : packing.row_start[c + 1]]
         rounding = CLOSED * max(1.0, abs(exactly[c] / _ONE))
         enough = targets[c] - max(rounding, parts.unit - rounding)
-        if targets[c] - gaps[c] >= enough or not memory_allows(
-            work_memory(MOST_ROWS * rows.size, int(packing.col_start[c + 1] - packing.col_start[c]))
-        ):
+        columns = int(packing.col_start[c + 1] - packing.col_start[c])
+        needed = work_memory(MOST_ROWS * rows.size, columns, packing.num_sensors)
+        if targets[c] - gaps[c] >= enough or not memory_allows(needed):
             continue
         own_aim = replace(aim, target=float(targets[c]), enough=float(enough))
         own_duals = parts.duals[packing.row_start[c] : packing.row_start[c + 1]]

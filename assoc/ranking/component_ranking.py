@@ -141,7 +141,7 @@ class ComponentRanking:
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
         packing = self._packing
-        if not self._memory_allows(work_memory(packing.num_rows, packing.num_columns)):
+        if not self._memory_allows(work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)):
             self._open.give_up()
             return False
         self._work = new_work(packing.arrays, self._root.program, self._root.slack)

@@ -60,8 +60,8 @@ def assign(
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
     watch : callable, optional
-        Of ``aco``: called after each cycle with its ``Cycle``, in numbers of the packing. ``assoc.solvers.pheromone``
-        gives the same by tuples of the problem.
+        Of ``aco``: called after each cycle with its ``Cycle``: pheromone, visibility and probability of the tuples.
+        Several ``workers`` call it from threads of their own. ``assoc.solvers.pheromone`` keeps all cycles.
     advise : bool, default True
         Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
     proof : path-like, optional
@@ -105,6 +105,8 @@ def assign(
         prepared = prepare(problem)
         run.offset = prepared.offset
         packing = prepared.packing
+        if watch is not None:
+            run.watch = _by_tuple(watch, problem, packing)
         if start is not None:
             run.start = start_columns(problem, prepared, start)
         estimate = chosen.memory(packing.num_columns, packing.num_rows)
@@ -133,6 +135,20 @@ def assign(
         for line in doubts_about_costs(problem):
             warn(line)
     return solution
+
+
+def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packing: Packing) -> Callable[[Any], object]:
+    """Add the tuples of its nodes to what a solver tells of a cycle: it knows columns and rows alone."""
+    # few calls watch, and this loads what other solvers do not need
+    from assoc.solvers.aco.cycle import Cycle, tuples_of
+
+    def told(state: Any) -> object:
+        if isinstance(state, Cycle):
+            nodes = tuples_of(problem.tuples, problem.sizes, packing, state.columns, state.rows)
+            state = state._replace(tuples=nodes)
+        return watch(state)
+
+    return told
 
 
 def _checked(outcome: object, solver: str) -> Outcome:

@@ -18,8 +18,8 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Callback
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
-from assoc.solvers.aco.cycle import Cycle
-from assoc.solvers.aco.paper import nodes_of
+from assoc.solvers.aco.cycle import Cycle, tuples_of
+from assoc.solvers.aco.paper import false_alarms, nodes_of
 from assoc.solvers.assign import assign
 
 
@@ -122,38 +122,27 @@ def pheromone(
         problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters
     )
     packing = prepare(problem).packing
-    rows, costs = nodes_of(packing)
-    tuples = _tuples(problem, packing.row_origin, rows)
+    # what is a node in no cycle is none
+    alone = false_alarms(packing) if parameters.get("mode") == "paper" else np.flatnonzero(packing.slack)
+    _, costs = nodes_of(packing, alone)
+    tuples = tuples_of(problem.tuples, problem.sizes, packing, np.arange(packing.num_columns), alone)
     chosen = {tuple(row) for row in solution.tuples.tolist()}
     cycles = 1 + np.arange(max((one.number for one in kept), default=0))
-    states = _by_cycle(kept, packing, len(cycles))
+    states = _by_cycle(kept, packing, alone, len(cycles))
     best = np.array([tuple(row) in chosen for row in tuples.tolist()], dtype=np.bool_)
     return PheromoneHistory(cycles, states[0], states[1], states[2], tuples, costs, best, solution)
 
 
-def _by_cycle(kept: list[Cycle], packing: Packing, count: int) -> Floats:
+def _by_cycle(kept: list[Cycle], packing: Packing, alone: NDArray[np.int64], count: int) -> Floats:
     """Pheromone, visibility and probability of all nodes after each cycle, shape (3, K, N)."""
-    alone = np.full(packing.num_rows, -1, dtype=np.int64)
-    free = np.flatnonzero(packing.slack)
-    alone[free] = packing.num_columns + np.arange(free.size)
-    num = packing.num_columns + free.size
+    place = np.full(packing.num_rows, -1, dtype=np.int64)
+    place[alone] = packing.num_columns + np.arange(alone.size)
+    num = packing.num_columns + alone.size
     states = np.full((3, count, num), np.nan)
     for one in kept:
-        nodes = np.concatenate([one.columns, alone[one.rows]])
+        nodes = np.concatenate([one.columns, place[one.rows]])
         states[:, one.number - 1, nodes] = np.stack([one.pheromone, one.visibility, one.probability])
     for k in range(1, count):
         # what had no cycle of this number is as it was
         states[:, k] = np.where(np.isnan(states[:, k]), states[:, k - 1], states[:, k])
     return states
-
-
-def _tuples(problem: AssignmentProblem, origin: NDArray[Any], rows: NDArray[np.int32]) -> NDArray[np.int32]:
-    """From rows (measurements counted through, -1: none) to one index for each sensor."""
-    starts = np.cumsum(problem.sizes) - problem.sizes
-    node, place = np.nonzero(rows >= 0)
-    through = np.asarray(origin)[rows[node, place]]
-    sensor = np.searchsorted(starts, through, side="right") - 1
-    # sensors without measurements start where the next one does
-    result = np.zeros((len(rows), problem.num_sensors), dtype=np.int32)
-    result[node, sensor] = through - starts[sensor] + 1
-    return result

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assoc import AssignmentProblem, assign
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import counts, search
 from assoc.packing.branching.counts import split_on_counts, with_counts
@@ -216,3 +217,15 @@ def test_a_long_first_pass_is_split_before_it_ends(monkeypatch):
         assert (np.diff(bounds) >= 0.0).all() and bounds[-1] == pytest.approx(one.weight, abs=1e-6)
         nodes.append(one.nodes)
     assert nodes[1] < 0.2 * nodes[0]
+
+
+def test_tuples_of_many_sensors():
+    """Any two share a measurement, so that the linear program is far below the optimum and the root is split."""
+    rng = np.random.default_rng(0)
+    tuples = rng.integers(1, 4, (100, 130))
+    costs = -1.0 - 1e-3 * rng.random(100)
+    problem = AssignmentProblem(tuples, costs, [3] * 130)
+    for solver in ("exact", "tabu"):
+        solution = assign(problem, solver, **({"iterations": 5} if solver == "tabu" else {}))
+        assert solution.cost == pytest.approx(costs.min(), abs=1e-12)
+    assert assign(problem).status == "optimal"

@@ -8,6 +8,7 @@ from assoc.packing.branching import counts, search
 from assoc.packing.branching.counts import split_on_counts
 from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.packing import assemble
 from tests.packing.test_counts import inside, random_packing, solutions
 
 
@@ -68,3 +69,40 @@ def test_a_pass_is_split_in_its_middle(packing):
     shown = one.lower_bound
     one.run(1)
     assert len(one._leaves) > 1 and one.lower_bound >= shown
+
+
+def test_columns_of_many_rows_are_counted():
+    """More rows than an int8 holds."""
+    sensors, num = 130, 6
+    rng = np.random.default_rng(0)
+    cols = (3 * np.arange(sensors) + rng.integers(0, 3, (num, sensors))).astype(np.int32)
+    packing = assemble(cols, -np.ones(num), np.ones(3 * sensors, dtype=bool), np.arange(num, dtype=np.int32))
+    every = counts._counts_of(packing.component(0))
+    assert every.times.tolist() == [[1] * num, [sensors] * num]
+    program = counts._with_rows(plain_root(packing, np.zeros(packing.num_rows)).program, every)
+    last = program.sides.size - 3
+    assert (np.bincount(program.rows, minlength=last + 3)[[last - 1, last]] == [num + 1, num * sensors + 1]).all()
+
+
+def test_a_split_without_time_is_one_part_and_its_bound_holds(packing):
+    best = min(packing.weights[one].sum() for one in solutions(packing))
+    (leaf,) = split_on_counts(packing, plain_root(packing, dual_bound(packing)), np.inf, np.inf, -1.0)
+    assert leaf.bound <= best + 1e-9
+
+
+def test_time_that_ends_while_parts_are_solved_again_leaves_those_of_before(packing, monkeypatch):
+    best = min(packing.weights[one].sum() for one in solutions(packing))
+    expected = len(split(packing))
+    over = []
+    part = counts._Counted.part
+
+    def spy(self, ranges, start=None):
+        # the first part of a program with the rows of some counts alone
+        over.append(start is None and bool(over))
+        return part(self, ranges, start)
+
+    monkeypatch.setattr(counts._Counted, "part", spy)
+    monkeypatch.setattr(counts, "is_over", lambda deadline: any(over))
+    leaves = split(packing)
+    assert len(leaves) == expected and min(leaf.bound for leaf in leaves) <= best + 1e-9
+    assert len({leaf.root.slack.size for leaf in leaves}) == 1

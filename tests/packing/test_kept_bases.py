@@ -163,4 +163,5 @@ def test_the_memory_that_is_asked_for_is_enough():
 
         taken = sum(bytes_of(record) for record in (work.kept, work.trials, work.basis, work.node))
         # what grows with the rows alone is not counted, and little
-        assert taken <= work_memory(packing.num_rows, packing.num_columns) + 1000.0 * packing.num_rows
+        asked = work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
+        assert taken <= asked + 1000.0 * packing.num_rows

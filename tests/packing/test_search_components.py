@@ -9,11 +9,13 @@ import pytest
 
 import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.components import search
+from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.components import proof, search
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
-from assoc.packing.components.splitting import split_components
+from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.components.team import Team
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.simulation import simulate
@@ -218,3 +220,93 @@ def test_small_components_are_bounded_before_they_are_searched(solver):
     assert (solution.cost, solution.status) == (-2.0, "optimal") and solution.lower_bound == pytest.approx(-2.0)
     # the first cover and one iteration: without the proof it would search on until its patience is over
     assert solution.iterations == 2
+
+
+def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeypatch):
+    """Where its cover is better by less than the tolerance, too: nothing else would ever be found or proved."""
+    one, _ = ghosts
+    one.refinement = "full"
+    weight = one.weight
+
+    class Ended:
+        def __init__(self):
+            self.columns, self.weight = one.best_columns().astype(np.int32), weight
+
+        @property
+        def lower_bound(self):
+            return self.weight - one.tolerance
+
+        def run(self, nodes):
+            pass
+
+    monkeypatch.setattr(proof, "_search", lambda *_: Ended())
+    one.weight = weight + 0.5 * one.tolerance
+    branching = proof.Branching(one, Run(0))
+    branching.advance()
+    assert one.closed and one.weight == weight
+
+
+def test_what_is_proved_stays_when_columns_go(ghosts):
+    """Unless the component falls apart: what is proved of the whole says nothing of a part."""
+    one, optimum = ghosts
+    one.proven = one.bound + 0.5 * (optimum - one.bound)
+    (smaller,) = split_component(one, share=1.0)
+    assert smaller.proven == one.proven and smaller.weight == pytest.approx(one.weight)
+    best = Cover.of(one.packing, _optimal_columns(one))
+    assert one.offer(best.owner, one.weight_of(best.owner))
+    several = split_component(one, share=1.0)
+    assert len(several) > 1 and all(part.proven == -np.inf for part in several)
+
+
+def _optimal_columns(one):
+    search = BranchAndBound(one.packing, one.duals, one.weight, one.tolerance, to_the_end=True)
+    search.run(10_000)
+    return search.columns
+
+
+@pytest.mark.parametrize("columns, most", [(30, 50), (5_000, 4), (10**6, 1)])
+def test_few_nodes_at_a_time_where_each_takes_long(columns, most, ghosts, monkeypatch):
+    """Kernels do not hear Ctrl-C."""
+    one, _ = ghosts
+    asked = []
+
+    class Counting:
+        done, nodes, lower_bound = False, 0, -np.inf
+
+        def run(self, nodes):
+            asked.append(nodes)
+            self.done = True
+
+    monkeypatch.setattr(proof, "_search", lambda *_: Counting())
+    monkeypatch.setattr(type(one.packing), "num_columns", columns)
+    proof.bound_of_component(one, Run(0))
+    assert asked == [most]
+
+
+@pytest.mark.parametrize("solver", ["aco", "genetic", "tabu"])
+def test_a_seed_is_not_used_up(solver, unproven):
+    """The same SeedSequence again, or a generator whose state was set: the same search, with several workers, too."""
+    problem = gated_problem(np.random.default_rng(3), (14, 14, 13), 0.3, "mixed")
+
+    def search(seed):
+        solution = assoc.assign(problem, solver, seed=seed, workers=2, refinement="none", iterations=3)
+        return [(point.iteration, point.cost) for point in solution.trace]
+
+    sequence = np.random.SeedSequence(5)
+    assert search(sequence) == search(sequence)
+    state = np.random.default_rng(6).bit_generator.state
+    found = []
+    for _ in range(2):
+        generator = np.random.default_rng()
+        generator.bit_generator.state = state
+        found.append(search(generator))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("refinement", ["none", "full"])
+def test_weights_that_are_all_alike_have_a_size(refinement):
+    """A temperature of next to nothing would leave nothing to pheromone and chance."""
+    grid = np.stack(np.meshgrid(*[np.arange(1, 5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    keep = np.random.default_rng(2).random(len(grid)) < 0.3
+    one = component(assoc.AssignmentProblem(grid[keep], np.full(keep.sum(), -1e5), [4, 4, 4]), refinement)
+    assert one.temperature == pytest.approx(0.02 * 1e5)

@@ -203,6 +203,16 @@ def test_pheromone_gathers_on_what_is_chosen(ax):
     plotting.plot_pheromone(history, nodes=len(chosen), ax=ax)
     shown = {tuple(map(int, re.findall(r"\d+", text.get_text()))) for text in ax.get_yticklabels()}
     assert shown == chosen
+    for of in ("visibility", "probability"):
+        other = plotting.plot_pheromone(history, of=of, nodes=len(chosen), ax=new_figure().subplots())
+        values = getattr(history.top(len(chosen)), of)
+        if of == "visibility":
+            values = values / np.nansum(history.visibility, axis=1, keepdims=True)
+        (image,) = other.images
+        assert np.asarray(image.get_array()) == pytest.approx(100.0 * values[:, ::-1].T)
+        assert {"visibility": "visibility", "probability": "drawn"}[of] in image.colorbar.ax.get_ylabel()
+    with pytest.raises(assoc.InvalidInputError, match="of: expected pheromone, visibility, probability, got 'colour'"):
+        plotting.plot_pheromone(history, of="colour", ax=ax)
 
 
 def test_heat_map_has_means_and_intervals(tmp_path, scene, ax):

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
+from assoc.packing.prepare import prepare
+from assoc.solvers.aco.cycle import cycle_of
 from assoc.solvers.aco.max_min import Colony
 from assoc.solvers.aco.parameters import AcoParameters
 from tests.solvers.pieces import (
@@ -134,6 +137,11 @@ def test_probability_of_a_cycle():
         assert state.probability[node] == pytest.approx(np.mean(shares), rel=1e-9)
 
 
+def _starts(problem):
+    """Number of the first measurement of each sensor, counted through."""
+    return np.cumsum(problem.sizes) - problem.sizes
+
+
 @pytest.mark.parametrize("mode", ["paper", "mmas"])
 def test_pheromone_by_tuple(mode):
     """Histories are in the problem's tuples, and end where `assign` does."""
@@ -151,8 +159,15 @@ def test_pheromone_by_tuple(mode):
     for one in cycles:
         number = {tuple(row): i for i, row in enumerate(history.tuples.tolist())}
         at = [number[tuple(row)] for row in problem.tuples[packing.origin[one.columns]].tolist()]
+        # the nodes' tuples, false alarms of measurements among them, are told with each cycle
+        assert one.tuples[: len(at)].tolist() == problem.tuples[packing.origin[one.columns]].tolist()
+        through = packing.row_origin[one.rows]
+        of_rows = np.where(one.tuples[len(at) :] > 0, one.tuples[len(at) :] - 1 + _starts(problem), -1).max(axis=1)
+        assert of_rows.tolist() == through.tolist()
+        assert (np.count_nonzero(one.tuples[len(at) :], axis=1) == 1).all()
         np.testing.assert_array_equal(history.pheromone[one.number - 1, at], one.pheromone[: len(at)])
         np.testing.assert_array_equal(history.visibility[one.number - 1, at], one.visibility[: len(at)])
+        np.testing.assert_array_equal(history.probability[one.number - 1, at], one.probability[: len(at)])
     top = history.top(7)
     assert top.tuples.shape == (7, 3) and top.chosen.all()
 
@@ -169,3 +184,55 @@ def test_a_colony_learns_what_others_found():
     chosen = np.isin(np.arange(one.packing.num_columns), columns_of(found))
     assert (colony.pheromone[chosen] >= 0.5 + 0.5 * colony.lowest - 1e-12).all()
     assert colony.least == one.weight
+
+
+def test_visibility_of_a_cycle():
+    """What choosing a column, or leaving a row alone, adds to the bound."""
+    problem = open_problem()
+    one = component(problem)
+    one.offer_greedy()
+    state = cycle_of(prepare(problem).packing, one, Colony(one, AcoParameters(), lambda *_: None))
+    scale = temperature(one, one.weight)
+    np.testing.assert_allclose(state.visibility[: state.columns.size], np.exp(-one.reduced / scale), rtol=1e-12)
+    alone = np.exp(one.duals[one.packing.slack] / scale)
+    np.testing.assert_allclose(state.visibility[state.columns.size :], alone, rtol=1e-12)
+
+
+@pytest.fixture
+def diving(monkeypatch):
+    """Dives that return one cover, the best of many, and what they were given; there are so many until time is over."""
+    one = component(open_problem(), "full")
+    one.refinement = "none"
+    best = min((one.random_cover(4.0, np.random.default_rng(seed)) for seed in range(60)), key=one.weight_of)
+    trails, left = [], [0]
+
+    def dive(self, number, rng, trail, beta):
+        trails.append(trail.copy())
+        left[0] -= 1
+        return best.copy()
+
+    monkeypatch.setattr(Component, "dive", dive)
+    monkeypatch.setattr(Component, "dives", property(lambda self: left[0] > 0))
+    return one, best, trails, left
+
+
+def test_divers_draw_by_the_pheromone_and_the_best_of_them_lays_it(diving):
+    one, best, trails, left = diving
+    left[0] = 1
+    parameters = AcoParameters(ants=1, divers=1, alpha=1.7, beta=0.0, rho=0.5, refinement="none")
+    colony = Colony(one, parameters, lambda *_: None)
+    before = np.random.default_rng(2).uniform(0.2, 1.0, one.packing.num_columns)
+    colony.pheromone[:] = before
+    colony.iterate(one, np.random.default_rng(0))
+    (trail,) = trails
+    np.testing.assert_allclose(trail, before**1.7, rtol=1e-12)
+    chosen = np.isin(np.arange(one.packing.num_columns), columns_of(best))
+    np.testing.assert_allclose(colony.pheromone, np.maximum(0.5 * before + 0.5 * chosen, colony.lowest), rtol=1e-12)
+
+
+def test_divers_end_when_time_is_over(diving):
+    one, _, trails, left = diving
+    left[0] = 3
+    colony = Colony(one, AcoParameters(ants=1, divers=100_000, refinement="none"), lambda *_: None)
+    colony.iterate(one, np.random.default_rng(0))
+    assert len(trails) == 3

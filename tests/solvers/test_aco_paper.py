@@ -12,6 +12,11 @@ from assoc.solvers.aco import paper
 from tests.solvers.pieces import is_complete, problems, rows_of
 
 PROBLEMS = problems()
+# more measurements than partners: those that are left are no false alarms, and no choice of an ant
+_PAIRS = [[i, j] for i in range(1, 5) for j in range(1, 8)]
+PROBLEMS["unequal"] = assoc.AssignmentProblem(
+    _PAIRS, np.random.default_rng(8).uniform(10.0, 20.0, len(_PAIRS)), [4, 7], dummy=False
+)
 SETTINGS = [
     {"alpha": 1.0, "beta": 1.0, "rho": 0.9},
     {"alpha": 2.0, "beta": 1.0, "rho": 0.3},
@@ -30,7 +35,7 @@ def reference(packing, parameters, seed, cycles):
     """The paper's ants with sets and sums; yields the tours of all ants and the pheromone after each cycle."""
     alpha, beta, rho = parameters["alpha"], parameters["beta"], parameters["rho"]
     ants = parameters.get("ants", 15)
-    alone = np.flatnonzero(packing.slack)
+    alone = np.arange(packing.num_rows if packing.slack.all() else 0)
     nodes = [set(rows_of(packing, j)) for j in range(packing.num_columns)] + [{int(r)} for r in alone]
     costs = positive_costs([*packing.weights.tolist(), *[0.0] * alone.size], **parameters)
     eta = 1.0 / costs  # eq. 7
@@ -83,7 +88,8 @@ def test_cycle_by_cycle(monkeypatch, name, setting):
     packing = prepare(problem).packing
     expected = list(reference(packing, parameters, setting, 12))
     assert solution.iterations == len(expected) == len(seen)
-    costs = positive_costs([*packing.weights.tolist(), *[0.0] * int(packing.slack.sum())], **parameters)
+    alone = packing.num_rows if packing.slack.all() else 0
+    costs = positive_costs([*packing.weights.tolist(), *[0.0] * alone], **parameters)
     for cycle, (tours, pheromone) in enumerate(expected, start=1):
         state = seen[cycle - 1]
         assert walked[cycle - 1] == tours
@@ -135,3 +141,29 @@ def test_what_no_ant_can_complete_is_completed_or_refused():
     problem = assoc.AssignmentProblem([[1, 1], [2, 1]], [1.0, 1.0], [2, 2], dummy=False)
     with pytest.raises(InfeasibleError):
         assoc.assign(problem, "aco", mode="paper")
+
+
+def test_tours_are_complete_where_sensors_have_unequal_numbers_and_no_dummies():
+    problem = PROBLEMS["unequal"]
+    for visibility in ("exponential", "reciprocal"):
+        history = assoc.solvers.pheromone(problem, seed=1, mode="paper", visibility=visibility, scale=2.0)
+        assert history.tuples.tolist() == problem.tuples.tolist() and not np.isnan(history.pheromone).any()
+        assert len(history.solution.tuples) == 4
+        # found by ants, not by what completes a problem that they cannot
+        assert len(history.solution.trace) > 1
+        first = history.pheromone[0] - 0.3 * history.visibility[0]
+        assert np.count_nonzero(first > 1e-12) >= 4
+
+
+def test_ants_that_do_not_walk_for_want_of_time_end_the_search(monkeypatch):
+    """A deadline may be early by what another process took of the processor; the time is then not over yet."""
+    cycle = paper._cycle
+
+    def cut(nodes, value, greedy, starts, tours, lengths, rng, deadline):
+        owners = cycle(nodes, value, greedy, starts, tours, lengths, rng, deadline)
+        lengths[-1], owners[-1] = 0, -1
+        return owners
+
+    monkeypatch.setattr(paper, "_cycle", cut)
+    solution = assoc.assign(PROBLEMS["mixed"], "aco", mode="paper", ants=5)
+    assert solution.iterations == 1

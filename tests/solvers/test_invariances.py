@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from assoc.costs import build_problem
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
+from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from experiments.common.oracles import axial_problem, brute_force, check_answer, gated_problem
 from tests.sizes import sample
@@ -157,6 +159,18 @@ def test_the_limit_of_iterations_is_named(name, chosen, hard):
     # a search that ends by itself is not said to be cut off
     easy = gated_problem(np.random.default_rng(3), (3, 3, 3), 0.5)
     assert assign(easy, name, **chosen).stopped_by in ("converged", "gap")
+
+
+def test_a_limit_of_nodes_is_kept_and_named():
+    """What is known then holds."""
+    problem = build_problem(simulate("bearing-only", seed=12, targets=24, scans=1), 0)
+    best = assign(problem)
+    assert best.status == "optimal"
+    for nodes in (1, 5, 30):
+        cut = assign(problem, nodes=nodes)
+        assert cut.stopped_by == "iterations" and cut.iterations <= nodes
+        assert cut.lower_bound - 1e-9 <= best.cost <= cut.cost + 1e-9 and cut.lower_bound < best.cost - 1e-3
+        check_answer(problem, cut.tuples)
 
 
 @pytest.mark.parametrize("name", QUICK)

@@ -118,3 +118,33 @@ def test_ctrl_c_in_a_conversion_is_a_keyboard_interrupt():
                 assoc.assign(problem, "interrupted")
         finally:
             del registry._REGISTERED["interrupted"]
+
+
+@pytest.mark.parametrize(
+    "solver, name, values",
+    [
+        *((solver, "refinement", ("some", 1, None)) for solver in ("aco", "genetic", "tabu")),
+        *((solver, "workers", (0, -1, 1001, 1.5, True)) for solver in ("aco", "genetic", "tabu")),
+        *((solver, "clusters", (0, 10**20, 2.5)) for solver in ("aco", "genetic", "tabu")),
+        ("aco", "divers", (-1, 10**20, "two")),
+        ("genetic", "population", (1, 10**20)),
+        ("genetic", "tournament", (0, 21)),
+        ("tabu", "tenure", (-1, 10**20)),
+        ("tabu", "moves", (0, 10**20)),
+    ],
+)
+def test_parameters_of_metaheuristics_out_of_range(solver, name, values):
+    """One line, before anything is searched: kernels know whole numbers of 64 bits."""
+    problem = assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1])
+    for value in values:
+        with pytest.raises(assoc.InvalidInputError, match=f"{name}: expected"):
+            assoc.assign(problem, solver, **{name: value})
+
+
+def test_memory_of_a_population_is_that_of_all_workers():
+    parameters = assoc.solvers.parameters("genetic")
+    one, several = (parameters(population=1000, workers=workers).memory(10, 10) for workers in (1, 8))
+    assert several[0] >= 8 * one[0] and "workers = 8" in several[1] and several[2].endswith("or fewer workers")
+    for solver in ("aco", "tabu"):
+        parameters = assoc.solvers.parameters(solver)
+        assert parameters().memory(10, 10) is None and parameters(workers=1000).memory(10, 10)[0] > 1e9

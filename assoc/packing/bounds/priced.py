@@ -65,7 +65,7 @@ class Priced:
     def sharpen(self, run: Run) -> None:
         """Take the multipliers of the linear program itself, where there is memory for it."""
         packing = self.packing
-        if not run.memory_allows(LinearProgram.memory(packing.num_columns, packing.num_rows)):
+        if not run.memory_allows(LinearProgram.memory(packing)):
             return
         duals = LinearProgram(packing).solve(duals=self.duals, deadline=run.deadline()).duals
         hard_pass(packing, duals)

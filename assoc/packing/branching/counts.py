@@ -56,13 +56,13 @@ class _Counts(NamedTuple):
 
     Attributes
     ----------
-    times : int8 array, shape (C, N)
+    times : int32 array, shape (C, N)
         What each column adds to each count.
     least, most : int64 arrays, shape (C,)
         The range, both ends included.
     """
 
-    times: NDArray[np.int8]
+    times: NDArray[np.int32]
     least: NDArray[np.int64]
     most: NDArray[np.int64]
 
@@ -114,15 +114,20 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
     everything = _counts_of(packing)
     counted = _Counted(root, everything, cutoff, deadline)
     parts = _split(counted, everything, min(goal, counted.effort.cutoff))
-    ranges = [part.counts for part in parts]
     used = np.zeros(len(everything.times), dtype=np.bool_)
-    for one in ranges:
-        used |= (one.least > everything.least) | (one.most < everything.most)
+    for part in parts:
+        used |= (part.counts.least > everything.least) | (part.counts.most < everything.most)
     # the rows of counts that no leaf is about would only make programs larger
     counted = _Counted(root, everything.only(used), cutoff, deadline)
-    solved = [counted.part(one.only(used)).leaf for one in ranges]
-    # a second solution may stop short of the first one's bound
-    leaves = [new._replace(bound=max(new.bound, part.leaf.bound)) for new, part in zip(solved, parts, strict=True)]
+    leaves = []
+    for part in parts:
+        if is_over(deadline):
+            # each takes a factorisation; those of before hold as well
+            leaves = [part.leaf for part in parts]
+            break
+        again = counted.part(part.counts.only(used)).leaf
+        # a second solution may stop short of the first one's bound
+        leaves.append(again._replace(bound=max(again.bound, part.leaf.bound)))
     return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
 
 
@@ -150,7 +155,7 @@ def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
 
 def most_counts(packing: Packing) -> int:
     """Counts at the most."""
-    return packing.cols.shape[1] + 1
+    return packing.num_sensors + 1
 
 
 def _counts_of(packing: Packing) -> _Counts:
@@ -165,7 +170,7 @@ def _counts_of(packing: Packing) -> _Counts:
         most.append(rows // 2)
     times.append(sizes)
     most.append(rows)
-    return _Counts(np.array(times, dtype=np.int8), np.zeros(len(most), dtype=np.int64), np.array(most, dtype=np.int64))
+    return _Counts(np.array(times, dtype=np.int32), np.zeros(len(most), dtype=np.int64), np.array(most, dtype=np.int64))
 
 
 class _Counted:
@@ -228,6 +233,8 @@ def _best_split(counted: _Counted, part: _Part, goal: float) -> list[_Part] | No
         least, most = int(part.counts.least[k]), int(part.counts.most[k])
         if not (_WHOLE < value - below < 1.0 - _WHOLE and least <= below < most):
             continue
+        if is_over(counted.effort.deadline):
+            return None
         ranges = part.counts.within(k, least, below), part.counts.within(k, below + 1, most)
         sides = [counted.part(one, part) for one in ranges]
         trees = sum(max((goal - side.leaf.bound) / (goal - bound), 0.0) ** _POWER for side in sides)

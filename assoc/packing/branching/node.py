@@ -71,10 +71,10 @@ class Work(NamedTuple):
     limit: float
 
 
-def work_memory(rows: float, columns: int) -> float:
+def work_memory(rows: float, columns: int, sensors: int) -> float:
     """Bytes that `new_work` takes: an inverse by columns and by rows, those kept, and what is known of pairs."""
-    # of a column: two lists for pricing, masks, and its rows, of up to eight sensors
-    return 34.0 * rows * rows + kept_memory(rows) + 200.0 * columns
+    # of a column: two lists for pricing, masks, and its rows, in the program and in two orders for pricing
+    return 34.0 * rows * rows + kept_memory(rows) + (200.0 + 12.0 * max(sensors - 8, 0)) * columns
 
 
 def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:

@@ -146,10 +146,7 @@ class BranchAndBound:
 
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
-        rows, columns = float(self._packing.num_rows), self._packing.num_columns
-        if self._to_the_end:
-            rows = MOST_ROWS * rows + 2 * most_counts(self._packing)
-        if not self._memory_allows(work_memory(rows, columns)):
+        if not self._memory_allows(self._room()):
             self._open.give_up()
             return False
         root = self._root
@@ -160,6 +157,13 @@ class BranchAndBound:
             self._set_aim()
         self._work = new_work(self._packing.arrays, root.program, root.slack)
         return True
+
+    def _room(self) -> float:
+        """Bytes that a search takes, with all the cuts and counts that it may have."""
+        rows = float(self._packing.num_rows)
+        if self._to_the_end:
+            rows = MOST_ROWS * rows + 2 * most_counts(self._packing)
+        return work_memory(rows, self._packing.num_columns, self._packing.num_sensors)
 
     @property
     def _least_waiting(self) -> float:
@@ -199,9 +203,8 @@ class BranchAndBound:
             return False
         # where no split pays, one may with a better incumbent or another aim
         self._split_at = 2 * self.nodes
-        rows = MOST_ROWS * self._packing.num_rows + 2 * most_counts(self._packing)
         # the room of the search so far and that of another one
-        if not self._memory_allows(2.0 * work_memory(rows, self._packing.num_columns)):
+        if not self._memory_allows(2.0 * self._room()):
             return False
         cutoff, bound = self.weight - self.tolerance, self._root_bound
         goal = min(bound + _FARTHER * (self._aim - bound), cutoff)

@@ -128,7 +128,10 @@ class Component(Priced):
     @property
     def temperature(self) -> float:
         """Scale of the reduced costs that matter: a share of the gap, at most of the weights' spread."""
-        widest = max(0.02 * float(np.ptp(self.packing.weights)), 1e-12)
+        weights = self.packing.weights
+        # weights that are all alike have no spread, and a size all the same
+        spread = float(np.ptp(weights)) or abs(float(weights[0]))
+        widest = max(0.02 * spread, 1e-12)
         if self.weight < np.inf:
             return min(max((self.weight - self.bound) / 4.0, TOLERANCE * max(1.0, abs(self.bound))), widest)
         return widest

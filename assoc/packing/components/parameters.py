@@ -39,6 +39,14 @@ class SearchParameters(Parameters):
     workers: int = field(default=1, metadata={"help": "searches at a time, on threads, that exchange their best"})
 
     def __post_init__(self) -> None:
-        self._whole("iterations", "patience", "clusters")
+        self._whole("iterations", "patience")
+        self._whole("clusters", most=100_000)
         self._whole("workers", most=1000)
         self._require(self.refinement in REFINEMENTS, "refinement", ", ".join(REFINEMENTS))
+
+    def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
+        """A stack for each further worker, and a copy of what searches keep."""
+        if self.workers == 1:
+            return None
+        needed = (10e6 + 200.0 * num_columns) * (self.workers - 1)
+        return needed, f"workers = {self.workers}", "take fewer workers"

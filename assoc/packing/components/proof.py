@@ -19,6 +19,8 @@ from assoc.packing.run import Run
 # nodes of the proof of what a metaheuristic leaves open, and of the search beside it, after each of its iterations
 _PROOF_NODES = 2000
 _NODES = 10
+# nodes times columns between two looks at the user
+_AT_ONCE = 20_000
 # rows for which the search beside it pays: fewer are bounded before, and with more it seldom ends in time
 _LEAST, _MOST = 30, 150
 
@@ -52,7 +54,9 @@ class Branching:
         search.weight = min(search.weight, component.weight)
         search.run(_NODES)
         if search.columns is not None and search.weight < component.weight:
-            component.offer(Cover.of(component.packing, search.columns).owner, search.weight)
+            # where it is better by less than the tolerance, too: a search that ended so has proved this cover alone
+            owner = Cover.of(component.packing, search.columns).owner
+            component.best, component.weight = owner, component.weight_of(owner)
         component.proven = max(component.proven, min(search.lower_bound, component.weight))
 
 
@@ -65,8 +69,10 @@ def bound_of_component(component: Component, run: Run) -> float:
     if run.should_stop():
         return max(component.bound, component.proven)
     search = _search(component, run)
+    # kernels do not hear Ctrl-C: few nodes at a time where each takes long
+    at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
-        search.run(50)
+        search.run(at_once)
     return min(max(component.bound, component.proven, search.lower_bound), component.weight)
 
 

@@ -59,6 +59,9 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     for one in components:
         one.iterations, one.stalled = whole.iterations, whole.stalled
         one.deadline, one.refinement = whole.deadline, whole.refinement
+    if len(components) == 1:
+        # no better cover went with the columns
+        components[0].proven = whole.proven
     return components
 
 

@@ -61,12 +61,14 @@ class Team:
             self._members = [(component, make(component, run.rng), run)]
             return
         self._members = []
-        for number, rng in enumerate(run.rng.spawn(workers)):
+        # from what it draws, and not Generator.spawn: that counts how often it was called, and knows no state set later
+        seeds = np.random.SeedSequence(run.rng.integers(2**63, size=4).tolist()).spawn(workers)
+        for number, rng in enumerate(map(np.random.default_rng, seeds)):
             # a cover of its own, too: it is refined in place
             best = None if component.best is None else component.best.copy()
             own = replace(component, best=best, worker=number, _searches={}, _diver=None)
             # a run of its own: the same clock, another generator
-            aside = Run(rng, time_limit=run.time_limit, started=run.started)
+            aside = Run(rng, time_limit=run.time_limit, started=run.started, reserve=run.reserve)
             self._members.append((own, make(own, rng), aside))
 
     def iterate(self) -> None:

@@ -30,9 +30,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assoc._system.clock import is_over
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
-from assoc.packing.branching.counts import are_whole, split_on_counts
+from assoc.packing.branching.counts import are_whole, most_counts, split_on_counts
 from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.neighbourhoods.cover import own_all
@@ -101,7 +102,7 @@ class Diver:
         if not _LEAST <= packing.num_rows <= _MOST:
             return False
         # with the mark of the root
-        return memory_allows(2.0 * LinearProgram.memory(packing.num_columns, packing.num_rows))
+        return memory_allows(2.0 * LinearProgram.memory(packing))
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
@@ -149,16 +150,18 @@ class Diver:
     def _split(self, cutoff: float, deadline: float) -> list[_Start]:
         """The programs of the parts of the solutions, where a split on counts pays and there is memory for them."""
         core, relaxed = self._core, self._all.relaxed
-        if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal):
+        each = 2.0 * LinearProgram.memory(core, 2 * most_counts(core))
+        if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal) or not memory_allows(each):
             return []
         leaves = split_on_counts(core, plain_root(core, relaxed.duals), cutoff, cutoff, deadline)
         # without rows of counts there is but the program of all solutions; with them, each has the mark of its root
         leaves = [leaf for leaf in leaves if leaf.root.slack.size > core.num_rows]
-        room = sum(2.0 * LinearProgram.memory(core.num_columns, leaf.root.slack.size) for leaf in leaves)
-        if not memory_allows(room):
+        if not memory_allows(each * len(leaves)):
             return []
-        parts = []
+        parts: list[_Start] = []
         for leaf in leaves:
+            if is_over(deadline):
+                break
             root = leaf.root
             basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
             program = LinearProgram.extended(core, root.program, root.slack, basis)

@@ -102,9 +102,11 @@ class LinearProgram:
         return self
 
     @staticmethod
-    def memory(columns: int, rows: int) -> float:
-        """Bytes that the program of a packing takes."""
-        return 8.0 * rows * rows + 120.0 * columns
+    def memory(packing: Packing, more_rows: int = 0) -> float:
+        """Bytes that the program of a packing takes, and that of one with further rows."""
+        rows = float(packing.num_rows + more_rows)
+        # a column's rows stand in the program and in two orders for pricing
+        return 8.0 * rows * rows + (120.0 + 12.0 * max(packing.num_sensors - 8, 0)) * packing.num_columns
 
     def solve(
         self,

@@ -27,8 +27,11 @@ class Cycle(NamedTuple):
     rows : int array, shape (r,)
         Rows of the packing whose staying uncovered is a node; the last r nodes.
     pheromone, visibility, probability : float arrays, shape (n + r,)
-        tau_j, eta_j, and p_j of eq. 8, of the first ant of the next cycle. Mode paper: where all nodes are allowed.
-        Mode mmas: at a row of which all columns still fit; of a column the mean over its rows.
+        tau_j, eta_j, and p_j of eq. 8, of the first ant of the next cycle (unless something better is found in between,
+        which makes ants stricter). Mode paper: where all nodes are allowed. Mode mmas: at a row of which all columns
+        still fit; of a column the mean over its rows.
+    tuples : int32 array, shape (n + r, S), or None
+        The tuple of the problem that each node is, as ``assign`` tells it; solvers do not know.
     """
 
     number: int
@@ -37,6 +40,35 @@ class Cycle(NamedTuple):
     pheromone: Floats
     visibility: Floats
     probability: Floats
+    tuples: NDArray[np.int32] | None = None
+
+
+def tuples_of(
+    tuples: NDArray[np.int32],
+    sizes: NDArray[np.integer],
+    packing: Packing,
+    columns: NDArray[np.int64],
+    rows: NDArray[np.int64],
+) -> NDArray[np.int32]:
+    """Return the tuples of nodes.
+
+    Parameters
+    ----------
+    tuples : int32 array, shape (M, S)
+        Of the problem from which the packing was made.
+    sizes : int array, shape (S,)
+        Measurements of each of its sensors.
+    packing : Packing
+    columns, rows : int arrays
+        Columns, and rows that stay uncovered: false alarms.
+    """
+    starts = np.cumsum(sizes) - sizes
+    through = packing.row_origin[rows]
+    # sensors without measurements start where the next one does
+    sensor = np.searchsorted(starts, through, side="right") - 1
+    alone = np.zeros((rows.size, sizes.size), dtype=np.int32)
+    alone[np.arange(rows.size), sensor] = through - starts[sensor] + 1
+    return np.concatenate([tuples[packing.origin[columns]], alone])
 
 
 def cycle_of(whole: Packing, component: Component, colony: Colony) -> Cycle:

@@ -66,7 +66,9 @@ class Colony:
         inserts, deadline = component.inserts, component.deadline
         owner, _ = walk(component.arrays, component.prices, trail, p.ants, inserts, rng, deadline)
         weight = component.settle(owner, rng, p.clusters)
-        for _ in range(p.divers if component.dives else 0):
+        for _ in range(p.divers):
+            if not component.dives:
+                break
             other = component.dive(self.dives, rng, self.pheromone**p.alpha, p.beta)
             self.dives += 1
             reached = component.settle(other, rng, p.clusters)

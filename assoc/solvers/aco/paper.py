@@ -42,7 +42,8 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     InfeasibleError
         No ant completed a tour (possible only without dummies).
     """
-    nodes, costs = nodes_of(packing)
+    alone = false_alarms(packing)
+    nodes, costs = nodes_of(packing, alone)
     if costs.size == 0:
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0)
     positive = transformed(costs, parameters.visibility, parameters.scale)
@@ -56,6 +57,9 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     cycle, cut_off = 0, False
     while cycle < parameters.iterations:
         if cycle > 0:
+            if not lengths.all():
+                # time was over before every ant had walked
+                break
             starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
         probability = pheromone**parameters.alpha * visibility**parameters.beta  # numerator of eq. 8
         value = visibility if cycle == 0 else probability
@@ -71,8 +75,8 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
         _lay(pheromone, positive, tours, lengths, parameters.rho)
         if run.watch is not None:
             value = pheromone**parameters.alpha * visibility**parameters.beta
-            columns, rows = np.arange(packing.num_columns), np.flatnonzero(packing.slack)
-            run.watch(Cycle(cycle, columns, rows, pheromone.copy(), visibility, value / value.sum()))
+            columns = np.arange(packing.num_columns)
+            run.watch(Cycle(cycle, columns, alone, pheromone.copy(), visibility, value / value.sum()))
         if (owners == owners[0]).all() or run.should_stop():
             break
     else:
@@ -90,12 +94,16 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     return Outcome(best, cycle, bound, duals)
 
 
-def nodes_of(packing: Packing) -> tuple[NDArray[np.int32], Floats]:
-    """Rows of the nodes, first the packing's columns, then a false alarm for each row with slack; their costs."""
-    free = np.flatnonzero(packing.slack)
-    alone = np.full((free.size, packing.cols.shape[1]), -1, dtype=np.int32)
-    alone[:, 0] = free
-    return np.concatenate([packing.cols, alone]), np.concatenate([packing.weights, np.zeros(free.size)])
+def false_alarms(packing: Packing) -> NDArray[np.int64]:
+    """Rows that may be false alarms: none without dummies, where rows that stay uncovered are no choice of an ant."""
+    return np.zeros(0, dtype=np.int64) if packing.is_axial else np.arange(packing.num_rows)
+
+
+def nodes_of(packing: Packing, alone: NDArray[np.int64]) -> tuple[NDArray[np.int32], Floats]:
+    """Rows of the nodes, first the packing's columns, then those of one row alone; their costs."""
+    singles = np.full((alone.size, packing.cols.shape[1]), -1, dtype=np.int32)
+    singles[:, 0] = alone
+    return np.concatenate([packing.cols, singles]), np.concatenate([packing.weights, np.zeros(alone.size)])
 
 
 def transformed(costs: Floats, kind: str, scale: float) -> Floats:

@@ -61,5 +61,5 @@ class AcoParameters(SearchParameters):
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
         """In mode paper: the ants' tours, and the owners of rows from which they are made."""
         if self.mode != "paper":
-            return None
+            return super().memory(num_columns, num_rows)
         return 8.0 * self.ants * num_rows, f"ants = {self.ants} on {num_rows} measurements", "take fewer ants"

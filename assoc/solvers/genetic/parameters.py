@@ -34,6 +34,10 @@ class GeneticParameters(SearchParameters):
         self._require(good, "tournament", "a whole number from 1 to population")
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """The members in a list, and again as an array."""
+        """The members in a list, and again as an array, of every worker."""
         what = f"population = {self.population} on {num_rows} measurements"
-        return 8.0 * self.population * num_rows, what, "take a smaller population"
+        members = 8.0 * self.population * num_rows * self.workers
+        threads = super().memory(num_columns, num_rows)
+        if threads is None:
+            return members, what, "take a smaller population"
+        return members + threads[0], f"{what} with {threads[1]}", f"take a smaller population, or {threads[2][5:]}"

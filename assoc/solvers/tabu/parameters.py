@@ -28,4 +28,5 @@ class TabuParameters(SearchParameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._whole("tenure", least=0, most=1_000_000)
-        self._whole("moves", "restart")
+        self._whole("moves", most=100_000)
+        self._whole("restart")

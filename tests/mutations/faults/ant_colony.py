@@ -95,6 +95,13 @@ FAULTS = (
         "                        fits = j != node\n",
         _OF_PAPER,
     ),
+    Fault(
+        "what stays uncovered is a choice where there are no false alarms",
+        _PAPER,
+        "np.zeros(0, dtype=np.int64) if packing.is_axial",
+        "np.flatnonzero(packing.slack) if packing.is_axial",
+        _OF_PAPER,
+    ),
     Fault("the last best tour wins, not the cheapest", _PAPER, "if walked[k] < best_weight:", "if True:", _OF_PAPER),
     # mode mmas
     Fault(
@@ -157,6 +164,16 @@ FAULTS = (
     Fault("all ants are equally strict", _WALK, "2.0 ** (ant % 10)", "1.0", _OF_COLONY),
     Fault("no row stays uncovered", _WALK, "            if draw < 0.0:\n                continue\n", "", _OF_COLONY),
     Fault("the last ant wins, not the best", _WALK, "if weight < best_weight:", "if True:", _OF_COLONY),
+    Fault(
+        "the visibility that is told is constant",
+        _CYCLE,
+        "seen = np.exp(-component.reduced / component.temperature)",
+        "seen = np.ones_like(component.reduced)",
+        _OF_COLONY,
+    ),
+    Fault("divers know no pheromone", _COLONY, "rng, self.pheromone**p.alpha, p.beta", "rng, None, p.beta", _OF_COLONY),
+    Fault("what a diver found lays no pheromone", _COLONY, "owner, weight = other, reached", "pass", _OF_COLONY),
+    Fault("divers go on when time is over", _COLONY, "if not component.dives:", "if self.dives >= 10:", _OF_COLONY),
     Fault(
         "p_j without the visibility",
         _CYCLE,

@@ -9,6 +9,7 @@ _BREEDING = "assoc/solvers/genetic/population.py"
 _TABU = "assoc/solvers/tabu/moves.py"
 _SEARCH = "assoc/packing/components/search.py"
 _TEAM = "assoc/packing/components/team.py"
+_SPLITTING = "assoc/packing/components/splitting.py"
 _DIVER = "assoc/packing/neighbourhoods/diving.py"
 _COMPONENT = "assoc/packing/components/component.py"
 _SIMPLEX = "assoc/packing/simplex/dual.py"
@@ -64,6 +65,36 @@ FAULTS = (
     ),
     Fault("workers do not exchange", _TEAM, "own.offer(whole.best, whole.weight)", "pass", _OF_SEARCH),
     Fault("what other workers find is lost", _TEAM, "whole.offer(own.best, own.weight)", "pass", _OF_SEARCH),
+    Fault("workers use a seed up", _TEAM, "map(np.random.default_rng, seeds)", "run.rng.spawn(workers)", _OF_SEARCH),
+    Fault("what was proved is forgotten", _SPLITTING, "components[0].proven = whole.proven", "pass", _OF_SEARCH),
+    Fault(
+        "a search beside that ended does not close its component",
+        "assoc/packing/components/proof.py",
+        "component.best, component.weight = owner, component.weight_of(owner)",
+        "component.offer(owner, search.weight)",
+        _OF_SEARCH,
+    ),
+    Fault(
+        "weights that are all alike have no size",
+        _COMPONENT,
+        "float(np.ptp(weights)) or abs(float(weights[0]))",
+        "float(np.ptp(weights))",
+        _OF_SEARCH,
+    ),
+    Fault(
+        "columns of many rows are miscounted",
+        _COUNTS,
+        "np.array(times, dtype=np.int32)",
+        "np.array(times, dtype=np.int8)",
+        _OF_COUNTS,
+    ),
+    Fault(
+        "parts are forgotten when time ends",
+        _COUNTS,
+        "            leaves = [part.leaf for part in parts]\n",
+        "",
+        _OF_COUNTS,
+    ),
     Fault("workers draw the same numbers", _TEAM, "Run(rng, time_limit", "Run(0, time_limit", _OF_SEARCH),
     Fault(
         "a colony learns nothing from others",
@@ -142,7 +173,7 @@ FAULTS = (
     Fault(
         "what a diver fixed is not excluded", _DIVER, "row_ptr[r + 1]]] = False", "row_ptr[r + 1]]] = True", _OF_DIVES
     ),
-    Fault("no ant dives", _COLONY, "p.divers if component.dives else 0", "0", _OF_DIVES),
+    Fault("no ant dives", _COLONY, "for _ in range(p.divers):", "for _ in range(0):", _OF_DIVES),
     Fault(
         "a cover that is worse is kept",
         _COMPONENT,
@@ -198,9 +229,7 @@ FAULTS = (
         "place = a if bits[a] == most else place",
         _OF_EXTREMES,
     ),
-    Fault(
-        "only the last is looked at", _EXTREMES, "least = min(least, bits[a])", "least = bits[a]", _OF_EXTREMES
-    ),
+    Fault("only the last is looked at", _EXTREMES, "least = min(least, bits[a])", "least = bits[a]", _OF_EXTREMES),
     Fault(
         "columns are priced by the rows of one sensor less",
         _PRICING,
