@@ -250,7 +250,7 @@ def _axial_cases(quick: bool) -> Iterator[Case]:
     # 60 instances of the sizes of Balas and Saltzman, heuristics on three sizes
     for n in range(4, 27, 2):
         ours: tuple[Entry, ...] = _entries(("exact",), 60.0)
-        peers: tuple[Entry, ...] = _entries(("highs",), 60.0)
+        peers: tuple[Entry, ...] = _entries(("highs", "scip_1"), 60.0)
         if n in limits:
             ours += _entries((*HEURISTICS, "lagrangian", "greedy"), limits[n])
             peers += (Entry("cp_sat", 30.0), *_entries(("sequential", "nrl_tracker"), limits[n]))
