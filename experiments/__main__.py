@@ -169,6 +169,11 @@ EXPERIMENTS = (
         "one scan from its measurements to a proven answer, part by part",
         "docs/which_solver.md (a scan); with --publish experiments/results/scan_time.json",
     ),
+    Experiment(
+        "linear_programs",
+        "linear programs of our simplex method and of HiGHS",
+        "docs/solvers.md (dual bound); with --publish experiments/results/linear_programs.json",
+    ),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),
 )

@@ -121,12 +121,18 @@ def convergence(figure: Any) -> None:
 
 
 def pheromone(figure: Any) -> None:
-    """Draw how the ants of the paper agree on a tour."""
+    """Draw what the ants of the paper see, how they agree on a tour, and what both say of the next draw."""
     from assoc.plotting import plot_pheromone
     from assoc.solvers import pheromone
 
     problem = assoc.build_problem(simulate("crowd", 0, targets=8, scans=1), 0)
-    plot_pheromone(pheromone(problem, mode="paper", rho=0.9), ax=figure.subplots())
+    figure.set_size_inches(7, 8.4)
+    history = pheromone(problem, mode="paper", rho=0.9)
+    for axes, of in zip(figure.subplots(3), ("visibility", "pheromone", "probability"), strict=True):
+        plot_pheromone(history, of=of, nodes=12, ax=axes)
+        axes.set(xlabel="cycle (number)" if of == "probability" else "", ylabel="tuple")
+        # one for the three, where it is in nothing's way
+        axes.legend(loc="lower left", fontsize=8) if of == "visibility" else axes.get_legend().remove()
 
 
 def heat_map(figure: Any) -> None:

@@ -6,7 +6,7 @@ so that "each measurement in exactly one tuple" is one integer comparison.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -137,8 +137,18 @@ def marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
     return result
 
 
-def milp_optimum(problem: AssignmentProblem, time_limit: float = 60.0) -> float:
+def milp_optimum(
+    problem: AssignmentProblem, time_limit: float = 60.0, forbidden: Sequence[NDArray[np.integer]] = ()
+) -> float:
     """Optimal cost by HiGHS through scipy, gap 1e-9 (0 would mean "the default, 1e-4").
+
+    Parameters
+    ----------
+    problem : AssignmentProblem
+    time_limit : float
+        Seconds.
+    forbidden : sequence of int arrays
+        Solutions that do not count, each by the places of its tuples in the problem.
 
     Raises
     ------
@@ -157,11 +167,15 @@ def milp_optimum(problem: AssignmentProblem, time_limit: float = 60.0) -> float:
     row = offsets[sensor] + problem.tuples[column, sensor] - 1
     matrix = csc_array((np.ones(row.size), (row, column)), shape=(int(offsets[-1]), problem.num_tuples))
     must = np.repeat(problem.dummy | (sizes == sizes.min()), sizes)
+    constraints = [LinearConstraint(matrix, np.where(must, 1.0, 0.0), 1.0)]
+    if len(forbidden):
+        taken = np.array([np.isin(np.arange(problem.num_tuples), one) for one in forbidden], dtype=np.float64)
+        constraints.append(LinearConstraint(taken, ub=taken.sum(axis=1) - 1.0))
     result = milp(
         problem.costs,
         integrality=np.ones(problem.num_tuples, dtype=np.int64),
         bounds=Bounds(0, 1),
-        constraints=LinearConstraint(matrix, np.where(must, 1.0, 0.0), 1.0),
+        constraints=constraints,
         options={"mip_rel_gap": 1e-9, "time_limit": time_limit},
     )
     if result.status == 2:

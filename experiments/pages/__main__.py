@@ -23,7 +23,7 @@ TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "start.md": measured.START,
     "dependencies.md": measured.DEPENDENCIES,
     "sweeps.md": measured.SWEEPS,
-    "solvers.md": metaheuristics.SOLVERS,
+    "solvers.md": {**measured.SOLVERS, **metaheuristics.SOLVERS},
     "which_solver.md": {**benchmarks.WHICH_SOLVER, **measured.WHICH_SOLVER},
     "ant_colony.md": metaheuristics.ANT_COLONY,
     "concepts.md": measured.CONCEPTS,

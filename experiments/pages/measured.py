@@ -161,6 +161,16 @@ def scan_time() -> str:
     return table(["ms", "both", *parts[1:], "HiGHS / exact"], rows)
 
 
+def linear_programs() -> str:
+    """Times of our simplex method, and ratios of HiGHS's to them."""
+    r = Results("linear_programs")
+    kinds = [c.quantity.split(": ")[0] for c in r.claims if c.quantity.endswith(": rows")]
+    what = [c.quantity.split(": ")[1] for c in r.claims if c.quantity.startswith(f"{kinds[0]}: ")]
+    heads = [f"{one}, ms" if one.startswith("ours") else one for one in what]
+    rows = [[kind, *(number(r[f"{kind}: {one}"].ours) for one in what)] for kind in kinds]
+    return table(["", *heads], rows)
+
+
 def first_call() -> str:
     """What a user waits for: an empty cache in a clone, a wheel with kernels, the cache of the run before."""
     if not result_file("cold_start").exists():
@@ -315,6 +325,7 @@ FILTERS = {
 RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
 START = {"first-call": first_call}
+SOLVERS = {"linear-programs": linear_programs}
 WHICH_SOLVER = {"scan-time": scan_time}
 DEPENDENCIES = {"sizes": sizes}
 CONCEPTS = {"prior": prior}

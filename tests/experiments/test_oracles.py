@@ -55,6 +55,19 @@ def test_dense_dummy_problem_has_the_right_number_of_solutions() -> None:
     assert len(oracles.all_solutions(two)) == expected
 
 
+def test_the_next_best_is_the_optimum_once_those_before_are_forbidden() -> None:
+    seen = 0
+    for problem in oracles.small_problems(60, seed=2):
+        ranked = oracles.all_solutions(problem)
+        if not 4 <= len(ranked) or len({tuple(row) for row in problem.tuples.tolist()}) < problem.num_tuples:
+            continue
+        known = [tuple(row) for row in problem.tuples.tolist()]
+        forbidden = [np.array([known.index(one) for one in solution.tuples]) for solution in ranked[:3]]
+        assert oracles.milp_optimum(problem, forbidden=forbidden) == pytest.approx(ranked[3].cost, abs=1e-7)
+        seen += 1
+    assert seen > 10
+
+
 @pytest.mark.slow
 def test_oracles_agree_and_answers_check() -> None:
     shapes, infeasible = set(), 0
