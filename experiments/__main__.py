@@ -174,6 +174,11 @@ EXPERIMENTS = (
         "linear programs of our simplex method and of HiGHS",
         "docs/solvers.md (dual bound); with --publish experiments/results/linear_programs.json",
     ),
+    Experiment(
+        "ghost_rankings",
+        "the ten best of ghost scenes, with proof",
+        "docs/which_solver.md (rankings); with --publish experiments/results/ghost_rankings.json",
+    ),
     Experiment("long_runs", "memory and time of runs that last for days", "docs/reliability.md (long runs)"),
     Experiment("gallery", "the pictures of the documentation", "docs/images"),
 )

@@ -161,6 +161,23 @@ def scan_time() -> str:
     return table(["ms", "both", *parts[1:], "HiGHS / exact"], rows)
 
 
+def ghost_rankings() -> str:
+    """The ten best of ghost scenes: seconds, and what is proved."""
+    r = Results("ghost_rankings")
+    kinds = [c.quantity.removesuffix(": scenes") for c in r.claims if c.quantity.endswith(": scenes")]
+    times = ("kbest, median", "kbest, longest", "marginals, median", "marginals, longest")
+    rows = []
+    for kind in kinds:
+        claim = r[f"{kind}: proved"]
+        proved = f"{claim.ours:.0f} of {r[f'{kind}: scenes'].ours:.0f}"
+        proved = proved if claim.holds else f"**{proved}**"
+        rows.append([
+            kind, proved, *(_judged(r[f"{kind}: {one}"]) for one in times),
+            number(r[f"{kind}: widest interval, median"].ours, 2),
+        ])  # fmt: skip
+    return table(["", "proved", *(f"{one}, s" for one in times), "widest interval, median"], rows)
+
+
 def linear_programs() -> str:
     """Times of our simplex method, and ratios of HiGHS's to them."""
     r = Results("linear_programs")
@@ -326,7 +343,7 @@ RECORDINGS = {"traffic": traffic}
 SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
 START = {"first-call": first_call}
 SOLVERS = {"linear-programs": linear_programs}
-WHICH_SOLVER = {"scan-time": scan_time}
+WHICH_SOLVER = {"scan-time": scan_time, "ghost-rankings": ghost_rankings}
 DEPENDENCIES = {"sizes": sizes}
 CONCEPTS = {"prior": prior}
 TRACKING = {"warm-starts": warm_starts}

@@ -1,0 +1,157 @@
+"""The ten best associations of scenes full of ghosts, and the probabilities of tuples, each proved.
+
+    python -m experiments.ghost_rankings [--quick] [--only KIND ...] [--json FILE] [--figure FILE] [--publish]
+
+``kbest`` ranks ten solutions of scenes of three bearing-only sensors (the seeds of the benchmarks), also of those whose
+linear program is far below the optimum; ``marginals`` gives the probability of every tuple from as many. Rankings are
+cut after the last rank that is proved: one of ten is proved. On scenes of 20 targets HiGHS (scipy) then looks for
+something better with the ten forbidden: it must not find any. Processor time of one thread, pinned to a core, kernels
+compiled, from the candidate tuples on: building them counts, too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import assoc
+from assoc.costs import build_problem
+from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+from experiments.benchmarks import FIRST_SEED
+from experiments.benchmarks.families import WIDE_GAPS
+from experiments.benchmarks.run import one_core
+from experiments.common.claims import Claim
+from experiments.common.command import add_only, make_parser, run
+from experiments.common.instances import scenes
+from experiments.common.oracles import milp_optimum
+
+NAME, TITLE = "ghost_rankings", "The ten best associations of ghost scenes"
+K = 10
+SHOWN = ("median", "longest")
+# what a ranking may take before it is cut, and what HiGHS may take, seconds
+_LIMIT, _CHECK = 60.0, 30.0
+
+
+class Kind(NamedTuple):
+    """Scenes that are alike.
+
+    Attributes
+    ----------
+    targets : int
+    seeds : tuple of int
+    goal : float
+        Seconds that a ranking may take.
+    checked : bool
+        Whether HiGHS looks for something better.
+    """
+
+    targets: int
+    seeds: tuple[int, ...]
+    goal: float
+    checked: bool = False
+
+
+_PLAIN = tuple(range(FIRST_SEED, FIRST_SEED + 10))
+KINDS = {
+    "20 targets": Kind(20, _PLAIN, 5.0, checked=True),
+    "20 targets, linear program 1 % off": Kind(20, WIDE_GAPS[20], 5.0, checked=True),
+    "40 targets": Kind(40, _PLAIN, 60.0),
+    "40 targets, linear program 1 % off": Kind(40, WIDE_GAPS[40], 60.0),
+}
+
+
+def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    """What a call returns, and the processor time that it takes."""
+    begin = time.thread_time()
+    answer = call()
+    return answer, time.thread_time() - begin
+
+
+def nothing_better(problem: AssignmentProblem, ranking: list[Solution], limit: float) -> bool:
+    """Whether HiGHS ends, with these solutions forbidden.
+
+    Raises
+    ------
+    AssertionError
+        It found something better than the last of them.
+    """
+    try:
+        left = milp_optimum(problem, limit, forbidden=[solution.indices for solution in ranking])
+    except TimeoutError:
+        return False
+    last = ranking[-1].cost
+    if left < last - 1e-6 * max(1.0, abs(last)):
+        raise AssertionError(f"kbest left out a solution of cost {left!r}; the last one of {K} costs {last!r}")
+    return True
+
+
+def claims_of(name: str, kind: Kind, seeds: tuple[int, ...]) -> list[Claim]:
+    """Rank scenes of one kind."""
+    seconds, spent, unseen, proved, checked = [], [], [], 0, 0
+    for seed in seeds:
+        scene = scenes.ghost(kind.targets, seed)
+        ranking, taken = _timed(lambda scene=scene: assoc.kbest(build_problem(scene, 0), K, time_limit=_LIMIT))
+        seconds.append(taken)
+        proved += len(ranking) == K
+        marginals, taken = _timed(lambda scene=scene: assoc.marginals(build_problem(scene, 0), K, time_limit=_LIMIT))
+        spent.append(taken)
+        unseen.append(marginals.unseen)
+        if kind.checked and len(ranking) == K:
+            checked += nothing_better(build_problem(scene, 0), ranking, _CHECK)
+    claims = [
+        Claim(f"{name}: scenes", "", None, len(seeds)),
+        Claim(f"{name}: proved", "", None, proved, None, (len(seeds), None), source="goal chosen by us"),
+        Claim(f"{name}: kbest, median", "s", None, float(np.median(seconds))),
+        Claim(f"{name}: kbest, longest", "s", None, max(seconds), None, (None, kind.goal), source="goal chosen by us"),
+        Claim(f"{name}: marginals, median", "s", None, float(np.median(spent))),
+        Claim(f"{name}: marginals, longest", "s", None, max(spent)),
+        Claim(f"{name}: widest interval, median", "", None, float(np.median(unseen))),
+    ]
+    if kind.checked:
+        claims.append(Claim(f"{name}: HiGHS ended and found nothing better", "", None, checked))
+    return claims
+
+
+def experiment(quick: bool, kinds: list[str]) -> tuple[list[Claim], Any]:
+    """Rank scenes of these kinds."""
+    claims = []
+    with one_core():
+        # a scene that is not measured
+        scene = scenes.ghost(20, 0)
+        assoc.kbest(build_problem(scene, 0), K)
+        assoc.marginals(build_problem(scene, 0), K)
+        for name in kinds:
+            claims += claims_of(name, KINDS[name], KINDS[name].seeds[: 2 if quick else None])
+    by_quantity = {claim.quantity: claim.ours for claim in claims}
+    return claims, {name: [by_quantity[f"{name}: kbest, {one}"] for one in SHOWN] for name in kinds}
+
+
+def draw(figure: Any, shown: Any) -> None:
+    """Draw the median and the longest time of each kind."""
+    axes = figure.subplots()
+    places = np.arange(len(shown))
+    for number, words in enumerate(SHOWN):
+        values = [times[number] for times in shown.values()]
+        bars = axes.bar(places + 0.4 * number - 0.2, values, 0.38, label=words)
+        axes.bar_label(bars, [f"{value:.2g}" for value in values], fontsize=8)
+    axes.set_xticks(places, [name.replace(", ", "\n") for name in shown])
+    axes.set(ylabel="s", yscale="log")
+    axes.margins(y=0.15)
+    axes.legend()
+
+
+def program(arguments: list[str] | None = None) -> int:
+    """Run the measurement; returns its exit code."""
+    parser = make_parser(NAME, TITLE)
+    add_only(parser, list(KINDS))
+    chosen = parser.parse_args(arguments)
+    kinds = chosen.only or list(KINDS)
+    return run(parser, chosen, NAME, TITLE, lambda quick, _: experiment(quick, kinds), draw, (7, 4), __doc__)
+
+
+if __name__ == "__main__":
+    raise SystemExit(program())
