@@ -72,7 +72,7 @@ def add_only(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
     """Add the option that runs a part of what is compared; with --publish it replaces these rows of the result file."""
     parser.add_argument(
         "--only", nargs="+", choices=names, metavar="NAME",
-        help=f"run these alone; with --publish their rows of the file are replaced: {', '.join(names)}",
+        help=f"run these alone; with --publish their rows of the file are replaced: {', '.join(names).replace('%', '%%')}",
     )  # fmt: skip
 
 
