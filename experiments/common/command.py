@@ -70,9 +70,10 @@ def add_publish(parser: argparse.ArgumentParser, name: str) -> None:
 
 def add_only(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
     """Add the option that runs a part of what is compared; with --publish it replaces these rows of the result file."""
+    known = ", ".join(names).replace("%", "%%")
     parser.add_argument(
         "--only", nargs="+", choices=names, metavar="NAME",
-        help=f"run these alone; with --publish their rows of the file are replaced: {', '.join(names).replace('%', '%%')}",
+        help=f"run these alone; with --publish their rows of the file are replaced: {known}",
     )  # fmt: skip
 
 
