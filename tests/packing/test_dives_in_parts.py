@@ -18,6 +18,8 @@ from tests.solvers.pieces import component
 
 # what HiGHS finds (scipy.optimize.milp, mip_rel_gap=1e-9) for the problem of ``mixed``
 OPTIMUM = -328.2414815625
+# no cover is known
+NONE = np.zeros(0, dtype=np.int64)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,7 @@ def mixed():
 
 def test_dives_in_parts_find_what_the_others_do_not(mixed):
     """Without them, 60 dives end 0.4 per cent above the optimum."""
-    diver, rng, least = Diver(mixed, np.inf), np.random.default_rng(0), np.inf
+    diver, rng, least = Diver(mixed, NONE, np.inf), np.random.default_rng(0), np.inf
     for number in range(20):
         owner = diver.dive(np.ones(mixed.packing.num_columns), 4.0 * 2.0 ** (number % 4), rng, least, np.inf)
         if mixed.is_complete(owner):
@@ -42,7 +44,7 @@ def test_dives_in_parts_find_what_the_others_do_not(mixed):
 
 
 def test_dives_begin_by_turns_in_all_solutions_and_in_a_part(mixed):
-    diver = Diver(mixed, np.inf)
+    diver = Diver(mixed, NONE, np.inf)
     # two of three parts: the third one holds nothing below so high a bound
     diver._parts = [diver._all._replace(relaxed=replace(diver._all.relaxed, bound=b)) for b in (-5.0, -4.0, -1.0)]
     diver._dives = diving._BEFORE_PARTS + 1
@@ -53,21 +55,22 @@ def test_dives_begin_by_turns_in_all_solutions_and_in_a_part(mixed):
 
 def test_the_program_of_a_part_is_that_of_all_with_its_ranges(mixed, monkeypatch):
     """At its mark, and while a dive fixes columns: HiGHS finds the same bound."""
-    diver = Diver(mixed, np.inf)
+    diver = Diver(mixed, NONE, np.inf)
     core, cutoff = diver._core, OPTIMUM + 3.0
     parts = diver._split(cutoff, np.inf)
     assert len(parts) > 1
+    assert all(part.search._work.trials.gain is diver._all.search._work.trials.gain for part in parts)
     for part in parts:
-        program, fixed = part.program._program, []
+        program, fixed = part.program.program, []
         assert part.relaxed.bound >= diver._all.relaxed.bound - 1e-9
         assert part.relaxed.primal.size == part.relaxed.reduced.size == core.num_columns
-        assert part.relaxed.bound == pytest.approx(_highs(program, part.program._slack, core, fixed), abs=1e-6)
+        assert part.relaxed.bound == pytest.approx(_highs(program, part.program.slack, core, fixed), abs=1e-6)
         part.program.back()
         at = _Descent(core, part.program, part.relaxed, np.inf)
         for _ in range(3):
             if at.relaxed.status == OPTIMAL and at.fix(at.open_columns()[:2], 6.0, np.inf):
                 fixed = at.fixed.tolist()
-                least = _highs(program, part.program._slack, core, fixed)
+                least = _highs(program, part.program.slack, core, fixed)
                 assert at.relaxed.bound == pytest.approx(least, abs=1e-6)
         assert fixed
     # nothing is split where memory is short, and nothing where counts are whole
@@ -77,6 +80,15 @@ def test_the_program_of_a_part_is_that_of_all_with_its_ranges(mixed, monkeypatch
     whole = replace(diver._all.relaxed, primal=np.round(diver._all.relaxed.primal))
     diver._all = diver._all._replace(relaxed=whole)
     assert diver._split(cutoff, np.inf) == []
+
+
+def test_a_split_takes_a_share_of_the_time(mixed, monkeypatch):
+    """What is long on large programs leaves time for dives."""
+    diver, seen = Diver(mixed, NONE, np.inf), []
+    monkeypatch.setattr(diving, "split_on_counts", lambda *words: seen.append(words[-1]) or [])
+    monkeypatch.setattr(diving, "now", lambda: 100.0)
+    diver._split(0.0, 110.0)
+    assert seen == [pytest.approx(103.0)]
 
 
 def _highs(program, slack, core, fixed):

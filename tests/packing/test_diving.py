@@ -8,10 +8,13 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_matrix
 
 import assoc
+from assoc.packing.branching.depth_first import Limits
+from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
 from assoc.packing.run import Run
+from assoc.packing.simplex.dual import OPTIMAL
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.simulation import simulate
 from assoc.solvers.aco.max_min import Colony
@@ -20,7 +23,11 @@ from assoc.solvers.genetic.parameters import GeneticParameters
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
+from experiments.common.instances.synthetic import axial_known_optimum
 from tests.solvers.pieces import columns_of, component, cover_of, open_problem
+
+# no cover is known
+NONE = np.zeros(0, dtype=np.int64)
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +39,17 @@ def priced():
     return one
 
 
+@pytest.fixture
+def plain(priced, monkeypatch):
+    """Its diver, without cuts: programs of the packing alone are easily made anew."""
+    monkeypatch.setattr(diving, "root_with_cuts", lambda packing, duals, *_: plain_root(packing, duals))
+    return Diver(priced, NONE, np.inf)
+
+
 def dive(one, seed=0, *, trail=None, strictness=4.0, cutoff=np.inf):
     """Columns and weight of one dive."""
     trail = np.ones(one.packing.num_columns) if trail is None else trail
-    owner = Diver(one, np.inf).dive(trail, strictness, np.random.default_rng(seed), cutoff, np.inf)
+    owner = Diver(one, NONE, np.inf).dive(trail, strictness, np.random.default_rng(seed), cutoff, np.inf)
     columns = columns_of(owner)
     # a cover: no row twice, and each row's owner is a column that has it
     np.testing.assert_array_equal(owner, cover_of(one.packing, columns))
@@ -48,15 +62,15 @@ def test_dives_are_near_the_bound(priced):
     left = [dive(priced, seed)[1] - priced.bound for seed in range(8)]
     assert min(left) >= -1e-9
     # what is left to branch and bound at first is most of so small a component
-    assert Diver(priced, np.inf).share * priced.packing.num_rows >= 39.0
+    assert Diver(priced, NONE, np.inf).share * priced.packing.num_rows >= 39.0
     rng = np.random.default_rng(0)
     greedy = [priced.weight_of(priced.random_cover(8.0, rng)) - priced.bound for _ in range(20)]
     assert np.median(left) < 0.5 * np.median(greedy)
 
 
-def test_what_is_drawn_is_fixed(priced, monkeypatch):
+def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
     """Column after column: what was drawn stays whole in all programs that follow."""
-    diver = Diver(priced, np.inf)
+    diver = plain
     solve, masks = diver._all.program.solve, []
 
     def spy(**words):
@@ -78,9 +92,9 @@ def test_what_is_drawn_is_fixed(priced, monkeypatch):
     assert counts == sorted({*counts}), "each step fixes more rows"
 
 
-def test_pheromone_and_values_decide(priced, monkeypatch):
+def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     """The first draw has the probabilities of the docstring: counted over many dives."""
-    diver = Diver(priced, np.inf)
+    diver = plain
     core, primal = diver._core, diver._all.relaxed.primal
     open_columns = np.flatnonzero((primal > 1e-6) & (primal < 1.0 - 1e-6))
     # halves all of them in this program: other values tell more
@@ -108,11 +122,11 @@ def test_pheromone_and_values_decide(priced, monkeypatch):
     assert (np.abs(among - chance) <= 5.0 * np.sqrt(chance / second.size) + 2e-3).all()
 
 
-def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
+def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
     """As soon as nothing better can follow; what it has then is a cover still."""
     steps = []
     for cutoff in (np.inf, priced.bound + 1e-6):
-        diver = Diver(priced, np.inf)
+        diver = Diver(priced, NONE, np.inf)
         diver.share = diving._LOWEST
         solve, count = diver._all.program.solve, []
         monkeypatch.setattr(
@@ -121,6 +135,60 @@ def test_a_dive_ends_at_its_cutoff(priced, monkeypatch):
         diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), cutoff, np.inf)
         steps.append(len(count))
     assert 1 <= steps[1] < steps[0]
+
+
+def test_dives_begin_in_a_program_with_cuts(priced, plain):
+    """Its bound is nearer to the optimum, and its solution to whole numbers."""
+    root = plain._all.relaxed
+    diver = Diver.__new__(Diver)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diving, "root_with_cuts", root_with_cuts)
+        diver.__init__(priced, NONE, np.inf)
+    core = diver._core
+    best = _milp(core, np.ones(core.num_columns, dtype=bool), [])
+    assert root.bound + 0.01 < diver._all.relaxed.bound <= best + 1e-7
+    assert len(diver._root.sets) > 0
+
+
+def test_what_lies_near_the_bound_holds_the_cover_that_is_known(priced, monkeypatch):
+    """Where it held none, dives would find none."""
+    monkeypatch.setattr(diving, "_CORE", 2)
+    owner = priced.random_cover(1.0, np.random.default_rng(0))
+    assert priced.is_complete(owner)
+    known = np.array(columns_of(owner))
+    without = Diver(priced, NONE, np.inf)._core
+    assert not np.isin(known, without.origin).all()
+    core = Diver(priced, known, np.inf)._core
+    assert np.isin(known, core.origin).all() and core.num_columns < priced.packing.num_columns
+
+
+def test_the_core_is_what_the_program_with_cuts_would_take(monkeypatch):
+    """As chosen by the multipliers without cuts it lacks the optimum; in the end no column is missing."""
+    problem, optimum = axial_known_optimum(14, 1)
+    one = component(problem, "full")
+    one.sharpen(Run(0))
+    one.offer_greedy()
+    assert optimum < one.weight
+    monkeypatch.setattr(diving, "_CORE", 4)
+    bounds, least = [], []
+    for rounds in (1, 3):
+        monkeypatch.setattr(diving, "_ROUNDS", rounds)
+        diver = Diver(one, one.best_columns(), np.inf)
+        bounds.append(diver._all.relaxed.bound)
+        least.append(diver._reduced_costs(one.duals).min())
+    assert bounds == pytest.approx([one.weight, optimum], abs=1e-2)
+    assert least[0] < -1.0 and least[1] > -1e-6
+
+
+def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
+    diver, rng = plain, np.random.default_rng(0)
+    trials, tried = diver._all.search._work.trials, []
+    for share in (1.0, 1.0, 0.6, 0.6):
+        diver.share = share
+        diver.dive(np.ones(priced.packing.num_columns), 4.0, rng, np.inf, np.inf)
+        tried.append(int(trials.tried.sum()))
+    # what one has tried often enough no other one tries
+    assert 0 < tried[0] <= tried[1] <= tried[-1] and trials.tried.max() <= 2
 
 
 def test_components_too_small_or_too_large_do_not_dive(monkeypatch):
@@ -176,9 +244,9 @@ def test_others_dive_once_an_iteration(searcher, monkeypatch):
     assert called == [before + 1, before + 2]
 
 
-def test_columns_are_fixed_in_their_order(priced):
+def test_columns_are_fixed_in_their_order(plain):
     """Those that fit, until they cover enough rows; the program is then that of what is left."""
-    diver = Diver(priced, np.inf)
+    diver = plain
     root, core = diver._all.relaxed, diver._core
     drawn = np.random.default_rng(0).permutation(_Descent(core, diver._all.program, root, np.inf).open_columns())
     for rows in (0.0, 5.0, 100.0):
@@ -200,9 +268,9 @@ def test_columns_are_fixed_in_their_order(priced):
         )
 
 
-def test_what_leaves_nothing_better_is_not_fixed(priced):
-    """Then all is as it was before."""
-    diver = Diver(priced, np.inf)
+def test_what_leaves_nothing_better_is_not_fixed(plain):
+    """Then all is as it was before, the basis too."""
+    diver = plain
     root, core = diver._all.relaxed, diver._core
     fixed = refused = 0
     for j in _Descent(core, diver._all.program, root, np.inf).open_columns()[:12]:
@@ -219,15 +287,17 @@ def test_what_leaves_nothing_better_is_not_fixed(priced):
                 assert at._fixed == [j] and at.relaxed.bound == pytest.approx(least, abs=1e-7)
                 fixed += 1
             else:
-                assert at._columns.all() and not at._fixed and at.open_rows == core.num_rows and at.relaxed is root
+                assert at._columns.all() and not at._fixed and at.open_rows == core.num_rows
+                assert at.relaxed.status == OPTIMAL and at.relaxed.bound == pytest.approx(root.bound, abs=1e-9)
+                value = core.weights @ at.relaxed.primal
+                assert value == pytest.approx(root.bound, abs=1e-7)
                 refused += 1
     assert refused > 2 and fixed > 2
 
 
-def test_the_rest_is_covered_as_well_as_can_be(priced, monkeypatch):
-    """Beside what is fixed: the optimum by scipy's MILP; and nothing where that is not below the cutoff."""
-    monkeypatch.setattr(diving, "_NODES", 10_000)
-    diver = Diver(priced, np.inf)
+def test_the_rest_is_covered_as_well_as_can_be(priced):
+    """Beside what is fixed: the optimum by scipy's MILP; and nothing more where that is not below the cutoff."""
+    diver = Diver(priced, NONE, np.inf)
     core = diver._core
     for cutoff in (np.inf, -1.0):
         diver._all.program.back()
@@ -237,15 +307,15 @@ def test_the_rest_is_covered_as_well_as_can_be(priced, monkeypatch):
         columns = np.logical_and.reduce([_left(core, j) for j in fixed])
         best = _milp(core, columns, fixed)
         at._cutoff = min(cutoff, best - 1e-6) if cutoff < 0.0 else cutoff
-        found, done = at.completed(1e-9, np.inf)
+        found, done = at.completed(diver._all.search, Limits(1e-9, np.inf, 10_000, np.inf))
         assert done and at.fixed.tolist() == fixed
         if cutoff < 0.0:
-            assert not found.size
+            assert found.tolist() == fixed
         else:
-            chosen = [*fixed, *found.tolist()]
+            assert set(fixed) < set(found.tolist())
             # no row twice
-            cover_of(core, chosen)
-            assert core.weights[chosen].sum() == pytest.approx(best, abs=1e-7)
+            cover_of(core, found)
+            assert core.weights[found].sum() == pytest.approx(best, abs=1e-7)
 
 
 def _milp(core, columns, fixed):
@@ -267,8 +337,8 @@ def _milp(core, columns, fixed):
     return float(found.fun)
 
 
-def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, monkeypatch):
-    diver = Diver(priced, np.inf)
+def test_the_share_grows_while_searches_end_and_shrinks_while_they_do_not(priced, plain, monkeypatch):
+    diver = plain
     trail, rng = np.ones(priced.packing.num_columns), np.random.default_rng(0)
     open_rows = []
     for done, limit in ((True, diving._HIGHEST), (False, diving._LOWEST)):

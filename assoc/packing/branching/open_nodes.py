@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit
+from assoc._types import Floats
 from assoc.packing.branching.root import Root
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
@@ -61,13 +62,23 @@ class OpenNodes:
             variable=np.zeros((_DEPTH, rows), dtype=np.int32),
             duals=np.zeros((_DEPTH, rows)),
         )
-        self.arrays.arena[:num] = np.arange(num)
-        self.arrays.size[0] = num
-        self.arrays.slack[0] = root.slack
-        self.arrays.variable[0] = root.variable
-        self.arrays.duals[0] = root.duals
-        self.count = 1
+        self.hold(np.arange(num), root.slack, root.variable, root.duals)
         self.given_up = math.inf
+
+    def hold(
+        self,
+        columns: NDArray[np.int64],
+        slack: NDArray[np.bool_],
+        variable: NDArray[np.int32],
+        duals: Floats,
+        bound: float = -np.inf,
+    ) -> None:
+        """Hold one node alone: its columns, which rows may stay uncovered, its basis and multipliers, its bound."""
+        arrays = self.arrays
+        arrays.arena[: columns.size] = columns
+        arrays.first[0], arrays.size[0], arrays.bound[0] = 0, columns.size, bound
+        arrays.slack[0], arrays.variable[0], arrays.duals[0] = slack, variable, duals
+        self.count = 1
 
     @property
     def least_bound(self) -> float:

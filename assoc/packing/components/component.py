@@ -190,7 +190,8 @@ class Component(Priced):
         Dives of successive numbers differ in strictness. ``trail`` is tau_j^alpha of each column.
         """
         if self._diver is None:
-            self._diver = Diver(self, self.deadline)
+            known = np.zeros(0, dtype=np.int64) if self.best is None else self.best_columns()
+            self._diver = Diver(self, known, self.deadline)
         if trail is None:
             trail = np.ones(self.packing.num_columns)
         strictness = beta * 2.0 ** (2 + number % 4)

@@ -1,7 +1,7 @@
 """Dives: covers begun in the linear program, column by column, and ended by a short branch and bound.
 
-The linear program is solved for the columns of small reduced cost. A diver draws some of its fractional columns, each
-column j with a probability proportional to
+The linear program is solved for the columns of small reduced cost, with cuts. A diver draws some of its fractional
+columns, each column j with a probability proportional to
 
     tau_j^alpha x_j^beta
 
@@ -10,8 +10,8 @@ the dual simplex method goes on from where it was, some exchanges each time. So 
 before it cost, and what is left can still bring. The first choices cost next to nothing, and many are made at a time.
 The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
 the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
-cover, and branch and bound (branching/search.py) covers what is left. The share grows while these searches end early,
-and shrinks when they do not end at all.
+cover, and branch and bound (branching/short_search.py) covers what is left. The share grows while these searches end
+early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to dive.
 
 Where the program mixes solutions of different kinds (branching/counts.py), dives end in whichever kind fits what they
 fixed first, and hardly ever in another. So after some dives every second one begins in a part of the solutions, one
@@ -30,26 +30,30 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.clock import is_over
+from assoc._system.clock import is_over, now
 from assoc._types import Floats
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.counts import are_whole, most_counts, split_on_counts
-from assoc.packing.branching.root import plain_root
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.branching.depth_first import Limits
+from assoc.packing.branching.root import MOST_ROWS, Root, root_with_cuts
+from assoc.packing.branching.short_search import Part, ShortSearch
 from assoc.packing.neighbourhoods.cover import own_all
-from assoc.packing.packing import Packing, assemble
+from assoc.packing.packing import Packing
 from assoc.packing.run import memory_allows
 from assoc.packing.simplex.basis import basis_of
+from assoc.packing.simplex.cuts import with_cuts
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED
 from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
-from assoc.packing.simplex.program import all_allowed
+from assoc.packing.simplex.program import all_allowed, all_reduced_costs
 
 # rows for which a dive pays: fewer are solved exactly, and the inverse of more takes too long
 _LEAST, _MOST = 30, 900
-# columns of the program for each row, those of least reduced cost
+# columns of the program for each row, those of least reduced cost; how often they are chosen anew where the program
+# with cuts would take others
 _CORE = 40
+_ROUNDS = 3
 # of the rows that are still to be covered by choices: those covered before the program is solved again
-_BATCH = 0.3
+_BATCH = 0.1
 # shares of the rows that are left to branch and bound: at first (but so many rows), at the least and at the most (all
 # would be an exact solver), and how they change
 _START, _ROWS = 0.35, 40
@@ -59,15 +63,18 @@ _GROW, _SHRINK = 0.03, 0.02
 _NODES = 8
 # dives before the first one that begins in a part of the solutions: a split is judged by the best cover
 _BEFORE_PARTS = 8
+# share of the time left that such a split may take: where programs are large it is long
+_SPLIT = 0.3
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
 
 
 class _Start(NamedTuple):
-    """A linear program, marked where it is solved."""
+    """A linear program, marked where it is solved, and room for searches below it."""
 
     program: LinearProgram
     relaxed: Relaxation
+    search: ShortSearch
 
 
 class Diver:
@@ -77,32 +84,58 @@ class Diver:
     ----------
     priced : Priced
         One component, with multipliers near the optimal ones.
+    known : int array
+        Columns of the best cover known; none of them: none is known.
     deadline : float
         When time is over (clock.py).
     """
 
-    def __init__(self, priced: Priced, deadline: float) -> None:
+    def __init__(self, priced: Priced, known: NDArray[np.int64], deadline: float) -> None:
         packing = priced.packing
-        count = min(_CORE * packing.num_rows, packing.num_columns - 1)
-        limit = np.partition(priced.reduced, count)[count]
-        # rows that must be covered keep a column each: what the program leaves out insertion may bring back
-        self._core: Packing = packing.restrict(priced.reduced <= limit)
         self._packing, self._tolerance = packing, priced.tolerance
-        program = LinearProgram(self._core)
-        relaxed = program.solve(duals=priced.duals[self._core.row_origin], deadline=deadline)
-        program.mark()
-        self._all = _Start(program, relaxed)
+        cutoff = float(packing.weights[known].sum()) if known.size else np.inf
+        reduced = priced.reduced
+        count = min(_CORE * packing.num_rows, packing.num_columns - 1)
+        near = np.zeros(packing.num_columns, dtype=np.bool_)
+        # what lies near the bound may hold no cover at all
+        near[known] = True
+        for _ in range(_ROUNDS):
+            near |= reduced <= np.partition(reduced, count)[count]
+            # rows that must be covered keep a column each: what the program leaves out insertion may bring back
+            self._core: Packing = packing.restrict(near)
+            self._root = root_with_cuts(self._core, priced.duals[self._core.row_origin], cutoff, deadline)
+            reduced = self._reduced_costs(priced.duals)
+            if is_over(deadline) or reduced[~near].min(initial=0.0) >= -priced.tolerance:
+                break
+        self._all = self._start(self._root, None, deadline)
         self._parts: list[_Start] = []
         self._dives = 0
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
+
+    def _reduced_costs(self, duals: Floats) -> Floats:
+        """Reduced costs of all columns by the multipliers of the root; by these where it has no such row."""
+        rows, root = self._core.row_origin, self._root
+        size, own = self._packing.num_rows, self._core.num_rows
+        sets = np.zeros((len(root.sets), size), dtype=np.bool_)
+        sets[:, rows] = root.sets
+        extended = np.concatenate([duals, root.duals[own:]])
+        extended[rows] = root.duals[:own]
+        return all_reduced_costs(with_cuts(self._packing.cols, self._packing.weights, size, sets), extended)
+
+    def _start(self, root: Root, like: ShortSearch | None, deadline: float) -> _Start:
+        """Solve the program of a root."""
+        basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
+        program = LinearProgram.extended(self._core, root.program, root.slack, basis)
+        relaxed = program.solve(deadline=deadline)
+        program.mark()
+        return _Start(program, relaxed, ShortSearch(self._core, program, like))
 
     @staticmethod
     def pays(packing: Packing) -> bool:
         """Whether a component has a size for dives, and there is memory for its program."""
         if not _LEAST <= packing.num_rows <= _MOST:
             return False
-        # with the mark of the root
-        return memory_allows(2.0 * LinearProgram.memory(packing))
+        return memory_allows(_memory(packing, MOST_ROWS * packing.num_rows))
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
@@ -132,10 +165,10 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-        found, done = at.completed(self._tolerance, deadline)
+        found, done = at.completed(start.search, Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
-        own_all(self._packing.cols, self._core.origin[np.concatenate([at.fixed, found])], owner)
+        own_all(self._packing.cols, self._core.origin[found], owner)
         return owner
 
     def _next_start(self, cutoff: float, deadline: float) -> _Start:
@@ -149,25 +182,27 @@ class Diver:
 
     def _split(self, cutoff: float, deadline: float) -> list[_Start]:
         """The programs of the parts of the solutions, where a split on counts pays and there is memory for them."""
-        core, relaxed = self._core, self._all.relaxed
-        each = 2.0 * LinearProgram.memory(core, 2 * most_counts(core))
+        core, relaxed, root = self._core, self._all.relaxed, self._root
+        each = _memory(core, root.slack.size + 2 * most_counts(core))
         if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal) or not memory_allows(each):
             return []
-        leaves = split_on_counts(core, plain_root(core, relaxed.duals), cutoff, cutoff, deadline)
-        # without rows of counts there is but the program of all solutions; with them, each has the mark of its root
-        leaves = [leaf for leaf in leaves if leaf.root.slack.size > core.num_rows]
+        leaves = split_on_counts(core, root, cutoff, cutoff, now() + _SPLIT * (deadline - now()))
+        # without rows of counts there is but the program of all solutions
+        leaves = [leaf for leaf in leaves if leaf.root.slack.size > root.slack.size]
         if not memory_allows(each * len(leaves)):
             return []
         parts: list[_Start] = []
         for leaf in leaves:
             if is_over(deadline):
                 break
-            root = leaf.root
-            basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
-            program = LinearProgram.extended(core, root.program, root.slack, basis)
-            parts.append(_Start(program, program.solve(deadline=deadline)))
-            program.mark()
+            parts.append(self._start(leaf.root, self._all.search, deadline))
         return parts
+
+
+def _memory(packing: Packing, rows: float) -> float:
+    """Bytes of a start whose program has so many rows, with the mark of its root."""
+    more = int(rows) - packing.num_rows
+    return 2.0 * LinearProgram.memory(packing, more) + ShortSearch.memory(packing, rows)
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -215,7 +250,7 @@ class _Descent:
         Where nothing below the cutoff is left then, nothing is fixed; whether it was.
         """
         packing = self._packing
-        before = self._columns.copy(), self._covered.copy(), len(self._fixed), self.relaxed
+        before = self._columns.copy(), self._covered.copy(), len(self._fixed)
         # what nothing lighter can use goes for good
         self._columns &= self.relaxed.reduced <= self._cutoff - self.relaxed.bound
         self._columns[self._fixed] = True
@@ -236,8 +271,12 @@ class _Descent:
         self.relaxed = self._program.solve(columns=self._columns, slack=slack, cutoff=self._cutoff, deadline=deadline)
         if self.relaxed.status in (OPTIMAL, STOPPED):
             return True
-        self._columns, self._covered, count, self.relaxed = before
+        self._columns, self._covered, count = before
         del self._fixed[count:]
+        # from the mark it is nearer than from what was taken back
+        self._program.back()
+        slack = packing.slack & ~self._covered
+        self.relaxed = self._program.solve(columns=self._columns, slack=slack, deadline=deadline)
         return False
 
     @property
@@ -245,20 +284,14 @@ class _Descent:
         """Columns that are fixed."""
         return np.array(self._fixed, dtype=np.int64)
 
-    def completed(self, tolerance: float, deadline: float) -> tuple[NDArray[np.int32], bool]:
-        """Search columns for what is open, with which the cover is lighter than the cutoff (none: nothing was found).
+    def completed(self, search: ShortSearch, limits: Limits) -> tuple[NDArray[np.int32], bool]:
+        """Search a cover lighter than the cutoff with what is fixed; what is fixed alone where none was found.
 
         And whether the search came to its end.
         """
-        packing, relaxed = self._packing, self.relaxed
-        keep = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
-        keep[self._fixed] = False
-        inside = np.flatnonzero(keep).astype(np.int32)
-        # rows that are covered already may stay as they are
-        slack = packing.slack | self._covered
-        rest = assemble(packing.cols[inside], packing.weights[inside], slack, inside, packing.granularity)
-        cutoff = self._cutoff - float(packing.weights[self._fixed].sum())
-        search = BranchAndBound(rest, relaxed.duals[rest.row_origin], cutoff, tolerance, deadline)
-        search.run(_NODES)
-        columns = np.zeros(0, dtype=np.int32) if search.columns is None else rest.origin[search.columns]
-        return columns, search.done
+        relaxed = self.relaxed
+        columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
+        columns[self._fixed] = True
+        slack = self._packing.slack & ~self._covered
+        found, done = search.run(Part(columns, slack, relaxed.bound), self._cutoff, limits)
+        return (found if found.size else self.fixed.astype(np.int32)), done

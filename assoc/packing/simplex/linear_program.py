@@ -73,13 +73,21 @@ class LinearProgram:
     ----------
     packing : Packing
         One component or several (then as one program). Takes memory for its number of rows, squared.
+
+    Attributes
+    ----------
+    program : Program
+    slack : bool array, shape (rows of the program,)
+        Whether a row may stay uncovered.
+    basis : Basis
+        Where the last call has ended.
     """
 
     def __init__(self, packing: Packing) -> None:
         self._packing = packing
-        self._program = program_of(packing.arrays)
-        self._slack = packing.slack
-        self._basis: Basis = new_basis(self._program)
+        self.program = program_of(packing.arrays)
+        self.slack = packing.slack
+        self.basis: Basis = new_basis(self.program)
         self._marked: dict[int, Basis] = {}
         self._begun = False
 
@@ -97,7 +105,7 @@ class LinearProgram:
             Is changed from now on.
         """
         self = cls.__new__(cls)
-        self._packing, self._program, self._slack, self._basis = packing, program, slack, basis
+        self._packing, self.program, self.slack, self.basis = packing, program, slack, basis
         self._marked, self._begun = {}, True
         return self
 
@@ -136,9 +144,9 @@ class LinearProgram:
         deadline : float
             When to stop (clock.py).
         """
-        packing, program, basis = self._packing, self._program, self._basis
+        packing, program, basis = self._packing, self.program, self.basis
         mask = np.ones(program.weights.size, dtype=np.bool_)
-        may_stay = self._slack.copy()
+        may_stay = self.slack.copy()
         if columns is not None:
             mask[: columns.size] = columns
         if slack is not None:
@@ -164,20 +172,20 @@ class LinearProgram:
     def mark(self, number: int = 0) -> None:
         """Remember the basis, for `back`; takes as much memory again for each number."""
         if number not in self._marked:
-            self._marked[number] = new_basis(self._program)
-        copy_basis(self._basis, self._marked[number])
+            self._marked[number] = new_basis(self.program)
+        copy_basis(self.basis, self._marked[number])
 
     def back(self, number: int = 0) -> None:
         """Return to the basis that was marked with this number."""
         assert number in self._marked, "nothing was marked"
-        copy_basis(self._marked[number], self._basis)
+        copy_basis(self._marked[number], self.basis)
 
     def _from_duals(self, allowed: Allowed, duals: Floats, effort: Effort) -> Any:
         """Solve from multipliers: first with the columns of small reduced cost, then with those that this leaves out.
 
         Most columns are far from any optimum, and looking at them in every step is most of the work.
         """
-        program, basis = self._program, self._basis
+        program, basis = self.program, self.basis
         tolerance = _LACK * float(np.abs(program.weights).max(initial=0.0))
         few = _FEW * duals.size
         done = 0

@@ -29,6 +29,7 @@ _OF_COUNTS = "tests/packing/test_counts_small.py"
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
 _OF_DIVES = "tests/packing/test_diving.py"
+_OF_SHORT = "tests/packing/test_short_search.py"
 _OF_PARTS = "tests/packing/test_dives_in_parts.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
@@ -133,16 +134,45 @@ FAULTS = (
     Fault(
         "divers do not end with branch and bound",
         _DIVER,
-        "        search.run(_NODES)\n",
-        "",
+        "        found, done = search.run(Part(columns, slack, relaxed.bound), self._cutoff, limits)\n",
+        "        found, done = np.zeros(0, dtype=np.int32), True\n",
         _OF_DIVES,
     ),
-    Fault("what ends a dive is lost", _DIVER, "if search.columns is None else", "if True else", _OF_DIVES),
+    Fault("what ends a dive is lost", _DIVER, "(found if found.size else", "(found if False else", _OF_DIVES),
+    Fault(
+        "dives begin without cuts",
+        _DIVER,
+        "duals[self._core.row_origin], cutoff,",
+        "duals[self._core.row_origin], -np.inf,",
+        _OF_DIVES,
+    ),
+    Fault(
+        "parts learn nothing of pairs",
+        _DIVER,
+        "self._start(leaf.root, self._all.search",
+        "self._start(leaf.root, None",
+        _OF_PARTS,
+    ),
+    Fault("a split may take all of the time", _DIVER, "now() + _SPLIT * (deadline - now())", "deadline", _OF_PARTS),
+    Fault(
+        "a short search computes its first basis anew",
+        "assoc/packing/branching/short_search.py",
+        "        keep_alone(self._work.kept, basis)\n",
+        "",
+        _OF_SHORT,
+    ),
+    Fault(
+        "short searches look for what is no better",
+        "assoc/packing/branching/short_search.py",
+        "self._open.arrays, 1, cutoff, limits",
+        "self._open.arrays, 1, np.inf, limits",
+        _OF_SHORT,
+    ),
     Fault(
         "a diver keeps what leaves nothing better",
         _DIVER,
-        "        del self._fixed[count:]\n        return False\n",
-        "        return True\n",
+        "        return False\n\n    @property\n    def fixed",
+        "        return True\n\n    @property\n    def fixed",
         _OF_DIVES,
     ),
     Fault("dives end at once", _DIVER, "while at.open_rows > left and", "while False and", _OF_DIVES),
