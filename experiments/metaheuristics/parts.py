@@ -12,11 +12,15 @@ from unittest import mock
 
 import numba  # noqa: TID251  (a changed kernel is not kept)
 
+from assoc.packing.branching.root import Root, plain_root
+from assoc.packing.branching.short_search import ShortSearch
 from assoc.packing.components.component import Component
 from assoc.packing.components.proof import Branching
+from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
 from assoc.packing.neighbourhoods.diving import Diver
+from assoc.packing.packing import Packing
 from assoc.solvers.aco import max_min
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu import moves
@@ -56,6 +60,21 @@ def _unchanged(self: Any, priced: Any, owner: Any, weight: float, *_: Any) -> fl
 
 def _never(*_: Any) -> bool:
     return False
+
+
+def _uncut(packing: Packing, duals: Any, *_: Any) -> Root:
+    """The root of dives without cuts."""
+    return plain_root(packing, duals)
+
+
+_searched = ShortSearch.run
+
+
+def _forgetful(self: ShortSearch, *words: Any) -> Any:
+    """A search at the end of a dive that knows nothing of pairs from those before."""
+    for known in (self.trials.gain, self.trials.tried):
+        known[:] = 0
+    return _searched(self, *words)
 
 
 def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextManager[Any]]:
@@ -160,6 +179,8 @@ OWN = (
 SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
     Part("no dives in parts split on counts", SOLVERS, without=_replaced(Diver, "_split", lambda *_: [])),
+    Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
+    Part("nothing kept of pairs from dive to dive", SOLVERS, without=_replaced(ShortSearch, "run", _forgetful)),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
     Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
     Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),

@@ -13,6 +13,7 @@ from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.kept_bases import keep_alone
 from assoc.packing.branching.node import new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
+from assoc.packing.branching.pairs import Trials
 from assoc.packing.branching.root import Root
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.linear_program import LinearProgram
@@ -50,14 +51,19 @@ class ShortSearch:
 
     def __init__(self, packing: Packing, linear: LinearProgram, like: ShortSearch | None = None) -> None:
         wait_for_kernels()
-        self._packing, self._linear = packing, linear
+        self._linear = linear
         program, slack, basis = linear.program, linear.slack, linear.basis
         self._work = new_work(with_counts(packing.arrays, program), program, slack)
         if like is not None:
-            known = like._work.trials
+            known = like.trials
             self._work = self._work._replace(trials=self._work.trials._replace(gain=known.gain, tried=known.tried))
         no_sets = np.zeros((0, packing.num_rows), dtype=np.bool_)
         self._open = OpenNodes(Root(program, slack, basis.variable, basis.duals, no_sets))
+
+    @property
+    def trials(self) -> Trials:
+        """What is known of pairs."""
+        return self._work.trials
 
     @staticmethod
     def memory(packing: Packing, rows: float) -> float:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over, now
 from assoc._types import Floats
+from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.counts import are_whole, most_counts, split_on_counts
 from assoc.packing.branching.depth_first import Limits
@@ -104,8 +105,8 @@ class Diver:
             # rows that must be covered keep a column each: what the program leaves out insertion may bring back
             self._core: Packing = packing.restrict(near)
             self._root = root_with_cuts(self._core, priced.duals[self._core.row_origin], cutoff, deadline)
-            reduced = self._reduced_costs(priced.duals)
-            if is_over(deadline) or reduced[~near].min(initial=0.0) >= -priced.tolerance:
+            reduced = priced.reduced if is_over(deadline) else self._reduced_costs(priced.duals)
+            if reduced[~near].min(initial=0.0) >= -priced.tolerance:
                 break
         self._all = self._start(self._root, None, deadline)
         self._parts: list[_Start] = []
@@ -113,14 +114,22 @@ class Diver:
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
-        """Reduced costs of all columns by the multipliers of the root; by these where it has no such row."""
+        """Reduced costs of all columns by the multipliers of the root, by these where it has no such row.
+
+        Of those at or above 0 less than all is told: without cuts.
+        """
         rows, root = self._core.row_origin, self._root
         size, own = self._packing.num_rows, self._core.num_rows
         sets = np.zeros((len(root.sets), size), dtype=np.bool_)
         sets[:, rows] = root.sets
         extended = np.concatenate([duals, root.duals[own:]])
         extended[rows] = root.duals[:own]
-        return all_reduced_costs(with_cuts(self._packing.cols, self._packing.weights, size, sets), extended)
+        # cuts make columns dearer, never cheaper: of most no more need be known
+        reduced = reduced_costs(self._packing, extended[:size])
+        below = np.flatnonzero(reduced < 0.0)
+        program = with_cuts(self._packing.cols[below], self._packing.weights[below], size, sets)
+        reduced[below] = all_reduced_costs(program, extended)
+        return reduced
 
     def _start(self, root: Root, like: ShortSearch | None, deadline: float) -> _Start:
         """Solve the program of a root."""

@@ -139,6 +139,8 @@ FAULTS = (
         _OF_DIVES,
     ),
     Fault("what ends a dive is lost", _DIVER, "(found if found.size else", "(found if False else", _OF_DIVES),
+    Fault("the core is chosen once", _DIVER, "for _ in range(_ROUNDS):", "for _ in range(1):", _OF_DIVES),
+    Fault("dives may hold no cover at all", _DIVER, "        near[known] = True\n", "", _OF_DIVES),
     Fault(
         "dives begin without cuts",
         _DIVER,
