@@ -59,7 +59,7 @@ def test_the_program_of_a_part_is_that_of_all_with_its_ranges(mixed, monkeypatch
     core, cutoff = diver._core, OPTIMUM + 3.0
     parts = diver._split(cutoff, np.inf)
     assert len(parts) > 1
-    assert all(part.search._work.trials.gain is diver._all.search._work.trials.gain for part in parts)
+    assert all(part.search.trials.gain is diver._all.search.trials.gain for part in parts)
     for part in parts:
         program, fixed = part.program.program, []
         assert part.relaxed.bound >= diver._all.relaxed.bound - 1e-9

@@ -182,7 +182,7 @@ def test_the_core_is_what_the_program_with_cuts_would_take(monkeypatch):
 
 def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
     diver, rng = plain, np.random.default_rng(0)
-    trials, tried = diver._all.search._work.trials, []
+    trials, tried = diver._all.search.trials, []
     for share in (1.0, 1.0, 0.6, 0.6):
         diver.share = share
         diver.dive(np.ones(priced.packing.num_columns), 4.0, rng, np.inf, np.inf)

@@ -83,8 +83,8 @@ def test_what_is_known_of_pairs_is_shared():
     packing = next(packings(1, 43))
     linear, relaxed, search = begun(packing)
     other = ShortSearch(packing, linear, search)
-    assert other._work.trials.gain is search._work.trials.gain and other._work.trials.tried is search._work.trials.tried
-    assert other._work.trials.mass is not search._work.trials.mass
+    assert other.trials.gain is search.trials.gain and other.trials.tried is search.trials.tried
+    assert other.trials.mass is not search.trials.mass
 
 
 def test_a_search_of_few_nodes_says_that_it_did_not_end():

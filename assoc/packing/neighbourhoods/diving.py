@@ -7,7 +7,7 @@ columns, each column j with a probability proportional to
 
 where x_j, the visibility, is how much of it the program takes; they are fixed, what shares a row with them goes, and
 the dual simplex method goes on from where it was, some exchanges each time. So each choice knows what the choices
-before it cost, and what is left can still bring. The first choices cost next to nothing, and many are made at a time.
+before it cost, and what is left can still bring. The first choices cost next to nothing, and some are made at a time.
 The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
 the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
 cover, and branch and bound (branching/short_search.py) covers what is left. The share grows while these searches end
