@@ -53,6 +53,7 @@ from assoc.ranking.enumeration import (
     cut_of,
     enumerate_solutions,
     new_store,
+    new_store_inside,
 )
 
 FIRST_BUDGET = 3000
@@ -131,9 +132,10 @@ class ComponentRanking:
         while not self.done and self.nodes < target and not is_over(self._deadline):
             if self._work is None and not self._begin():
                 return
-            self._open.count, done, self._store = _rank(
+            self._open.count, done, *store = _rank(
                 self._work, self._open.arrays, self._open.count, self._wanted, self._store, target - self.nodes
             )
+            self._store = Store(*store)
             self.nodes += done
             if not self.done and self.nodes < target and not is_over(self._deadline):
                 self._open.grow(self._memory_allows)
@@ -216,9 +218,10 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
 
 @search_njit
 def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store, node_limit: int) -> Any:
-    """Search depth first; the number of open nodes, the nodes done, and the store.
+    """Search depth first; the number of open nodes, the nodes done, and the arrays of the store.
 
-    Stops early with nodes open when there is no room left for two children, or time is over.
+    Stops early with nodes open when there is no room left for two children, or time is over. The arrays are no record:
+    where Ctrl-C comes while a result is converted, numba calls a record's class without having found it.
     """
     deadline = wanted.deadline
     nodes = 0
@@ -265,7 +268,7 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
             push_node(stack, top, allowed_at(work, num), work.basis, lower)
             num_open = top + 1
         at_work = num_open - 1
-    return num_open, nodes, store
+    return num_open, nodes, store.key, store.slot, store.marks, store.columns, store.num
 
 
 @search_njit
@@ -313,7 +316,7 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
         for r in range(top, end):
             base += duals[r]
         own_wanted = Wanted(wanted.k, base + room, wanted.tolerance, wanted.budget + end - top, wanted.deadline)
-        steps, store = enumerate_solutions(priced, top, end, base, own_wanted, False, new_store(end - top))
+        steps, store = enumerate_solutions(priced, top, end, base, own_wanted, False, new_store_inside(end - top))
         if steps != NOT_COMPLETE:
             proven[c] = cut_of(store, own_wanted)
             own, chosen = _sorted_store(store)

@@ -83,9 +83,8 @@ class Store(NamedTuple):
     num: NDArray[np.int64]
 
 
-@njit
 def new_store(num_rows: int) -> Store:
-    """Room for solutions of so many rows."""
+    """Room for solutions of so many rows, made where no Ctrl-C can spoil a kernel's result."""
     capacity = 4
     return Store(
         np.empty(capacity),
@@ -94,6 +93,9 @@ def new_store(num_rows: int) -> Store:
         np.empty((capacity, num_rows + 1), np.int32),
         np.zeros(1, np.int64),
     )
+
+
+new_store_inside = inner_njit(new_store)
 
 
 @njit

@@ -76,6 +76,44 @@ def test_while_a_result_is_converted():
     assert (done.returncode, done.stdout.strip()) == (0, "10"), done.stderr
 
 
+RECORDS = """
+import gc, json
+import assoc
+from numba.core import types
+from numba.core.dispatcher import Dispatcher
+from tests.reliability.answers import answers
+from tests.reliability.big import ghosts
+
+assoc.warm_up()
+answers(["costs", "tracks", "rankings"])
+assoc.kbest(ghosts(20, 5_000), 5, time_limit=3.0)
+
+def holds_record(kind):
+    if isinstance(kind, types.Optional):
+        return holds_record(kind.type)
+    return isinstance(kind, types.BaseNamedTuple) or isinstance(kind, types.BaseTuple) and any(map(holds_record, kind))
+
+kernels = [one for one in gc.get_objects() if isinstance(one, Dispatcher) and one.__module__.startswith("assoc.")]
+called = [one for one in kernels if one.overloads]
+bad = [one.__name__ for one in called for own in one.overloads.values() if holds_record(own.signature.return_type)]
+print(json.dumps([len(called), sorted(bad)]), flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_no_kernel_that_python_calls_returns_a_record():
+    # what the test above sees where the signal comes in time; the first process compiles, also kernels that kernels
+    # call, the second one loads those alone that Python calls
+    compiled_only = os.environ | {"ASSOC_INTERPRET": "0"}
+    for _ in range(2):
+        command = [sys.executable, "-c", RECORDS]
+        done = subprocess.run(command, env=compiled_only, capture_output=True, text=True, timeout=600)
+        assert done.returncode == 0, done.stderr
+    num_called, bad = json.loads(done.stdout)
+    assert num_called > 50
+    assert bad == []
+
+
 LOADING = """
 import signal
 import sys

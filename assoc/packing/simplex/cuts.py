@@ -179,9 +179,18 @@ def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> in
     return kept
 
 
-@njit
 def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
     """The linear program of columns over rows, and a further row for the cut of each set."""
+    start, rows, sides = _entries(cols, num_rows, sets)
+    return Program(weights, start, rows, sides, cols.shape[1])
+
+
+@njit
+def _entries(cols: Any, num_rows: int, sets: Any) -> Any:
+    """Where each column's rows begin, the rows, and the right-hand sides.
+
+    A plain tuple: where Ctrl-C comes while a result is converted, numba calls a record's class without having found it.
+    """
     num, num_sensors = cols.shape
     start = np.zeros(num + 1, np.int64)
     for count in range(2):
@@ -210,4 +219,4 @@ def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
         for r in range(num_rows):
             size += sets[c, r]
         sides[num_rows + c] = (size - 1) // 2
-    return Program(weights, start, rows, sides, num_sensors)
+    return start, rows, sides
