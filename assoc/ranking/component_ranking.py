@@ -3,7 +3,9 @@
 Enumeration (enumeration.py) is quick where the multipliers' bound is near the optimum. Where it is not, the
 component is branched as in packing/branching (are two measurements of the same source or not?): the linear program of
 every node gives the best multipliers there are for it, and what its reduced costs leave of a node is enumerated as soon
-as a small budget suffices. The two answers exclude each other, so that every solution is in exactly one leaf.
+as a small budget suffices. A search that takes long begins anew, with cuts and in parts split on counts. Enumeration
+knows nothing of these: it may list solutions of another part as well, with their own weights, and a solution that is
+known already is not listed again.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit, search_njit
 from assoc._types import Floats
+from assoc.packing.branching.counts import Leaf, most_rows, split_on_counts
+from assoc.packing.branching.leaves import begin_leaf
 from assoc.packing.branching.node import (
     Work,
     allowed_at,
@@ -38,7 +42,7 @@ from assoc.packing.branching.pairs import (
     doubtful_pairs,
     part_certain,
 )
-from assoc.packing.branching.root import plain_root
+from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.sorting import order_of
 from assoc.packing.packing import Packing, PackingArrays
@@ -58,6 +62,12 @@ from assoc.ranking.enumeration import (
 
 FIRST_BUDGET = 3000
 NODE_BUDGET = 500
+# nodes after which a search may begin anew with cuts and in parts, and again whenever they have doubled
+_HARD = 40
+# the share of the way to the limit by which parts must raise what is proved
+_RAISED = 0.02
+# a budget that is never used up
+_ALL = 1 << 60
 
 
 class ComponentRanking:
@@ -103,12 +113,17 @@ class ComponentRanking:
         self._root = plain_root(packing, duals)
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
+        # the parts of the root that are still to be searched, the least bound last
+        self._waiting: list[Leaf] = []
+        self._split_at = _HARD
+        # no solution that was not found before the last split weighs less
+        self._floor = -np.inf
         self.nodes = 0
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to search."""
-        return self._open.count == 0
+        return self._open.count == 0 and not self._waiting
 
     @property
     def out_of_memory(self) -> bool:
@@ -119,7 +134,8 @@ class ComponentRanking:
     def proven(self) -> float:
         """Every solution that was not found weighs at least this."""
         cut = float(cut_of(self._store, self._wanted))
-        return min(cut, self._open.least_bound)
+        waiting = self._waiting[-1].bound if self._waiting else np.inf
+        return max(self._floor, min(cut, self._open.least_bound, waiting))
 
     def solutions(self) -> tuple[Floats, list[NDArray[np.int32]]]:
         """Return weights (ascending) and the columns of each solution."""
@@ -132,13 +148,38 @@ class ComponentRanking:
         while not self.done and self.nodes < target and not is_over(self._deadline):
             if self._work is None and not self._begin():
                 return
+            if self._open.count == 0:
+                given_up = self._open.given_up
+                self._open, self._work = begin_leaf(self._packing, self._waiting.pop(), given_up, self._work)
+            elif self.nodes >= self._split_at and self._split():
+                continue
+            limit = min(target, max(self._split_at, self.nodes + 1))
             self._open.count, done, *store = _rank(
-                self._work, self._open.arrays, self._open.count, self._wanted, self._store, target - self.nodes
+                self._work, self._open.arrays, self._open.count, self._wanted, self._store, limit - self.nodes
             )
             self._store = Store(*store)
             self.nodes += done
-            if not self.done and self.nodes < target and not is_over(self._deadline):
+            if self._open.count and self.nodes < limit and not is_over(self._deadline):
                 self._open.grow(self._memory_allows)
+
+    def _split(self) -> bool:
+        """Begin anew with cuts and in parts, where that raises what is proved; whether it does."""
+        # where this does not pay, it may with a nearer cut
+        self._split_at = 2 * self.nodes
+        packing, cut = self._packing, float(cut_of(self._store, self._wanted))
+        # the room of the search so far and that of another one
+        needed = 2.0 * work_memory(most_rows(packing), packing.num_columns, packing.num_sensors)
+        if not (cut < np.inf and self._open.given_up == np.inf and self._memory_allows(needed)):
+            return False
+        root = root_with_cuts(packing, self._root.duals, cut, self._deadline)
+        leaves = split_on_counts(packing, root, cut, cut, self._deadline)
+        proven = self.proven
+        if min((leaf.bound for leaf in leaves), default=cut) <= proven + _RAISED * (cut - proven):
+            return False
+        self._floor = proven
+        self._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
+        self._open.count = 0
+        return True
 
     def _begin(self) -> bool:
         """Make room for the search; without memory for it the root is given up."""
@@ -186,8 +227,9 @@ def _priced(work: Work, num: int) -> PricedColumns:
                 row_cols[place[r]] = a
                 place[r] += 1
     return PricedColumns(
-        own_cols, active[:num].copy(), reduced, work.node.slack, work.duals, row_ptr, row_cols, np.empty(num, np.int32)
-    )
+        own_cols, active[:num].copy(), work.weights, reduced, work.node.slack, work.duals, row_ptr, row_cols,
+        np.empty(num, np.int32),
+    )  # fmt: skip
 
 
 @inner_njit
@@ -224,6 +266,7 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
     where Ctrl-C comes while a result is converted, numba calls a record's class without having found it.
     """
     deadline = wanted.deadline
+    budget = wanted.budget
     nodes = 0
     # the node whose basis is at work
     at_work = -1
@@ -244,10 +287,9 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
         lower = max(lower, bound)
         if lower < cut:
             num = drop(work, num, bound, cut)
-            base = 0.0
-            for r in range(work.trial.size):
-                base += work.duals[r]
-            steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, base, wanted, True, store)
+            own = Wanted(wanted.k, wanted.limit, wanted.tolerance, budget, deadline)
+            budget = wanted.budget
+            steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, bound, own, True, store)
             cut = min(cut_of(store, wanted), work.limit)
             if steps == NOT_COMPLETE and is_over(deadline):
                 # the node is as it was on the stack; what it has listed already is known again
@@ -261,6 +303,10 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
         num = drop(work, num, bound, cut)
         allowed = allowed_at(work, num)
         pair, verdict, likely = _question(work, allowed, status, Effort(cut, 0, deadline))
+        if pair[0] < 0:
+            # nothing to ask: once more, as the node is on the stack, and to the end
+            num_open, nodes, budget = top + 1, nodes - 1, _ALL
+            continue
         if verdict == NEITHER:
             num_open = branch(work, stack, top, num, pair, likely, lower)
         else:
@@ -305,7 +351,7 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
     proven = np.full(num_components, -np.inf)
     names = np.arange(reduced.size).astype(np.int32)
     priced = PricedColumns(
-        packing.cols, names, reduced, packing.slack, duals, packing.row_ptr, packing.row_cols,
+        packing.cols, names, packing.weights, reduced, packing.slack, duals, packing.row_ptr, packing.row_cols,
         np.empty(reduced.size, np.int32),
     )  # fmt: skip
     room = wanted.limit

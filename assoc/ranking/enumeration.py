@@ -4,7 +4,9 @@ With feasible multipliers u (packing/bounds) a solution x weighs
 
     w(x) = sum(u) + sum of the reduced costs of its columns + sum of -u_r over its uncovered rows with slack,
 
-all terms but the first >= 0. The search decides row by row (always the row with the fewest choices left)
+all terms but the first >= 0. (Rows of cuts and counts have such terms, too. For the solutions of a node that weigh less
+than the limit they are >= 0, and are left out; other solutions may be passed over, as they belong to other nodes.) The
+search decides row by row (always the row with the fewest choices left)
 and gives up where the terms so far exceed what the limit allows. The limit falls to the weight of the k-th
 lightest solution known, so that only ties and better ones are looked for.
 """
@@ -53,10 +55,12 @@ class PricedColumns(NamedTuple):
         Rows of each column.
     names : int32 array, shape (N,)
         What the store calls the columns.
+    weights : float array
+        Weights of the columns, by these names.
     reduced : float array, shape (N,)
         Reduced costs (what rounding left below 0 counts as 0).
-    slack, duals : arrays, shape (R,)
-        Whether a row may stay uncovered, and the multipliers.
+    slack, duals : arrays
+        Whether a row may stay uncovered, and the multipliers; rows of cuts and counts come last, and are not used.
     row_ptr, row_cols : int arrays
         Columns of each row; each row's part of ``row_cols`` is put in order of reduced cost.
     blocked : int32 array, shape (N,)
@@ -65,6 +69,7 @@ class PricedColumns(NamedTuple):
 
     cols: NDArray[np.int32]
     names: NDArray[np.int32]
+    weights: NDArray[np.float64]
     reduced: NDArray[np.float64]
     slack: NDArray[np.bool_]
     duals: NDArray[np.float64]
@@ -165,7 +170,7 @@ def enumerate_solutions(
     top, end : int
         The rows to cover; no column of theirs uses others.
     base : float
-        Sum of the rows' multipliers.
+        What is wanted weighs at least this and what its columns and uncovered rows cost by the multipliers.
     wanted : Wanted
         How many, how light, and how long to search.
     check : bool
@@ -178,7 +183,7 @@ def enumerate_solutions(
     steps, store
         Decisions made, ``NOT_COMPLETE`` if the budget or the time did not suffice.
     """
-    cols, names, reduced, slack, duals, row_ptr, row_cols, blocked = priced
+    _, names, weights, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     k, budget, deadline = wanted.k, wanted.budget, wanted.deadline
     num_rows = end - top
     for r in range(top, end):
@@ -216,8 +221,12 @@ def enumerate_solutions(
             row, choices = _next_row(priced, top, end, done, cut - spent[depth])
             if row < 0 or choices == 0:
                 if row < 0 and spent[depth] < cut:
-                    store = _keep(store, k, spent[depth], chosen, count, check)
-                    cut = cut_of(store, wanted)
+                    weight = 0.0
+                    for t in range(count):
+                        weight += weights[chosen[t]]
+                    if weight < cut:
+                        store = _keep(store, k, weight, chosen, count, check)
+                        cut = cut_of(store, wanted)
                 forward = False
                 depth -= 1
                 continue
@@ -272,7 +281,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
 @inner_njit
 def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float) -> Any:
     """Return the row with the fewest choices left (-1: all are decided), and how many these are."""
-    _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
+    _, _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     row, least = -1, 1 << 60
     for r in range(top, end):
         if done[r - top]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._types import Floats
-from assoc.packing.branching.root import Root
+from assoc.packing.branching.root import MOST_ROWS, Root
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.simplex.basis import basis_of, primal_values
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
@@ -156,6 +156,11 @@ def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
 def most_counts(packing: Packing) -> int:
     """Counts at the most."""
     return packing.num_sensors + 1
+
+
+def most_rows(packing: Packing) -> float:
+    """Rows of a packing's program with all the cuts and counts that it may have."""
+    return MOST_ROWS * packing.num_rows + 2 * most_counts(packing)
 
 
 def _counts_of(packing: Packing) -> _Counts:

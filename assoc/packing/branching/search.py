@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from assoc._system.ahead import wait_for_kernels
 from assoc._system.clock import is_over
 from assoc._types import Floats
-from assoc.packing.branching.counts import Leaf, most_counts, split_on_counts, with_counts
+from assoc.packing.branching.counts import Leaf, most_rows, split_on_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first
+from assoc.packing.branching.leaves import begin_leaf
 from assoc.packing.branching.node import Work, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
-from assoc.packing.branching.root import MOST_ROWS, plain_root, root_with_cuts
+from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.packing import Packing
 from assoc.packing.run import memory_allows
 
@@ -160,9 +161,7 @@ class BranchAndBound:
 
     def _room(self) -> float:
         """Bytes that a search takes, with all the cuts and counts that it may have."""
-        rows = float(self._packing.num_rows)
-        if self._to_the_end:
-            rows = MOST_ROWS * rows + 2 * most_counts(self._packing)
+        rows = most_rows(self._packing) if self._to_the_end else float(self._packing.num_rows)
         return work_memory(rows, self._packing.num_columns, self._packing.num_sensors)
 
     @property
@@ -218,20 +217,8 @@ class BranchAndBound:
 
     def _next_leaf(self) -> None:
         """Begin with the part of the least bound that this pass has not searched yet."""
-        leaf = self._waiting.pop()
         given_up = self._open.given_up
-        self._open = OpenNodes(leaf.root)
-        self._open.arrays.bound[0] = leaf.bound
-        self._open.given_up = given_up
-        program, work = leaf.root.program, self._work
-        if work is None or work.program.rows is not program.rows:
-            new = new_work(with_counts(self._packing.arrays, program), program, leaf.root.slack)
-            if work is not None:
-                # what is known of pairs stays true
-                new = new._replace(trials=new.trials._replace(gain=work.trials.gain, tried=work.trials.tried))
-            work = new
-        # the programs of one split differ in their right-hand sides alone
-        self._work = work._replace(program=program)
+        self._open, self._work = begin_leaf(self._packing, self._waiting.pop(), given_up, self._work)
 
     def _set_aim(self) -> None:
         """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""

@@ -6,9 +6,10 @@ with it.
 
 from __future__ import annotations
 
-from tests.mutations.faults import ant_colony, genetic, pairs, shared, tabu, tracking
+from tests.mutations.faults import ant_colony, genetic, pairs, ranking, shared, tabu, tracking
 from tests.mutations.faults.fault import Fault
 
 FAULTS: tuple[Fault, ...] = (
     *ant_colony.FAULTS, *genetic.FAULTS, *tabu.FAULTS, *shared.FAULTS, *tracking.FAULTS, *pairs.FAULTS,
+    *ranking.FAULTS,
 )  # fmt: skip

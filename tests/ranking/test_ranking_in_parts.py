@@ -1,0 +1,116 @@
+"""The k best in parts split on counts, on packings so small that the tests run uncompiled, too (`make mutants`)."""
+
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import counts
+from assoc.packing.branching.leaves import begin_leaf
+from assoc.packing.branching.root import plain_root
+from assoc.ranking import component_ranking
+from assoc.ranking.component_ranking import ComponentRanking
+from tests.packing.test_counts import random_packing, solutions
+
+
+@pytest.fixture
+def parts(monkeypatch):
+    """Every split is made, and at once; how many parts are begun."""
+    monkeypatch.setattr(counts, "_PAYS", np.inf)
+    monkeypatch.setattr(component_ranking, "_HARD", 1)
+    begun = Mock(side_effect=begin_leaf)
+    monkeypatch.setattr(component_ranking, "begin_leaf", begun)
+    return begun
+
+
+@pytest.fixture
+def without_cuts(monkeypatch):
+    """Cuts close most of these small packings before there is anything to split."""
+    monkeypatch.setattr(component_ranking, "root_with_cuts", lambda packing, duals, *rest: plain_root(packing, duals))
+
+
+@pytest.mark.parametrize(("seed", "rigid"), [(3, 0.0), (26, 0.0), (26, 0.3)])
+@pytest.mark.parametrize(("k", "budget"), [(4, 0), (12, 6)])
+def test_none_is_left_out_and_none_listed_twice(parts, without_cuts, seed, rigid, k, budget):
+    check_list(parts, random_packing(seed, rigid), k, budget)
+
+
+def test_the_same_with_cuts(parts):
+    check_list(parts, random_packing(26), 12, 0)
+
+
+def check_list(parts, packing, k, budget):
+    """The lightest k by recursion, and the bound at any moment."""
+    weight_of = {frozenset(one): float(packing.weights[one].sum()) for one in solutions(packing)}
+    every = sorted(weight_of.values())
+    ranking = ComponentRanking(packing, dual_bound(packing), k, every[-1] + 1.0, 1e-12, budget=budget)
+    while not ranking.done:
+        ranking.run(1)
+        known = {frozenset(columns.tolist()) for columns in ranking.solutions()[1]}
+        rest = min((weight for one, weight in weight_of.items() if one not in known), default=np.inf)
+        assert ranking.proven <= rest + 1e-9
+    weights, chosen = ranking.solutions()
+    assert parts.call_count > 1
+    assert ranking.proven == pytest.approx(every[k - 1] if k <= len(every) else every[-1] + 1.0, abs=1e-9)
+    assert weights.tolist() == pytest.approx(every[:k], abs=1e-9)
+    found = [frozenset(columns.tolist()) for columns in chosen]
+    assert len(set(found)) == len(found)
+    assert [weight_of[one] for one in found] == pytest.approx(weights.tolist(), abs=1e-9)
+
+
+def test_without_memory_for_parts_the_search_goes_on_as_it_was(parts):
+    packing = random_packing(3)
+    every = sorted(packing.weights[one].sum() for one in solutions(packing))
+    room = component_ranking.work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)
+    ranking = ComponentRanking(
+        packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0, memory_allows=lambda needed: needed <= room
+    )
+    while not ranking.done:
+        ranking.run(1)
+    assert not parts.called
+    assert not ranking.out_of_memory
+    assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
+
+
+def test_what_was_given_up_in_one_part_is_remembered_in_the_next(parts, without_cuts):
+    packing = random_packing(3)
+    every = sorted(packing.weights[one].sum() for one in solutions(packing))
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
+    while not parts.called:
+        ranking.run(1)
+    assert ranking._open.count
+    while ranking._open.count:
+        ranking._open.give_up()
+    while not ranking.done:
+        ranking.run(1)
+        assert ranking.out_of_memory
+    assert ranking.proven < every[3]
+
+
+def test_a_split_that_time_ends_leaves_a_bound_that_holds(parts, monkeypatch):
+    packing = random_packing(26)
+    every = sorted(packing.weights[one].sum() for one in solutions(packing))
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
+    ranking.run(1)
+    before = ranking.proven
+    # time is over as soon as the cuts are looked for
+    ranking._deadline = -1.0
+    ranking._split()
+    assert before <= ranking.proven <= every[0] + 1e-9
+    ranking._deadline = np.inf
+    while not ranking.done:
+        ranking.run(1)
+    assert ranking.solutions()[0].tolist() == pytest.approx(every[:4], abs=1e-9)
+
+
+def test_parts_that_show_nothing_new_are_not_begun(parts, without_cuts):
+    packing = random_packing(3)
+    every = sorted(packing.weights[one].sum() for one in solutions(packing))
+    ranking = ComponentRanking(packing, dual_bound(packing), 4, every[-1] + 1.0, 1e-12, budget=0)
+    while not ranking._split():
+        assert not ranking.done
+        ranking.run(1)
+    waiting = ranking._waiting
+    assert not ranking._split()
+    assert ranking._waiting is waiting
