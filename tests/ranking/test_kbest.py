@@ -2,22 +2,26 @@
 
 import itertools
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import assoc
+from assoc.costs import build_problem
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.leaves import begin_leaf
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
-from assoc.ranking import iterative_deepening
+from assoc.ranking import component_ranking, iterative_deepening
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.component_ranking import ComponentRanking
 from assoc.ranking.kbest import kbest, rank
 from assoc.ranking.merging import merge
 from assoc.ranking.murty.murty import Murty
 from assoc.solvers.assign import assign
+from experiments.common.instances import scenes
 from experiments.common.instances.synthetic import axial_random, planar_random
 from experiments.common.oracles import (
     all_solutions,
@@ -195,6 +199,23 @@ def _solutions_of(piece):
 
     extend(0, frozenset(), (), 0.0)
     return sorted(found)
+
+
+@pytest.mark.parametrize("seed", [2001, 2033, 2037])
+def test_scenes_full_of_ghosts_in_parts_and_without(monkeypatch, seed):
+    problem = build_problem(scenes.ghost(20, seed), 0)
+    lists = []
+    for hard in (1, 10**9):
+        monkeypatch.setattr(component_ranking, "_HARD", hard)
+        begun = Mock(side_effect=begin_leaf)
+        monkeypatch.setattr(component_ranking, "begin_leaf", begun)
+        lists.append(kbest(problem, 20))
+        assert begun.called == (hard == 1)
+    one, two = lists
+    assert [solution.cost for solution in one] == pytest.approx([solution.cost for solution in two], abs=1e-11)
+    # of those that cost what the last one costs others may be listed
+    sure = [[s.indices.tolist() for s in found if s.cost < found[-1].cost - 1e-9] for found in lists]
+    assert sure[0] == sure[1] and len(sure[0]) >= 8
 
 
 def test_components_that_need_branching_within_a_problem(monkeypatch):
