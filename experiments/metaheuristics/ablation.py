@@ -32,6 +32,8 @@ from experiments.metaheuristics.running import log, run
 
 NAME = "metaheuristics.ablation"
 TITLE = "What the parts of the metaheuristics contribute"
+# percent by which two sums of the same costs may differ
+_SAME = 1e-9
 WORKERS = ", workers"
 """How the name of a group of claims ends that is about workers."""
 
@@ -79,6 +81,8 @@ def claims_of(name: str, seconds: float, costs: dict[tuple[str, str], Floats]) -
         whole = words == parts.WHOLE
         base = best if whole else costs[solver, bases[words]]
         excess = 100.0 * (values - base) / np.abs(base)
+        # the same cover, summed in another order
+        excess[np.abs(excess) < _SAME] = 0.0
         interval = mean_interval(excess[:, None])
         what = "the best found" if whole else bases[words]
         found.append(Claim(f"{group}: {solver}, {words}, above {what}", "%", None, float(excess.mean()), interval))
