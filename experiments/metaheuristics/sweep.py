@@ -156,8 +156,10 @@ def draw(figure: Any, shown: tuple[list[Case], dict[str, Claim]]) -> None:
                 [claims[f"{case.name}: {up} {one:g}, {across} {other:g}"] for other in GRID[across]] for one in GRID[up]
             ]
             means = np.array([[claim.ours for claim in line] for line in found])
-            picture = ax.imshow(means, cmap="cividis_r", aspect="auto", origin="lower", vmin=0.0)
-            dark = 0.5 * max(float(means.max()), 1e-12)
+            # where all settings are alike there is still a scale, from 0 up
+            most = max(float(means.max()), 1e-3)
+            picture = ax.imshow(means, cmap="cividis_r", aspect="auto", origin="lower", vmin=0.0, vmax=most)
+            dark = 0.5 * most
             for (i, j), mean in np.ndenumerate(means):
                 low, high = found[i][j].interval or (mean, mean)
                 text = f"{mean:.3g}\n{low:.2g} .. {high:.2g}"
