@@ -116,8 +116,6 @@ class ComponentRanking:
         # the parts of the root that are still to be searched, the least bound last
         self._waiting: list[Leaf] = []
         self._split_at = _HARD
-        # no solution that was not found before the last split weighs less
-        self._floor = -np.inf
         self.nodes = 0
 
     @property
@@ -135,7 +133,7 @@ class ComponentRanking:
         """Every solution that was not found weighs at least this."""
         cut = float(cut_of(self._store, self._wanted))
         waiting = self._waiting[-1].bound if self._waiting else np.inf
-        return max(self._floor, min(cut, self._open.least_bound, waiting))
+        return min(cut, self._open.least_bound, waiting)
 
     def solutions(self) -> tuple[Floats, list[NDArray[np.int32]]]:
         """Return weights (ascending) and the columns of each solution."""
@@ -176,7 +174,6 @@ class ComponentRanking:
         proven = self.proven
         if min((leaf.bound for leaf in leaves), default=cut) <= proven + _RAISED * (cut - proven):
             return False
-        self._floor = proven
         self._waiting = sorted(leaves, key=lambda leaf: -leaf.bound)
         self._open.count = 0
         return True

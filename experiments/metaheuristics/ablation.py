@@ -32,10 +32,10 @@ from experiments.metaheuristics.running import log, run
 
 NAME = "metaheuristics.ablation"
 TITLE = "What the parts of the metaheuristics contribute"
-# percent by which two sums of the same costs may differ
-_SAME = 1e-9
 WORKERS = ", workers"
 """How the name of a group of claims ends that is about workers."""
+# percent by which two sums of the same costs may differ
+_SAME = 1e-9
 
 
 def measured(name: str, count: int, seconds: float, chosen: Sequence[parts.Part]) -> dict[tuple[str, str], Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from assoc.packing.branching.counts import Leaf, with_counts
-from assoc.packing.branching.node import Work, new_work
+from assoc.packing.branching.node import Work, knowing, new_work
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.packing import Packing
 
@@ -28,7 +28,7 @@ def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None)
         new = new_work(with_counts(packing.arrays, program), program, root.slack)
         if work is not None:
             # what is known of pairs stays true
-            new = new._replace(trials=new.trials._replace(gain=work.trials.gain, tried=work.trials.tried))
+            new = knowing(new, work.trials)
         work = new
     # the programs of one split differ in their right-hand sides alone
     return nodes, work._replace(program=program)

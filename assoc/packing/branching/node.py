@@ -87,6 +87,11 @@ def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
     )  # fmt: skip
 
 
+def knowing(work: Work, trials: Trials) -> Work:
+    """The room, where what other trials of the same packing have learnt of pairs is known, and added to."""
+    return work._replace(trials=work.trials._replace(gain=trials.gain, tried=trials.tried))
+
+
 @inner_njit
 def drop(work: Work, num: int, bound: float, cut: float) -> int:
     """Drop the columns and the slack that no solution below the cut has; how many columns are left.

@@ -11,7 +11,7 @@ from assoc._system.ahead import wait_for_kernels
 from assoc.packing.branching.counts import with_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first
 from assoc.packing.branching.kept_bases import keep_alone
-from assoc.packing.branching.node import new_work, work_memory
+from assoc.packing.branching.node import knowing, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.pairs import Trials
 from assoc.packing.branching.root import Root
@@ -55,8 +55,7 @@ class ShortSearch:
         program, slack, basis = linear.program, linear.slack, linear.basis
         self._work = new_work(with_counts(packing.arrays, program), program, slack)
         if like is not None:
-            known = like.trials
-            self._work = self._work._replace(trials=self._work.trials._replace(gain=known.gain, tried=known.tried))
+            self._work = knowing(self._work, like.trials)
         no_sets = np.zeros((0, packing.num_rows), dtype=np.bool_)
         self._open = OpenNodes(Root(program, slack, basis.variable, basis.duals, no_sets))
 

@@ -12,7 +12,7 @@ _OF_PARTS = "tests/ranking/test_ranking_in_parts.py"
 
 FAULTS = (
     Fault(
-        "enumeration begins at nothing, not at the node's bound",
+        "enumeration begins above the node's bound",
         _COMPONENT,
         "work.trial.size, bound, own, True",
         "work.trial.size, bound + 0.2, own, True",
@@ -23,6 +23,13 @@ FAULTS = (
         _ENUMERATION,
         "                    weight = 0.0\n                    for t in range(count):",
         "                    weight = spent[depth]\n                    for t in range(0):",
+        _OF_PARTS,
+    ),
+    Fault(
+        "where there is nothing to ask a ranking branches on the last row",
+        _COMPONENT,
+        "if pair[0] < 0:",
+        "if pair[0] < -1:",
         _OF_PARTS,
     ),
     Fault(
