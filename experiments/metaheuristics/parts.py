@@ -72,7 +72,7 @@ _searched = ShortSearch.run
 
 def _forgetful(self: ShortSearch, *words: Any) -> Any:
     """A search at the end of a dive that knows nothing of pairs from those before."""
-    for known in (self.trials.gain, self.trials.tried):
+    for known in (self.gain, self.tried):
         known[:] = 0
     return _searched(self, *words)
 

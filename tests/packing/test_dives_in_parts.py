@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 import assoc
 from assoc.packing.neighbourhoods import diving
@@ -14,6 +13,7 @@ from assoc.packing.neighbourhoods.diving import Diver, _Descent
 from assoc.packing.run import Run
 from assoc.packing.simplex.dual import OPTIMAL
 from assoc.simulation import simulate
+from tests.packing.test_remainder import optimum
 from tests.solvers.pieces import component
 
 # what HiGHS finds (scipy.optimize.milp, mip_rel_gap=1e-9) for the problem of ``mixed``
@@ -34,7 +34,7 @@ def mixed():
 def test_dives_in_parts_find_what_the_others_do_not(mixed):
     """Without them, 60 dives end 0.4 per cent above the optimum."""
     diver, rng, least = Diver(mixed, NONE, np.inf), np.random.default_rng(0), np.inf
-    for number in range(20):
+    for number in range(30):
         owner = diver.dive(np.ones(mixed.packing.num_columns), 4.0 * 2.0 ** (number % 4), rng, least, np.inf)
         if mixed.is_complete(owner):
             least = min(least, mixed.weight_of(owner))
@@ -59,18 +59,18 @@ def test_the_program_of_a_part_is_that_of_all_with_its_ranges(mixed, monkeypatch
     core, cutoff = diver._core, OPTIMUM + 3.0
     parts = diver._split(cutoff, np.inf)
     assert len(parts) > 1
-    assert all(part.search.trials.gain is diver._all.search.trials.gain for part in parts)
     for part in parts:
         program, fixed = part.program.program, []
+        everything = np.ones(program.weights.size, dtype=bool)
         assert part.relaxed.bound >= diver._all.relaxed.bound - 1e-9
         assert part.relaxed.primal.size == part.relaxed.reduced.size == core.num_columns
-        assert part.relaxed.bound == pytest.approx(_highs(program, part.program.slack, core, fixed), abs=1e-6)
+        assert part.relaxed.bound == pytest.approx(optimum(program, part.program.slack, everything, fixed), abs=1e-6)
         part.program.back()
         at = _Descent(core, part.program, part.relaxed, np.inf)
         for _ in range(3):
             if at.relaxed.status == OPTIMAL and at.fix(at.open_columns()[:2], 6.0, np.inf):
                 fixed = at.fixed.tolist()
-                least = _highs(program, part.program.slack, core, fixed)
+                least = optimum(program, part.program.slack, everything, fixed)
                 assert at.relaxed.bound == pytest.approx(least, abs=1e-6)
         assert fixed
     # nothing is split where memory is short, and nothing where counts are whole
@@ -89,21 +89,3 @@ def test_a_split_takes_a_share_of_the_time(mixed, monkeypatch):
     monkeypatch.setattr(diving, "now", lambda: 100.0)
     diver._split(0.0, 110.0)
     assert seen == [pytest.approx(103.0)]
-
-
-def _highs(program, slack, core, fixed):
-    """The optimum of a program with some of the packing's columns fixed; infinite where there is none."""
-    matrix = np.zeros((program.sides.size, program.weights.size))
-    for j in range(program.weights.size):
-        np.add.at(matrix[:, j], program.rows[program.start[j] : program.start[j + 1]], 1.0)
-    least = np.zeros(program.weights.size)
-    least[fixed] = 1.0
-    answer = linprog(
-        program.weights,
-        A_ub=matrix[slack],
-        b_ub=program.sides[slack],
-        A_eq=matrix[~slack],
-        b_eq=program.sides[~slack],
-        bounds=np.column_stack([least, np.full(least.size, np.inf)]),
-    )
-    return answer.fun if answer.status == 0 else np.inf

@@ -4,7 +4,7 @@ import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import kept_bases
-from assoc.packing.branching.kept_bases import keep_alone, keep_basis, kept_memory, no_kept_bases, take_kept
+from assoc.packing.branching.kept_bases import keep_basis, kept_memory, no_kept_bases, take_kept
 from assoc.packing.branching.node import branch, new_work, open_node, relax, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root
@@ -88,31 +88,6 @@ def test_the_oldest_makes_room_and_what_came_later_is_done():
     keep_basis(kept, basis)
     basis.variable[:] = np.roll(first, 1)
     assert take_kept(kept, root.program, basis, False)
-
-
-def test_a_basis_kept_alone_is_the_only_one():
-    packing = next(packings(1, 29))
-    root = plain_root(packing, dual_bound(packing))
-    basis, _ = solved(packing, root.program)
-    kept = no_kept_bases(root.program)
-    first = basis.variable.copy()
-    basis.variable[:] = np.roll(first, 1)
-    keep_basis(kept, basis)
-    basis.variable[:] = first
-    basis.age[0] = 7
-    keep_alone(kept, basis)
-    other = new_basis(root.program)
-    other.variable[:] = np.roll(first, 1)
-    assert not take_kept(kept, root.program, other, False)
-    other.variable[:] = first
-    assert take_kept(kept, root.program, other, False)
-    assert_basis(root.program, other)
-    assert other.age[0] == 7
-    # and none where bases are too large to be kept
-    none = no_kept_bases(root.program)
-    none = none._replace(**{name: getattr(none, name)[:0] for name in ("variable", "inverse", "norms", "age")})
-    keep_alone(none, basis)
-    assert not take_kept(none, root.program, other, False)
 
 
 def test_the_other_side_of_a_branching_starts_from_its_basis():

@@ -7,92 +7,136 @@ import pytest
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.short_search import Part, ShortSearch
 from assoc.packing.simplex.linear_program import LinearProgram
 from tests.packing.test_trial import packings
 
+NO_LIMITS = Limits(1e-9, np.inf, 100_000, np.inf)
+NONE = np.zeros(0, dtype=np.int64)
+
 
 def begun(packing):
-    """Its program, solved, and the search below it."""
+    """Its program, solved, and searches of it."""
     linear = LinearProgram(packing)
     relaxed = linear.solve(duals=dual_bound(packing))
     linear.mark()
-    return linear, relaxed, ShortSearch(packing, linear)
+    return linear, relaxed, ShortSearch(packing)
 
 
-def best_of(packing, columns):
-    """Least weight of a cover of these columns."""
+def everything(packing):
+    return Part(np.ones(packing.num_columns, dtype=bool), packing.slack, NONE)
+
+
+def part_of(packing, rng, share, most):
+    """Some columns of a packing, of which some are fixed."""
+    columns = rng.random(packing.num_columns) < share
+    fixed, covered = [], np.zeros(packing.num_rows + 1, dtype=bool)
+    for j in rng.permutation(np.flatnonzero(columns)):
+        rows = packing.cols[j][packing.cols[j] >= 0]
+        if len(fixed) < most and not covered[rows].any():
+            fixed.append(j)
+            covered[rows] = True
+    columns &= ~covered[packing.cols].any(axis=1)
+    columns[fixed] = True
+    return Part(columns, packing.slack & ~covered[:-1], np.array(fixed, dtype=np.int64))
+
+
+def best_of(packing, part):
+    """Least weight of a cover of these columns with those that are fixed."""
     matrix = np.zeros((packing.num_rows, packing.num_columns))
     for j in range(packing.num_columns):
         matrix[packing.cols[j][packing.cols[j] >= 0], j] = 1.0
+    least = np.zeros(packing.num_columns)
+    least[part.fixed] = 1.0
     rows = LinearConstraint(matrix, np.where(packing.slack, 0.0, 1.0), 1.0)
     answer = milp(
-        packing.weights, integrality=np.ones(packing.num_columns), bounds=Bounds(0.0, columns.astype(float)),
+        packing.weights, integrality=np.ones(packing.num_columns), bounds=Bounds(least, part.columns.astype(float)),
         constraints=rows,
     )  # fmt: skip
     return answer.fun if answer.status == 0 else np.inf
 
 
 def test_what_is_found_is_the_best_of_its_part():
-    """And nothing, where that is not below the cutoff; again and again with the same room."""
+    """And nothing, where that is not below the cutoff; whatever was searched before."""
     rng = np.random.default_rng(3)
-    limits = Limits(1e-9, np.inf, 100_000, np.inf)
     feasible = 0
-    for packing in packings(8, 41):
+    for packing in packings(12, 41):
         linear, _, search = begun(packing)
-        for share in (1.0, 0.8, 0.6):
-            columns = rng.random(packing.num_columns) < share
+        for share, most in ((1.0, 0), (1.0, 2), (0.8, 4), (0.6, 1), (1.0, 100)):
+            part = part_of(packing, rng, share, most)
             linear.back()
-            relaxed = linear.solve(columns=columns)
-            part = Part(columns, packing.slack, relaxed.bound)
-            best = best_of(packing, columns)
-            found, done = search.run(part, np.inf, limits)
+            linear.solve(columns=part.columns, slack=part.slack)
+            best = best_of(packing, part)
+            found, done = search.run(linear, part, np.inf, NO_LIMITS)
             assert done
             if best == np.inf:
                 assert not found.size
                 continue
             feasible += 1
-            assert columns[found].all()
+            assert part.columns[found].all() and np.isin(part.fixed, found).all()
             rows = packing.cols[found]
             rows = rows[rows >= 0]
             assert np.unique(rows).size == rows.size and np.isin(np.flatnonzero(~packing.slack), rows).all()
             assert packing.weights[found].sum() == pytest.approx(best, abs=1e-8)
-            linear.back()
-            linear.solve(columns=columns)
-            found, done = search.run(part, best - 1e-6, limits)
+            found, done = search.run(linear, part, best - 1e-6, NO_LIMITS)
             assert done and not found.size
-    assert feasible > 10
+    assert feasible > 25
 
 
-def test_it_begins_with_the_basis_at_hand():
-    begun_fractional = 0
-    for packing in packings(8, 42):
-        linear, relaxed, search = begun(packing)
-        linear.basis.age[0] = 7
-        search.run(Part(np.ones(packing.num_columns, dtype=bool), packing.slack, relaxed.bound), np.inf,
-                   Limits(1e-9, np.inf, 1, np.inf))  # fmt: skip
-        # computed anew it would be younger; and the program's own stays as it is
-        assert search._work.basis.age[0] >= 7 and linear.basis.age[0] == 7
-        fractional = (relaxed.primal > 1e-6) & (relaxed.primal < 1.0 - 1e-6)
-        begun_fractional += fractional.any()
-    assert begun_fractional
+def test_it_searches_what_is_left_alone(monkeypatch):
+    """Neither rows that fixed columns cover nor columns that are not allowed are in its program."""
+    rng, seen, new_work = np.random.default_rng(5), [], short_search.new_work
+    monkeypatch.setattr(
+        short_search, "new_work", lambda arrays, *words: seen.append((arrays, words[0])) or new_work(arrays, *words)
+    )
+    for packing in packings(6, 42):
+        linear, _, search = begun(packing)
+        part = part_of(packing, rng, 0.9, 2)
+        linear.solve(columns=part.columns, slack=part.slack)
+        search.run(linear, part, np.inf, NO_LIMITS)
+        arrays, program = seen.pop()
+        covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
+        assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
+        assert arrays.slack.size == program.sides.size <= packing.num_rows - covered
 
 
-def test_what_is_known_of_pairs_is_shared():
-    packing = next(packings(1, 43))
-    linear, relaxed, search = begun(packing)
-    other = ShortSearch(packing, linear, search)
-    assert other.trials.gain is search.trials.gain and other.trials.tried is search.trials.tried
-    assert other.trials.mass is not search.trials.mass
+def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():
+    """By the numbers of the packing's own rows, wherever they are in what is left."""
+    rng, learnt = np.random.default_rng(7), 0
+    for packing in packings(10, 43):
+        linear, _, search = begun(packing)
+        search.run(linear, everything(packing), np.inf, NO_LIMITS)
+        gain, tried = search.gain.copy(), search.tried.copy()
+        if not tried.any():
+            continue
+        # a search without nodes leaves all as it was
+        part = part_of(packing, rng, 1.0, 2)
+        linear.back()
+        linear.solve(columns=part.columns, slack=part.slack)
+        search.run(linear, part, np.inf, NO_LIMITS._replace(nodes=0))
+        assert (search.gain == gain).all() and (search.tried == tried).all()
+        # pairs of rows that are gone stay as they were; others are added to where they belong
+        fresh = ShortSearch(packing)
+        fresh.run(linear, part, np.inf, NO_LIMITS)
+        _, first, second = np.nonzero(fresh.tried)
+        gone = np.unique(packing.cols[part.fixed])
+        assert not np.isin(first, gone).any() and not np.isin(second, gone).any()
+        together = np.zeros((packing.num_rows, packing.num_rows), dtype=bool)
+        for one in packing.cols:
+            rows = one[one >= 0]
+            together[np.ix_(rows, rows)] = True
+        assert together[first, second].all()
+        learnt += first.size
+    assert learnt
 
 
 def test_a_search_of_few_nodes_says_that_it_did_not_end():
     ended = []
     for packing in packings(8, 44):
-        linear, relaxed, search = begun(packing)
-        part = Part(np.ones(packing.num_columns, dtype=bool), packing.slack, relaxed.bound)
-        ended += [search.run(part, np.inf, Limits(1e-9, np.inf, nodes, np.inf))[1] for nodes in (1, 100_000)]
+        linear, _, search = begun(packing)
+        for nodes in (1, 100_000):
+            ended.append(search.run(linear, everything(packing), np.inf, NO_LIMITS._replace(nodes=nodes))[1])
         assert ended[-1]
-        linear.back()
     assert not all(ended)

@@ -38,6 +38,7 @@ buttons.forEach(click);
 [...document.querySelectorAll('button')].filter((one) => !known.has(one)).reverse().forEach(click);
 return buttons.map((one) => one.dataset.title);
 """
+CHARTS = ".traces:first-child .legendtoggle, .js-plotly-plot"
 LOCAL = ("file:", "data:", "blob:", "about:")
 
 
@@ -107,13 +108,24 @@ def in_time(condition):
 
 def click_all(browser):
     """Click every button, link, row, choice, legend and chart; return what the buttons of the charts are called."""
+    names = {*browser.execute_script(CLICK_ALL)}
+    for number in range(len(browser.find_elements("css selector", CHARTS))):
+        assert in_time(lambda number=number: click_chart(browser, number))
+    return names
+
+
+def click_chart(browser, number):
+    """Click one of the charts and legends; whether it was there: a chart drawn anew has other elements than before."""
+    from selenium.common.exceptions import StaleElementReferenceException
     from selenium.webdriver import ActionChains
 
-    names = {*browser.execute_script(CLICK_ALL)}
-    for one in browser.find_elements("css selector", ".traces:first-child .legendtoggle, .js-plotly-plot"):
+    try:
+        one = browser.find_elements("css selector", CHARTS)[number]
         browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", one)
         ActionChains(browser).move_to_element(one).click().perform()
-    return names
+    except (IndexError, StaleElementReferenceException):
+        return False
+    return True
 
 
 CLICKED_WHILE_IT_DRAWS = """

@@ -72,15 +72,6 @@ def keep_basis(kept: KeptBases, basis: Basis) -> None:
         kept.age[place] = basis.age[0]
 
 
-def keep_alone(kept: KeptBases, basis: Basis) -> None:
-    """Keep a copy of a basis, and no other one."""
-    kept.variable[:] = -1
-    if kept.age.size:
-        kept.latest[0] = 0
-        kept.variable[0], kept.inverse[0], kept.norms[0] = basis.variable, basis.inverse, basis.norms
-        kept.age[0] = basis.age[0]
-
-
 @inner_njit
 def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> bool:
     """Make ``basis`` the kept one of its variables, but for multipliers and anchors; False: there is none.

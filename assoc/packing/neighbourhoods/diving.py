@@ -10,8 +10,9 @@ the dual simplex method goes on from where it was, some exchanges each time. So 
 before it cost, and what is left can still bring. The first choices cost next to nothing, and some are made at a time.
 The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
 the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
-cover, and branch and bound (branching/short_search.py) covers what is left. The share grows while these searches end
-early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to dive.
+cover, and branch and bound (branching/short_search.py) covers what is left, as a problem of its own. The share grows
+while these searches end early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to
+dive.
 
 Where the program mixes solutions of different kinds (branching/counts.py), dives end in whichever kind fits what they
 fixed first, and hardly ever in another. So after some dives every second one begins in a part of the solutions, one
@@ -61,7 +62,7 @@ _START, _ROWS = 0.35, 40
 _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
 # nodes of one such search
-_NODES = 8
+_NODES = 24
 # dives before the first one that begins in a part of the solutions: a split is judged by the best cover
 _BEFORE_PARTS = 8
 # share of the time left that such a split may take: where programs are large it is long
@@ -71,11 +72,10 @@ _WHOLE = 1e-6
 
 
 class _Start(NamedTuple):
-    """A linear program, marked where it is solved, and room for searches below it."""
+    """A linear program, marked where it is solved."""
 
     program: LinearProgram
     relaxed: Relaxation
-    search: ShortSearch
 
 
 class Diver:
@@ -108,7 +108,8 @@ class Diver:
             reduced = priced.reduced if is_over(deadline) else self._reduced_costs(priced.duals)
             if reduced[~near].min(initial=0.0) >= -priced.tolerance:
                 break
-        self._all = self._start(self._root, None, deadline)
+        self._all = self._start(self._root, deadline)
+        self._search = ShortSearch(self._core)
         self._parts: list[_Start] = []
         self._dives = 0
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
@@ -131,20 +132,23 @@ class Diver:
         reduced[below] = all_reduced_costs(program, extended)
         return reduced
 
-    def _start(self, root: Root, like: ShortSearch | None, deadline: float) -> _Start:
+    def _start(self, root: Root, deadline: float) -> _Start:
         """Solve the program of a root."""
         basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         program = LinearProgram.extended(self._core, root.program, root.slack, basis)
         relaxed = program.solve(deadline=deadline)
         program.mark()
-        return _Start(program, relaxed, ShortSearch(self._core, program, like))
+        return _Start(program, relaxed)
 
     @staticmethod
     def pays(packing: Packing) -> bool:
         """Whether a component has a size for dives, and there is memory for its program."""
         if not _LEAST <= packing.num_rows <= _MOST:
             return False
-        return memory_allows(_memory(packing, MOST_ROWS * packing.num_rows))
+        rows = MOST_ROWS * packing.num_rows
+        # with the mark of its root
+        program = 2.0 * LinearProgram.memory(packing, int(rows) - packing.num_rows)
+        return memory_allows(program + ShortSearch.memory(packing, rows))
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
@@ -174,7 +178,7 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-        found, done = at.completed(start.search, Limits(self._tolerance, np.inf, _NODES, deadline))
+        found, done = at.completed(self._search, Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         own_all(self._packing.cols, self._core.origin[found], owner)
@@ -192,7 +196,7 @@ class Diver:
     def _split(self, cutoff: float, deadline: float) -> list[_Start]:
         """The programs of the parts of the solutions, where a split on counts pays and there is memory for them."""
         core, relaxed, root = self._core, self._all.relaxed, self._root
-        each = _memory(core, root.slack.size + 2 * most_counts(core))
+        each = 2.0 * LinearProgram.memory(core, root.slack.size + 2 * most_counts(core) - core.num_rows)
         if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal) or not memory_allows(each):
             return []
         leaves = split_on_counts(core, root, cutoff, cutoff, now() + _SPLIT * (deadline - now()))
@@ -204,14 +208,8 @@ class Diver:
         for leaf in leaves:
             if is_over(deadline):
                 break
-            parts.append(self._start(leaf.root, self._all.search, deadline))
+            parts.append(self._start(leaf.root, deadline))
         return parts
-
-
-def _memory(packing: Packing, rows: float) -> float:
-    """Bytes of a start whose program has so many rows, with the mark of its root."""
-    more = int(rows) - packing.num_rows
-    return 2.0 * LinearProgram.memory(packing, more) + ShortSearch.memory(packing, rows)
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -293,14 +291,13 @@ class _Descent:
         """Columns that are fixed."""
         return np.array(self._fixed, dtype=np.int64)
 
-    def completed(self, search: ShortSearch, limits: Limits) -> tuple[NDArray[np.int32], bool]:
+    def completed(self, search: ShortSearch, limits: Limits) -> tuple[NDArray[np.int64], bool]:
         """Search a cover lighter than the cutoff with what is fixed; what is fixed alone where none was found.
 
         And whether the search came to its end.
         """
         relaxed = self.relaxed
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
-        columns[self._fixed] = True
         slack = self._packing.slack & ~self._covered
-        found, done = search.run(Part(columns, slack, relaxed.bound), self._cutoff, limits)
-        return (found if found.size else self.fixed.astype(np.int32)), done
+        found, done = search.run(self._program, Part(columns, slack, self.fixed), self._cutoff, limits)
+        return (found if found.size else self.fixed), done

@@ -29,7 +29,10 @@ _OF_COUNTS = "tests/packing/test_counts_small.py"
 _OF_COLONY = "tests/solvers/test_aco_max_min.py"
 _OF_GENETIC = "tests/solvers/test_genetic.py"
 _OF_DIVES = "tests/packing/test_diving.py"
+_SHORT = "assoc/packing/branching/short_search.py"
 _OF_SHORT = "tests/packing/test_short_search.py"
+_REMAINDER = "assoc/packing/simplex/remainder.py"
+_OF_REMAINDER = "tests/packing/test_remainder.py"
 _OF_PARTS = "tests/packing/test_dives_in_parts.py"
 _OF_SEARCH = "tests/packing/test_search_components.py"
 
@@ -134,8 +137,8 @@ FAULTS = (
     Fault(
         "divers do not end with branch and bound",
         _DIVER,
-        "        found, done = search.run(Part(columns, slack, relaxed.bound), self._cutoff, limits)\n",
-        "        found, done = np.zeros(0, dtype=np.int32), True\n",
+        "        found, done = search.run(self._program, Part(columns, slack, self.fixed), self._cutoff, limits)\n",
+        "        found, done = np.zeros(0, dtype=np.int64), True\n",
         _OF_DIVES,
     ),
     Fault("what ends a dive is lost", _DIVER, "(found if found.size else", "(found if False else", _OF_DIVES),
@@ -148,27 +151,42 @@ FAULTS = (
         "duals[self._core.row_origin], -np.inf,",
         _OF_DIVES,
     ),
-    Fault(
-        "parts learn nothing of pairs",
-        _DIVER,
-        "self._start(leaf.root, self._all.search",
-        "self._start(leaf.root, None",
-        _OF_PARTS,
-    ),
     Fault("a split may take all of the time", _DIVER, "now() + _SPLIT * (deadline - now())", "deadline", _OF_PARTS),
     Fault(
-        "a short search computes its first basis anew",
-        "assoc/packing/branching/short_search.py",
-        "        keep_alone(self._work.kept, basis)\n",
+        "short searches learn nothing of pairs",
+        _SHORT,
+        "        self.gain[pairs], self.tried[pairs] = work.trials.gain, work.trials.tried\n",
         "",
         _OF_SHORT,
     ),
+    Fault("short searches look for what is no better", _SHORT, "1, below, limits", "1, np.inf, limits", _OF_SHORT),
     Fault(
-        "short searches look for what is no better",
-        "assoc/packing/branching/short_search.py",
-        "self._open.arrays, 1, cutoff, limits",
-        "self._open.arrays, 1, np.inf, limits",
+        "a short search forgets what fixed columns weigh",
+        _SHORT,
+        "cutoff - float(packing.weights[part.fixed].sum())",
+        "cutoff",
         _OF_SHORT,
+    ),
+    Fault(
+        "what fixed columns take of cuts is forgotten",
+        _REMAINDER,
+        "program.sides - np.bincount(_entries(program, fixed)[0], minlength=program.sides.size)",
+        "np.where(np.arange(program.sides.size) < np.bincount(_entries(program, fixed)[0]).size, program.sides, 1.0)",
+        _OF_REMAINDER,
+    ),
+    Fault(
+        "rows that must be covered go where nothing can cover them",
+        _REMAINDER,
+        "used | (~slack & (sides > 0.0))",
+        "used",
+        _OF_REMAINDER,
+    ),
+    Fault(
+        "what is left of a program begins anew",
+        _REMAINDER,
+        "numbered = numbered[numbered >= 0]",
+        "numbered = numbered[:0]",
+        _OF_REMAINDER,
     ),
     Fault(
         "a diver keeps what leaves nothing better",

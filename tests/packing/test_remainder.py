@@ -1,0 +1,89 @@
+"""What is left of a program with columns fixed, against HiGHS on all of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from assoc.packing.simplex.basis import basis_of
+from assoc.packing.simplex.dual import OPTIMAL, Effort, bound_of, solve_dual
+from assoc.packing.simplex.program import Allowed, all_allowed, weight_limit
+from assoc.packing.simplex.remainder import remainder_of
+from tests.packing.test_trial import packings, program_with_cuts, solved
+
+
+def optimum(program, slack, columns, fixed):
+    """The optimum by HiGHS of a program with these columns, of which some are fixed; infinite without a solution."""
+    matrix = np.zeros((program.sides.size, program.weights.size))
+    for j in range(program.weights.size):
+        np.add.at(matrix[:, j], program.rows[program.start[j] : program.start[j + 1]], 1.0)
+    least, most = np.zeros(program.weights.size), np.where(columns, np.inf, 0.0)
+    least[fixed], most[fixed] = 1.0, 1.0
+    answer = linprog(
+        program.weights, A_ub=matrix[slack], b_ub=program.sides[slack], A_eq=matrix[~slack],
+        b_eq=program.sides[~slack], bounds=np.column_stack([least, most]),
+    )  # fmt: skip
+    return answer.fun if answer.status == 0 else np.inf
+
+
+@pytest.mark.parametrize("share", [1.0, 0.7])
+def test_it_has_the_optimum_of_the_whole_and_begins_there(share):
+    """Also with cuts, of which a column may take two; no exchange is made, as the whole was solved for this."""
+    rng, solvable, smaller = np.random.default_rng(17), 0, 0
+    for packing in packings(24, 18):
+        program = program_with_cuts(packing, rng)
+        basis, allowed = solved(packing, program)
+        columns = rng.random(packing.num_columns) < share
+        fixed, covered = [], np.zeros(packing.num_rows + 1, dtype=bool)
+        for j in rng.permutation(np.flatnonzero(columns)):
+            rows = packing.cols[j][packing.cols[j] >= 0]
+            if len(fixed) < 3 and not covered[rows].any():
+                fixed.append(j)
+                covered[rows] = True
+        open_columns = columns & ~covered[packing.cols].any(axis=1)
+        may_stay = allowed.slack.copy()
+        may_stay[: packing.num_rows] &= ~covered[:-1]
+        both = open_columns.copy()
+        both[fixed] = True
+        fixed = np.array(fixed, dtype=np.int64)
+        least = optimum(program, may_stay, open_columns, fixed)
+        effort = Effort(weight_limit(program), 10_000, np.inf)
+        status, _ = solve_dual(program, Allowed(np.flatnonzero(both).astype(np.int32), both, may_stay), basis, effort)
+        rest = remainder_of(program, basis, fixed, np.flatnonzero(open_columns), may_stay)
+        if least == np.inf:
+            assert status != OPTIMAL
+            continue
+        solvable += 1
+        assert (rest.columns == np.flatnonzero(open_columns)).all()
+        assert not covered[rest.rows[rest.rows < packing.num_rows]].any()
+        smaller += rest.rows.size < program.sides.size
+        all_of_it = all_allowed(rest.program, rest.slack)
+        begin = basis_of(rest.program, all_of_it, rest.variable, rest.duals)
+        status, exchanges = solve_dual(rest.program, all_of_it, begin, effort)
+        assert status == OPTIMAL and exchanges == 0
+        assert bound_of(rest.program, begin) + program.weights[fixed].sum() == pytest.approx(least, abs=1e-8)
+    assert solvable > 10 and smaller == solvable
+
+
+def test_columns_that_do_not_fit_leave_nothing():
+    """Two columns of one measurement, or more of a cut than it allows."""
+    for packing in packings(2, 19):
+        program = program_with_cuts(packing, np.random.default_rng(0))
+        basis, allowed = solved(packing, program)
+        row = int(np.argmax(np.diff(packing.row_ptr)))
+        two = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row] + 2].astype(np.int64)
+        assert remainder_of(program, basis, two, np.zeros(0, dtype=np.int64), allowed.slack) is None
+
+
+def test_nothing_left_is_a_program_without_rows():
+    """Also a basis of anchors alone, where no variable of the whole one is left."""
+    for packing in packings(2, 20):
+        program = program_with_cuts(packing, np.random.default_rng(0))
+        basis, allowed = solved(packing, program)
+        none = np.zeros(0, dtype=np.int64)
+        rest = remainder_of(program, basis, none, none, np.ones_like(allowed.slack))
+        assert rest.program.sides.size == rest.variable.size == rest.rows.size == 0
+        # rows that must be covered stay: nothing can
+        rest = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
+        assert rest.rows.size == program.sides.size and rest.variable.size == rest.rows.size
