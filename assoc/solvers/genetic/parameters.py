@@ -23,7 +23,7 @@ class GeneticParameters(SearchParameters):
     """
 
     population: int = field(default=20, metadata={"help": "solutions that live at a time"})
-    offspring: int = field(default=10, metadata={"help": "children in a generation"})
+    offspring: int = field(default=5, metadata={"help": "children in a generation"})
     tournament: int = field(default=2, metadata={"help": "a parent is the best of so many"})
 
     def __post_init__(self) -> None:
