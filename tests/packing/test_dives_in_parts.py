@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 import assoc
+from assoc.packing.branching.short_search import Part, _remainder
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
 from assoc.packing.run import Run
-from assoc.packing.simplex.dual import OPTIMAL
+from assoc.packing.simplex.basis import basis_of
+from assoc.packing.simplex.dual import OPTIMAL, bound_of
+from assoc.packing.simplex.program import all_allowed
 from assoc.simulation import simulate
 from tests.packing.test_remainder import optimum
 from tests.solvers.pieces import component
@@ -72,6 +75,11 @@ def test_the_program_of_a_part_is_that_of_all_with_its_ranges(mixed, monkeypatch
                 fixed = at.fixed.tolist()
                 least = optimum(program, part.program.slack, everything, fixed)
                 assert at.relaxed.bound == pytest.approx(least, abs=1e-6)
+                # and so has what is left of it, with what the fixed columns weigh
+                rest = _remainder(core, part.program, Part(at._columns, core.slack & ~at._covered, at.fixed))
+                alone = basis_of(rest.program, all_allowed(rest.program, rest.slack), rest.variable, rest.duals)
+                assert rest.program.sides.size < program.sides.size
+                assert bound_of(rest.program, alone) + core.weights[fixed].sum() == pytest.approx(least, abs=1e-6)
         assert fixed
     # nothing is split where memory is short, and nothing where counts are whole
     with monkeypatch.context() as short:
