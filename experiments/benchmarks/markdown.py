@@ -39,7 +39,8 @@ solvers have one core. Peers (other solvers) get the same tuples in the same pro
 in the command above everybody had one core, several seeds at a time. `sequential` assigns one sensor at a time with
 scipy, as most trackers do; `nrl_tracker` needs a dense tensor and takes part if that has at most 8 million elements.
 `chils`, `branch_reduce` and `mmwis` search for the heaviest independent set of the conflict graph, on all cores
-that they have; `kap` knows costs of pairs alone.
+that they have (the last two up to 40 targets: their graphs are too large beyond; none of the three proves anything, and
+at 20 targets they have 10 s); `kap` knows costs of pairs alone.
 Independent code checks the feasibility and cost of every answer.
 
 *Found*: runs whose cost is the reference: the optimum (by construction, or proven by any solver) or else,

@@ -1,6 +1,7 @@
 """What each part of `aco`, `genetic` and `tabu` contributes, and what a second core does.
 
-    python -m experiments.metaheuristics.ablation [--problems NAME ...] [--seconds S] [--count N] [--workers]
+    python -m experiments.metaheuristics.ablation [--problems NAME ...] [--seconds S] [--count N] [--parts WORDS ...]
+                                                  [--workers]
 
 Each solver runs with one part taken out (parts.py) on the same problems as the whole, with the same seeds and the
 same processor time (with two workers: of each core). A figure is the mean over the problems of the cost with the part
@@ -9,14 +10,14 @@ taken out of it without refinement ("alone"), where they can be seen. Intervals 
 The first row gives how far the whole is above the best cost that any of these runs found. With --workers the whole on
 one core is compared with two workers on two.
 
---publish replaces the rows of the problems, of the budget and of the solvers that were measured, so that the whole
-table can be measured in several runs.
+--publish replaces the rows of the problems, of the budget and of the solvers that were measured, with --parts those of
+these parts alone, so that the whole table can be measured in several runs.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -34,6 +35,7 @@ NAME = "metaheuristics.ablation"
 TITLE = "What the parts of the metaheuristics contribute"
 WORKERS = ", workers"
 """How the name of a group of claims ends that is about workers."""
+_BASES = (parts.WHOLE, parts.ALONE)
 # percent by which two sums of the same costs may differ
 _SAME = 1e-9
 
@@ -94,12 +96,13 @@ def prefix(name: str, seconds: float) -> str:
     return f"{name}, {seconds:g} s"
 
 
-def merged(new: list[Claim], name: str = NAME) -> list[Claim]:
-    """The published claims, those of the same problems, budgets and solvers replaced."""
+def merged(new: list[Claim], name: str = NAME, of: Callable[[Claim], str] | None = None) -> list[Claim]:
+    """The published claims, those of the same problems, budgets and solvers (or what else ``of`` names) replaced."""
     path = result_file(name)
     old = load_json(path) if path.exists() else []
-    measured_anew = {_subject(claim) for claim in new}
-    return [claim for claim in old if _subject(claim) not in measured_anew] + new
+    subject = of or _subject
+    measured_anew = {subject(claim) for claim in new}
+    return [claim for claim in old if subject(claim) not in measured_anew] + new
 
 
 def _subject(claim: Claim) -> str:
@@ -115,13 +118,16 @@ def program(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=2.0, metavar="S", help="of each run (default 2)")
     parser.add_argument("--count", type=int, default=10, metavar="N", help="problems of each name (default 10)")
     parser.add_argument("--solvers", nargs="+", default=list(parts.SOLVERS), metavar="NAME", help="only these")
-    parser.add_argument("--workers", action="store_true", help="no parts: one worker against two, on two cores")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--parts", nargs="+", metavar="WORDS", help="only these, as the table names them")
+    what.add_argument("--workers", action="store_true", help="no parts: one worker against two, on two cores")
     parser.add_argument("--json", metavar="FILE", help="write the results here")
     add_publish(parser, NAME)
     chosen = parser.parse_args(arguments)
     for label, given, known in (
         ("--problems", chosen.problems, PROBLEMS),
         ("--solvers", chosen.solvers, parts.SOLVERS),
+        ("--parts", chosen.parts or (), [part.words for part in parts.PARTS if part.words not in _BASES]),
     ):
         for one in given:
             if one not in known:
@@ -129,17 +135,29 @@ def program(arguments: Sequence[str] | None = None) -> int:
     if chosen.count < 2 or not 0.0 < chosen.seconds < 1e5:
         parser.error("expected --count of at least 2 and --seconds above 0")
     taken = (parts.PARTS[0], parts.TWO_WORKERS) if chosen.workers else parts.PARTS
+    if chosen.parts:
+        named = [part for part in taken if part.words in chosen.parts]
+        bases = {part.base for part in named} | {parts.WHOLE}
+        solvers = {solver for part in named for solver in part.solvers}
+        chosen.solvers = [one for one in chosen.solvers if one in solvers]
+        if not chosen.solvers:
+            parser.error(f"--solvers: none of them has a part of --parts; these have: {', '.join(sorted(solvers))}")
+        taken = (*(part for part in taken if part.words in bases), *named)
     taken = tuple(part._replace(solvers=tuple(one for one in part.solvers if one in chosen.solvers)) for part in taken)
     claims: list[Claim] = []
     for name in chosen.problems:
         _warm_up(name, chosen.count, taken)
         costs = measured(name, chosen.count, chosen.seconds, taken)
-        claims += claims_of(name, chosen.seconds, costs)
+        found = claims_of(name, chosen.seconds, costs)
+        if chosen.parts:
+            # how good the whole and the bare metaheuristic are is told by a run of all parts
+            found = [one for one in found if any(f", {words}, above " in one.quantity for words in chosen.parts)]
+        claims += found
     print_table(claims, TITLE)
     if chosen.json:
         save_json(chosen.json, claims, NAME, 0, __doc__ or "")
     if chosen.publish:
-        publish(merged(claims), NAME, 0, __doc__)
+        publish(merged(claims, of=(lambda claim: claim.quantity) if chosen.parts else None), NAME, 0, __doc__)
     return 0
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numba  # noqa: TID251  (a changed kernel is not kept)
+import numpy as np
 
 from assoc.packing.branching.root import Root, plain_root
 from assoc.packing.branching.short_search import ShortSearch
@@ -22,11 +23,14 @@ from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
 from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.packing import Packing
 from assoc.solvers.aco import max_min
+from assoc.solvers.genetic import population
 from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu import moves
 
 SOLVERS = ("aco", "genetic", "tabu")
 WHOLE, ALONE = "all parts", 'refinement="none"'
+# iterations
+_NEVER = 1_000_000_000
 
 
 class Part(NamedTuple):
@@ -128,6 +132,18 @@ def _inverted_selection() -> Iterator[None]:
         yield
 
 
+def _admit_equals(self: Any, component: Component, owner: Any, weight: float) -> None:
+    """A child replaces the worst member if it is better, whatever the others cost."""
+    worst = int(np.argmax(self.fitness))
+    if component.is_complete(owner) and weight < self.fitness[worst]:
+        self.members[worst], self.fitness[worst] = owner, weight
+
+
+def _deposit_unlimited(self: Any, cols: Any, owner: Any, share: float) -> None:
+    """Pheromone that may fade away."""
+    max_min._update(self.pheromone, self.slack_pheromone, owner, share, 0.0)
+
+
 def _rewritten(kernel: Any, old: str, new: str) -> Any:
     """A kernel with a part of its text replaced, compiled when it is called."""
     function = getattr(kernel, "py_func", kernel)
@@ -165,14 +181,18 @@ OWN = (
     Part("alpha 0: pheromone ignored", ("aco",), {"alpha": 0.0}),
     Part("beta 0: visibility ignored", ("aco",), {"beta": 0.0}),
     Part("no pheromone laid", ("aco",), without=_replaced(max_min.Colony, "_deposit", lambda *_: None)),
+    Part("no lower limit of pheromone", ("aco",), without=_replaced(max_min.Colony, "_deposit", _deposit_unlimited)),
+    Part("pheromone never laid anew", ("aco",), without=_replaced(max_min, "_RENEWAL", _NEVER)),
     Part("no crossover", ("genetic",), without=_no_crossover),
     Part("no selection", ("genetic",), {"tournament": 1}),
     Part("selection inverted", ("genetic",), without=_inverted_selection),
+    Part("population never renewed", ("genetic",), without=_replaced(population, "_RENEWAL", _NEVER)),
+    Part("equal members admitted", ("genetic",), without=_replaced(Breeding, "_admit", _admit_equals)),
     Part("no moves", ("tabu",), without=_no_moves),
     Part("tenure 0", ("tabu",), {"tenure": 0}),
     Part("no aspiration", ("tabu",), without=_no_aspiration),
     Part("no column forced in", ("tabu",), without=_replaced(moves.TabuSearch, "_force", lambda *_: -1)),
-    Part("no restarts", ("tabu",), {"restart": 1_000_000_000}),
+    Part("no restarts", ("tabu",), {"restart": _NEVER}),
 )
 """Parts that one of the three has and the others have not."""
 
@@ -192,9 +212,7 @@ SHARED = (
 
 def _alone(part: Part) -> Part:
     """The same part taken out of the metaheuristic without any refinement."""
-    return part._replace(
-        words=f"alone, {part.words}", parameters={"refinement": "none", **part.parameters}, base=ALONE
-    )
+    return part._replace(words=f"alone, {part.words}", parameters={"refinement": "none", **part.parameters}, base=ALONE)
 
 
 PARTS = (

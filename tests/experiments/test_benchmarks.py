@@ -106,6 +106,12 @@ def test_goals_of_wide_gaps_and_axial_problems() -> None:
     assert not verdict(goals.judge([known, replace(known, seed=1001, status="feasible")]), "exact: proof").met
     axial = replace(ROW, family="random axial", size="n=26")
     assert "1 of 1, n=26 median 0.01 s" in verdict(goals.judge([axial]), "exact: proof in 60 s").measured
+    for row in (known, axial):
+        assert verdict(goals.judge([row]), "exact: no slower than").met
+        assert not verdict(goals.judge([replace(row, seconds=7.0, cpu=7.0)]), "exact: no slower than").met
+    scan = replace(ROW, family="paper", size="3 radars", solver="aco")
+    assert verdict(goals.judge([replace(scan, seconds=9e-4)]), "aco: a scan in less than").met
+    assert not verdict(goals.judge([replace(scan, seconds=2e-3, cpu=2e-3)]), "aco: a scan in less than").met
 
 
 def test_a_limit_for_peers_and_chosen_seeds() -> None:

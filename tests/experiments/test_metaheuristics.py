@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +73,41 @@ def test_inverted_selection_takes_the_worst():
     assert breeding.fitness.tolist() == [3.0, -7.0, 5.0, 0.0]
 
 
+def test_equal_members_are_admitted_without_the_rule():
+    component = SimpleNamespace(is_complete=lambda owner: True, tolerance=1e-9)
+    for words, expected in ((parts.WHOLE, [1.0, 2.0, 3.0]), ("equal members admitted", [1.0, 2.0, 2.0])):
+        breeding = parts.Breeding.__new__(parts.Breeding)
+        breeding.members, breeding.fitness = np.zeros((3, 1), np.int32), np.array([1.0, 2.0, 3.0])
+        with next(part for part in parts.PARTS if part.words == words).without():
+            breeding._admit(component, np.ones(1, np.int32), 2.0)
+        assert breeding.fitness.tolist() == expected
+
+
+def test_pheromone_fades_away_without_its_limit():
+    for words, fades in ((parts.WHOLE, False), ("no lower limit of pheromone", True)):
+        colony = parts.max_min.Colony.__new__(parts.max_min.Colony)
+        colony.pheromone, colony.slack_pheromone, colony.lowest = np.full(2, 0.3), np.full(1, 0.3), 0.25
+        with next(part for part in parts.PARTS if part.words == words).without():
+            colony._deposit(np.zeros((2, 1), np.int32), np.zeros(1, np.int32), 0.5)
+        assert (colony.pheromone[1] < 0.25) == fades and colony.pheromone[0] == pytest.approx(0.65)
+
+
+@pytest.mark.slow
+def test_ablation_of_some_parts_measures_their_solvers_alone(capsys, tmp_path):
+    file = tmp_path / "results.json"
+    words = ["--problems", "ghosts 10", "--seconds", "0.2", "--count", "2", "--parts", "alone, no crossover"]
+    assert ablation.program([*words, "--json", str(file)]) == 0
+    found = [claim["quantity"] for claim in json.loads(file.read_text())["claims"]]
+    assert found == [f"ghosts 10, 0.2 s: genetic, alone, no crossover, above {parts.ALONE}"]
+    for wrong, reason in (
+        (["--parts", "no legs"], "unknown"),
+        (["--parts", "no moves", "--solvers", "aco"], "none of"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            ablation.program(wrong)
+        assert reason in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_ablation_reports_every_part(tmp_path, capsys):
     file = tmp_path / "results.json"
@@ -122,6 +158,9 @@ def test_published_results_of_other_problems_and_solvers_stay(tmp_path, monkeypa
         Claim("a, 2 s: tabu, all parts, above the best found", ours=8.0),
     ])  # fmt: skip
     assert [one.ours for one in again] == [2.0, 3.0, 9.0, 8.0]
+    # of a run with --parts only the same rows are replaced
+    part = [Claim("a, 1 s: aco, beta 0: no eta, above all parts", ours=7.0)]
+    assert [one.ours for one in ablation.merged(part, of=lambda claim: claim.quantity)] == [2.0, 3.0, 7.0]
 
 
 @pytest.mark.slow
