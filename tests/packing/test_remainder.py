@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from assoc.packing.bounds.dual_ascent import dual_bound
+from assoc.packing.branching.root import root_with_cuts
+from assoc.packing.prepare import prepare
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, Effort, bound_of, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, weight_limit
 from assoc.packing.simplex.remainder import remainder_of
+from experiments.common.oracles import axial_problem
 from tests.packing.test_trial import packings, program_with_cuts, solved
 
 
@@ -27,16 +31,36 @@ def optimum(program, slack, columns, fixed):
     return answer.fun if answer.status == 0 else np.inf
 
 
-@pytest.mark.parametrize("share", [1.0, 0.7])
-def test_it_has_the_optimum_of_the_whole_and_begins_there(share):
-    """Also with cuts, of which a column may take two; no exchange is made, as the whole was solved for this."""
-    rng, solvable, smaller = np.random.default_rng(17), 0, 0
+def with_random_cuts():
+    """Packings, their programs with cuts of which a column may take two, solved."""
+    rng = np.random.default_rng(17)
     for packing in packings(24, 18):
         program = program_with_cuts(packing, rng)
-        basis, allowed = solved(packing, program)
+        yield packing, program, *solved(packing, program)
+
+
+def with_cuts_at_work():
+    """Packings whose cuts, those of branch and bound, have multipliers."""
+    rng = np.random.default_rng(21)
+    for _ in range(24):
+        packing = prepare(axial_problem(rng, (8, 8, 8), 0.6, "positive")).packing
+        root = root_with_cuts(packing, dual_bound(packing), np.inf, np.inf)
+        if (root.duals[packing.num_rows :] < -1e-6).any():
+            allowed = all_allowed(root.program, root.slack)
+            yield packing, root.program, basis_of(root.program, allowed, root.variable, root.duals), allowed
+
+
+@pytest.mark.parametrize("cuts", [with_random_cuts, with_cuts_at_work])
+@pytest.mark.parametrize("share", [1.0, 0.7])
+def test_it_has_the_optimum_of_the_whole_and_begins_there(share, cuts):
+    """No exchange is made, as the whole was solved for this."""
+    rng, solvable, smaller, taken = np.random.default_rng(17), 0, 0, 0
+    for packing, program, basis, allowed in cuts():
         columns = rng.random(packing.num_columns) < share
+        # those that the program takes most of first: they leave a solution
+        order = np.argsort(-relaxed_values(program, basis) - rng.random(packing.num_columns))
         fixed, covered = [], np.zeros(packing.num_rows + 1, dtype=bool)
-        for j in rng.permutation(np.flatnonzero(columns)):
+        for j in order[columns[order]]:
             rows = packing.cols[j][packing.cols[j] >= 0]
             if len(fixed) < 3 and not covered[rows].any():
                 fixed.append(j)
@@ -63,21 +87,38 @@ def test_it_has_the_optimum_of_the_whole_and_begins_there(share):
         status, exchanges = solve_dual(rest.program, all_of_it, begin, effort)
         assert status == OPTIMAL and exchanges == 0
         assert bound_of(rest.program, begin) + program.weights[fixed].sum() == pytest.approx(least, abs=1e-8)
-    assert solvable > 10 and smaller == solvable
+        # cuts that still bind, of which fixed columns have taken a part
+        cut = rest.rows >= packing.num_rows
+        part_taken = rest.program.sides[cut] < program.sides[rest.rows[cut]]
+        taken += int((part_taken & (begin.duals[cut] < -1e-6)).sum())
+    assert solvable > 8 and smaller == solvable and (taken > 0 or cuts is with_random_cuts)
+
+
+def relaxed_values(program, basis):
+    """What a basis takes of each column."""
+    values = np.zeros(program.weights.size)
+    inside = basis.place >= 0
+    values[inside] = basis.values[basis.place[inside]]
+    return values
 
 
 def test_columns_that_do_not_fit_leave_nothing():
-    """Two columns of one measurement, or more of a cut than it allows."""
+    """Two columns of one measurement, or one that takes of a row more than it allows."""
+    none = np.zeros(0, dtype=np.int64)
     for packing in packings(2, 19):
         program = program_with_cuts(packing, np.random.default_rng(0))
         basis, allowed = solved(packing, program)
         row = int(np.argmax(np.diff(packing.row_ptr)))
         two = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row] + 2].astype(np.int64)
-        assert remainder_of(program, basis, two, np.zeros(0, dtype=np.int64), allowed.slack) is None
+        assert remainder_of(program, basis, two, none, allowed.slack) is None
+        first = np.flatnonzero(program.rows >= packing.num_rows)[0]
+        cut, one = program.rows[first], np.searchsorted(program.start, [first], side="right") - 1
+        assert remainder_of(program, basis, one, none, allowed.slack) is not None
+        full = program._replace(sides=np.where(np.arange(program.sides.size) == cut, 0.0, program.sides))
+        assert remainder_of(full, basis, one, none, allowed.slack) is None
 
 
 def test_nothing_left_is_a_program_without_rows():
-    """Also a basis of anchors alone, where no variable of the whole one is left."""
     for packing in packings(2, 20):
         program = program_with_cuts(packing, np.random.default_rng(0))
         basis, allowed = solved(packing, program)
@@ -87,3 +128,14 @@ def test_nothing_left_is_a_program_without_rows():
         # rows that must be covered stay: nothing can
         rest = remainder_of(program, basis, none, none, np.zeros_like(allowed.slack))
         assert rest.rows.size == program.sides.size and rest.variable.size == rest.rows.size
+
+
+def test_where_no_variable_of_a_basis_is_left_it_begins_with_anchors():
+    for packing in packings(2, 20):
+        program = program_with_cuts(packing, np.random.default_rng(0))
+        basis, allowed = solved(packing, program)
+        # the first column in every place, and it is not of the rest
+        alone = basis._replace(variable=np.zeros_like(basis.variable))
+        rest = remainder_of(program, alone, np.zeros(0, np.int64), np.arange(1, packing.num_columns), allowed.slack)
+        begin = basis_of(rest.program, all_allowed(rest.program, rest.slack), rest.variable, rest.duals)
+        assert (begin.variable >= rest.columns.size + rest.rows.size).all()

@@ -10,7 +10,10 @@ from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.short_search import Part, ShortSearch
+from assoc.packing.simplex.basis import basis_of
+from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
+from assoc.packing.simplex.program import all_allowed
 from tests.packing.test_trial import packings
 
 NO_LIMITS = Limits(1e-9, np.inf, 100_000, np.inf)
@@ -100,6 +103,25 @@ def test_it_searches_what_is_left_alone(monkeypatch):
         covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
         assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
         assert arrays.slack.size == program.sides.size <= packing.num_rows - covered
+
+
+def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
+    """Its root needs no exchange: the bound is that of the whole with what is fixed."""
+    rng, roots, open_nodes, warm = np.random.default_rng(6), [], short_search.OpenNodes, 0
+    monkeypatch.setattr(short_search, "OpenNodes", lambda root: roots.append(root) or open_nodes(root))
+    for packing in packings(6, 45):
+        linear, _, search = begun(packing)
+        part = part_of(packing, rng, 1.0, 2)
+        relaxed = linear.solve(columns=part.columns, slack=part.slack)
+        if relaxed.status != OPTIMAL:
+            continue
+        search.run(linear, part, np.inf, NO_LIMITS)
+        root = roots.pop()
+        begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
+        fixed = float(packing.weights[part.fixed].sum())
+        assert bound_of(root.program, begin) + fixed == pytest.approx(relaxed.bound, abs=1e-6)
+        warm += int((begin.place >= 0).sum())
+    assert warm > 10
 
 
 def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():

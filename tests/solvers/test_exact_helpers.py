@@ -1,5 +1,6 @@
 """When `exact` lets metaheuristics help its branching."""
 
+import numpy as np
 import pytest
 
 from assoc import assign
@@ -27,6 +28,18 @@ def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
     solution = assign(build_problem(ghost(20, 2018), 0), "exact")
     assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
     assert bool(joined) == (alone == 3) and all(age >= alone for age in joined)
+
+
+@pytest.mark.slow
+def test_a_long_search_says_from_the_beginning_what_it_knows():
+    """The first solution and bound come in the first tenth of a search of forty nodes, and better ones after them."""
+    trace = assign(build_problem(ghost(60, 7001), 0), "exact", nodes=40).trace
+    first, last = trace[0], trace[-1]
+    assert np.isfinite([first.cost, first.lower_bound]).all()
+    assert first.seconds < 0.1 * last.seconds
+    assert first.cost > last.cost and first.lower_bound < last.lower_bound
+    silences = np.diff([point.seconds for point in trace])
+    assert len(trace) > 4 and silences.max() < 0.7 * last.seconds
 
 
 def test_bounds_of_many_components_are_added_up_exactly():

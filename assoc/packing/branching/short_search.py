@@ -1,6 +1,7 @@
 """A short branch and bound where columns are fixed: some nodes, in what is left of a linear program.
 
-What is left is a program of its own (simplex/remainder.py): with half of the rows all takes a quarter of the time.
+What is left is a program of its own (simplex/remainder.py): with half of the rows an exchange takes a quarter of the
+time. A search that fills the room for its open nodes ends there, as with its last node.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ class ShortSearch:
     @staticmethod
     def memory(packing: Packing, rows: float) -> float:
         """Bytes that it takes at the most for a program of so many rows."""
-        return 10.0 * packing.num_rows**2 + work_memory(rows, packing.num_columns, packing.num_sensors)
+        # open nodes, and what is known of pairs with a copy of it
+        nodes = 60.0 * packing.num_columns
+        return 20.0 * packing.num_rows**2 + nodes + work_memory(rows, packing.num_columns, packing.num_sensors)
 
     def run(self, linear: LinearProgram, part: Part, cutoff: float, limits: Limits) -> tuple[NDArray[np.int64], bool]:
         """Search the part that a program was just solved for.

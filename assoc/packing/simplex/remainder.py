@@ -54,7 +54,7 @@ def remainder_of(
     fixed : int array
         Columns that are in every solution of the rest.
     columns : int array
-        Columns that may be used besides, ascending; none has a row in common with one that is fixed.
+        Columns that may be used besides, ascending; none has a measurement in common with one that is fixed.
     slack : bool array, shape (rows of the program,)
         Rows that may stay uncovered.
     """

@@ -171,8 +171,23 @@ FAULTS = (
         "what fixed columns take of cuts is forgotten",
         _REMAINDER,
         "program.sides - np.bincount(_entries(program, fixed)[0], minlength=program.sides.size)",
-        "np.where(np.arange(program.sides.size) < np.bincount(_entries(program, fixed)[0]).size, program.sides, 1.0)",
+        "program.sides"
+        " - (program.sides == 1.0) * np.bincount(_entries(program, fixed)[0], minlength=program.sides.size)",
         _OF_REMAINDER,
+    ),
+    Fault(
+        "a rest without a variable of the basis begins with a column",
+        _REMAINDER,
+        "else columns.size + size",
+        "else 0",
+        _OF_REMAINDER,
+    ),
+    Fault(
+        "short searches begin with anchors",
+        _SHORT,
+        "rest.slack, rest.variable, rest.duals",
+        "rest.slack, rest.variable * 0 + rest.columns.size + rest.rows.size, rest.duals",
+        _OF_SHORT,
     ),
     Fault(
         "rows that must be covered go where nothing can cover them",
