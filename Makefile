@@ -1,7 +1,7 @@
 # make demo   simulate the three-radar scene, associate it with the ant colony, print the result
 # make test   install what the tests need and run them, of the slow ones a sample (CONTRIBUTING.md)
 # make test-all         all tests: what a release needs
-# make lint   ruff, mypy and import-linter
+# make lint   ruff (rules and format), mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make mutants          faults put in on purpose: each must make the tests of its room fail
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
@@ -50,6 +50,7 @@ test-all: $(VENV)/.installed-test
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .
+	$(PY) -m ruff format --check --quiet .
 	$(PY) -m mypy
 	$(VENV)/bin/lint-imports
 

@@ -119,9 +119,7 @@ def _list_parser() -> Parser:
 
 
 def _parser(scenario: str, choices: list[Option]) -> Parser:
-    parser = Parser(
-        prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + "."
-    )
+    parser = Parser(prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".")
     content = "file for the plots (.csv)" if scenario in _PLOTS else "file for the scene (.npz)"
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)
     if scenario in _PLOTS:

@@ -52,8 +52,6 @@ def test_package_does_not_import_the_program():
 
 
 def test_the_list_of_programs():
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "assoc"], capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-W", "error", "-m", "assoc"], capture_output=True, text=True, check=True)
     assert "assoc.simulate" in done.stdout and "assoc.solve" in done.stdout
     assert done.stderr == ""

@@ -11,6 +11,7 @@ from assoc.problem import AssignmentProblem
 
 def same(one, other):
     """Whether two problems have the same tuples with the same costs."""
+
     def content(problem):
         return sorted(zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True))
 

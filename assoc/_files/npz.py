@@ -55,9 +55,7 @@ def save_npz(
     content = {name: np.asarray(value) for name, value in arrays.items()}
     for name, value in content.items():
         if value.dtype.hasobject:
-            raise InvalidInputError(
-                f"{path}: the field {name!r} holds Python objects, expected a plain array"
-            )
+            raise InvalidInputError(f"{path}: the field {name!r} holds Python objects, expected a plain array")
     header = {"format": np.asarray(format_name), "version": np.asarray(version)}
 
     def write(file: IO[bytes]) -> None:
@@ -111,8 +109,7 @@ def load_npz(
         raise
     except zipfile.BadZipFile as error:
         raise InvalidInputError(
-            f"{file}: is not a readable npz file ({_one_line(error)}), "
-            f"expected a file of format {format_name!r}"
+            f"{file}: is not a readable npz file ({_one_line(error)}), expected a file of format {format_name!r}"
         ) from error
     except (OSError, EOFError, zlib.error, lzma.LZMAError, RuntimeError, ValueError, NotImplementedError) as error:
         raise InvalidInputError(f"{file}: cannot be read ({_one_line(error)})") from error
@@ -168,9 +165,7 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
     """One array; its header is checked before memory is allocated."""
     name = info.filename.removesuffix(".npy")
     if info.file_size > SIZE_LIMIT or info.file_size > _LARGEST_EXPANSION * info.compress_size + 1000:
-        raise InvalidInputError(
-            f"{file}: the field {name!r} claims {info.file_size} bytes, more than it can hold"
-        )
+        raise InvalidInputError(f"{file}: the field {name!r} claims {info.file_size} bytes, more than it can hold")
     with archive.open(info) as stream:
         try:
             major, minor = np.lib.format.read_magic(stream)
@@ -181,24 +176,16 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
             else:
                 raise ValueError(f"npy version {major}.{minor}")
         except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError) as error:
-            raise InvalidInputError(
-                f"{file}: the field {name!r} is not a plain array ({_one_line(error)})"
-            ) from error
+            raise InvalidInputError(f"{file}: the field {name!r} is not a plain array ({_one_line(error)})") from error
         if dtype.hasobject:
-            raise InvalidInputError(
-                f"{file}: the field {name!r} holds pickled objects, expected {spec.kind} values"
-            )
+            raise InvalidInputError(f"{file}: the field {name!r} holds pickled objects, expected {spec.kind} values")
         if dtype.kind not in _KINDS[spec.kind]:
-            raise InvalidInputError(
-                f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values"
-            )
+            raise InvalidInputError(f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values")
         if dtype.itemsize == 0:
             # numpy allocates one character each, which a check against the size of the file cannot see
             raise InvalidInputError(f"{file}: the field {name!r} holds texts without room for a character")
         if len(shape) != spec.ndim:
-            raise InvalidInputError(
-                f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}"
-            )
+            raise InvalidInputError(f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}")
         if any(type(side) is not int for side in shape):
             # True and False pass numpy's own check, and no array has such a side
             raise InvalidInputError(f"{file}: the field {name!r} has the shape {shape}, expected whole numbers")

@@ -107,9 +107,7 @@ class ScanAssociation(Shown):
         if self.gate_loss is not None:
             content["gate_loss"] = plain(self.gate_loss)
         if self.ranked:
-            content["ranked"] = [
-                {"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)
-            ]
+            content["ranked"] = [{"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)]
         return content
 
     def __repr__(self) -> str:

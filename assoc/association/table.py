@@ -96,9 +96,7 @@ def _short_names(files: Sequence[str]) -> list[str]:
     return [short[file] for file in files] if len({*short.values()}) == len(short) else list(files)
 
 
-def _lines(
-    scans: Sequence[ScanAssociation], files: Sequence[str]
-) -> Iterator[tuple[ScanAssociation, str, int]]:
+def _lines(scans: Sequence[ScanAssociation], files: Sequence[str]) -> Iterator[tuple[ScanAssociation, str, int]]:
     """One line for each scan, or for each of its ranked associations: association, file, rank."""
     for scan, file in zip(scans, files, strict=True):
         for place, one in enumerate(scan.ranked or (scan,), start=1):

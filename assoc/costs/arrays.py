@@ -87,9 +87,7 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
         base += missed
     if not (np.isfinite(weight).all() and np.isfinite(gain).all()):
         worst = int(np.argmax(~(np.isfinite(weight).all(axis=(1, 2)) & np.isfinite(gain))))
-        raise InvalidInputError(
-            f"sensor {worst}: its noise or field of view is too extreme to compute a cost"
-        )
+        raise InvalidInputError(f"sensor {worst}: its noise or field of view is too extreme to compute a cost")
     half = 0.5 * (scene.region[:, 1] - scene.region[:, 0])
     # a flat region says where the targets are, it must not overrule what the sensors measure
     half = np.maximum(half, 0.1 * half.max())
@@ -114,9 +112,7 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
     """
     count = len(sensors.dim)
     if len(scan.measurements) != count:
-        raise InvalidInputError(
-            f"scan has measurements of {len(scan.measurements)} sensors, the scene has {count}"
-        )
+        raise InvalidInputError(f"scan has measurements of {len(scan.measurements)} sensors, the scene has {count}")
     start = np.zeros(count + 1, dtype=np.int64)
     np.cumsum([len(one) for one in scan.measurements], out=start[1:])
     z = np.zeros((int(start[-1]), 3))

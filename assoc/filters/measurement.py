@@ -81,9 +81,7 @@ class FunctionMeasurement:
         slopes = finite(self._jacobian(states), "the measurement function's jacobian", 3)
         wanted = (len(states), self.dim, states.shape[1])
         if slopes.shape != wanted:
-            raise InvalidInputError(
-                f"the measurement function's jacobian must have shape {wanted}, got {slopes.shape}"
-            )
+            raise InvalidInputError(f"the measurement function's jacobian must have shape {wanted}, got {slopes.shape}")
         return slopes
 
     def residual(self, measured: Array, predicted: Array) -> Array:

@@ -65,9 +65,7 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
     columns = [np.asarray(value) for value in (windows, sources, tracks, confirmed)]
     if any(column.shape != (len(columns[0]),) for column in columns):
         shapes = ", ".join(str(column.shape) for column in columns)
-        raise InvalidInputError(
-            f"windows, sources, tracks and confirmed must have one shape (n,), got {shapes}"
-        )
+        raise InvalidInputError(f"windows, sources, tracks and confirmed must have one shape (n,), got {shapes}")
     window, source, track, sure = columns
     correct = sure.astype(bool) & (source >= 0) & (identity_after_each(source, track) == source)
     previous: dict[int, int] = {}

@@ -215,7 +215,7 @@ def _unproved(
     if known is None:
         solution = quick(problem, bound, run)
     else:
-        (cost, indices), = _in_order(problem, [columns.indices(known)])
+        ((cost, indices),) = _in_order(problem, [columns.indices(known)])
         solution = Solution(problem.tuples[indices], indices, cost, min(bound, cost), "kbest", 0, 0.0)
         with contextlib.suppress(InfeasibleError):
             solution = min(solution, quick(problem, bound, run), key=lambda one: one.cost)

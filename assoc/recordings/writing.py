@@ -46,9 +46,7 @@ def write_plots(path: str | os.PathLike[str], recording: Recording) -> None:
 
 
 @door
-def write_tracks(
-    path: str | os.PathLike[str], ids: Array, times: Array, positions: Array, velocities: Array
-) -> None:
+def write_tracks(path: str | os.PathLike[str], ids: Array, times: Array, positions: Array, velocities: Array) -> None:
     """Write tracks, or the truth, as CSV with the columns track_id, time, x, y, z, vx, vy, vz.
 
     Parameters

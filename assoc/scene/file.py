@@ -75,9 +75,7 @@ def _to_arrays(parts: Mapping[str, Any]) -> dict[str, Array | str | int]:
         "sensor_detection_probability": np.array([sensor.detection_probability for sensor in sensors]),
         "sensor_false_alarm_rate": np.array([sensor.false_alarm_rate for sensor in sensors]),
         "measurement_values": np.concatenate([z.ravel() for block in blocks for z in block]),
-        "measurement_offsets": np.concatenate(
-            [np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1
-        ),
+        "measurement_offsets": np.concatenate([np.zeros((len(sensors), 1), np.int64), counts.cumsum(axis=1)], axis=1),
     }
     if parts["sectors"] is not None:
         arrays["sectors"] = parts["sectors"]
@@ -124,9 +122,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
     _check_shape(arrays, "sensor_position", (count, 3))
     dims = arrays["sensor_dim"]
     if dims.min() < 1 or dims.max() > 4:
-        raise InvalidInputError(
-            f"the field 'sensor_dim' must hold 1 to 4, got {dims.min()} to {dims.max()}"
-        )
+        raise InvalidInputError(f"the field 'sensor_dim' must hold 1 to 4, got {dims.min()} to {dims.max()}")
     _check_shape(arrays, "sensor_covariance", (int((dims**2).sum()),))
     _check_shape(arrays, "sensor_field_of_view", (int(dims.sum()), 2))
     sensors = []
@@ -135,8 +131,7 @@ def _from_arrays(arrays: dict[str, Array]) -> dict[str, Any]:
         kind = str(arrays["sensor_kind"][s])
         if kind not in KINDS:
             raise InvalidInputError(
-                f"the field 'sensor_kind' has {kind[:40]!r} for sensor {s}, "
-                f"expected one of {', '.join(KINDS)}"
+                f"the field 'sensor_kind' has {kind[:40]!r} for sensor {s}, expected one of {', '.join(KINDS)}"
             )
         covariance = arrays["sensor_covariance"][square : square + dim * dim].reshape(dim, dim)
         try:

@@ -67,14 +67,9 @@ class Truth:
         if self.sources is not None:
             sources = []
             for k, scan in enumerate(self.sources):
-                row = [
-                    integers(s, f"truth: sources of scan {k}, sensor {i}", len(s))
-                    for i, s in enumerate(scan)
-                ]
+                row = [integers(s, f"truth: sources of scan {k}, sensor {i}", len(s)) for i, s in enumerate(scan)]
                 if any(s.size and s.min() < -1 for s in row):
-                    raise InvalidInputError(
-                        f"truth: sources of scan {k} must be target ids or -1 (false alarm)"
-                    )
+                    raise InvalidInputError(f"truth: sources of scan {k} must be target ids or -1 (false alarm)")
                 sources.append(tuple(row))
             object.__setattr__(self, "sources", tuple(sources))
         for target, name in self.names.items():

@@ -95,9 +95,7 @@ class Sensor(ABC):
     def __post_init__(self) -> None:
         label = self._label
         if not isinstance(self.name, str):
-            raise InvalidInputError(
-                f"{type(self).__name__}: name must be text, got {type(self.name).__name__}"
-            )
+            raise InvalidInputError(f"{type(self).__name__}: name must be text, got {type(self.name).__name__}")
         put = object.__setattr__
         put(self, "position", finite_array(self.position, f"{label}: position", (3,)))
         put(self, "noise", self._checked_noise())
@@ -108,20 +106,15 @@ class Sensor(ABC):
             put(self, field, float(value))
         if not 0.0 < self.detection_probability < 1.0:
             raise InvalidInputError(
-                f"{label}: detection_probability must be strictly between 0 and 1, "
-                f"got {self.detection_probability}"
+                f"{label}: detection_probability must be strictly between 0 and 1, got {self.detection_probability}"
             )
         if not 0.0 < self.false_alarm_rate < math.inf:
-            raise InvalidInputError(
-                f"{label}: false_alarm_rate must be above 0 per scan, got {self.false_alarm_rate}"
-            )
+            raise InvalidInputError(f"{label}: false_alarm_rate must be above 0 per scan, got {self.false_alarm_rate}")
         view: object = self.field_of_view
         if view is None:
             put(self, "field_of_view", self._default_field_of_view())
         put(self, "field_of_view", finite_array(self.field_of_view, f"{label}: field_of_view", (self.dim, 2)))
-        for component, angular, (low, high) in zip(
-            self.components, self.angular, self.field_of_view, strict=False
-        ):
+        for component, angular, (low, high) in zip(self.components, self.angular, self.field_of_view, strict=False):
             if not low < high:
                 raise InvalidInputError(
                     f"{label}: field_of_view of {component} must have lower < upper, got {low:g}, {high:g}"
@@ -162,9 +155,7 @@ class Sensor(ABC):
             raise InvalidInputError(f"{label}: noise must have shape {wanted}, got {noise.shape}")
         if noise.ndim == 1:
             if not (noise > 0).all():
-                raise InvalidInputError(
-                    f"{label}: noise must be positive standard deviations, got {noise.min():g}"
-                )
+                raise InvalidInputError(f"{label}: noise must be positive standard deviations, got {noise.min():g}")
             variances = noise**2
         else:
             # rounding counts by the sizes of the two components: a rotated covariance may have +-1e-16 for 0

@@ -118,9 +118,7 @@ def pheromone(
         if watch is not None:
             watch(cycle)
 
-    solution = assign(
-        problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters
-    )
+    solution = assign(problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters)
     packing = prepare(problem).packing
     # what is a node in no cycle is none
     alone = false_alarms(packing) if parameters.get("mode") == "paper" else np.flatnonzero(packing.slack)

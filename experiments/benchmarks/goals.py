@@ -50,9 +50,7 @@ class Results:
         return [
             row
             for row in self.rows
-            if row.family == family
-            and (size is None or row.size == size)
-            and (solver is None or row.solver == solver)
+            if row.family == family and (size is None or row.size == size) and (solver is None or row.solver == solver)
         ]
 
     def sizes(self, family: str) -> list[str]:
@@ -127,9 +125,7 @@ def _always(results: Results, family: str, size: str, solvers: Iterable[str], go
     return verdicts
 
 
-def _share(
-    results: Results, family: str, size: str, needed: float, goal: str, *, stretch: bool
-) -> list[Verdict]:
+def _share(results: Results, family: str, size: str, needed: float, goal: str, *, stretch: bool) -> list[Verdict]:
     verdicts = []
     for solver in HEURISTICS:
         rows = results.of(family, size, solver)
@@ -139,9 +135,7 @@ def _share(
     return verdicts
 
 
-def _within(
-    results: Results, family: str, size: str, allowed: float, goal: str, *, stretch: bool
-) -> list[Verdict]:
+def _within(results: Results, family: str, size: str, allowed: float, goal: str, *, stretch: bool) -> list[Verdict]:
     verdicts = []
     for solver in HEURISTICS:
         rows = results.of(family, size, solver)
@@ -375,9 +369,7 @@ def _scale(results: Results) -> list[Verdict]:
         return []
     worst = max(row.gap for row in rows)
     verdicts = [Verdict("scale", "all", "gap <= 0.01 %", False, f"worst {_percent(worst)}", worst <= 1e-4)]
-    times = {
-        int(size): median(r.seconds for r in results.of("scale", size)) for size in results.sizes("scale")
-    }
+    times = {int(size): median(r.seconds for r in results.of("scale", size)) for size in results.sizes("scale")}
     least, most = min(times), max(times)
     if most > least:
         factor = (times[most] / times[least]) / (most / least)
@@ -395,9 +387,7 @@ def _kbest(results: Results) -> list[Verdict]:
     planar = results.of("kbest", ranking.PLANAR, "kbest")
     if planar:
         time = 1e3 * median(row.seconds for row in planar)
-        verdicts.append(
-            Verdict("kbest", ranking.PLANAR, "under 15 ms", False, f"median {time:.3g} ms", time < 15)
-        )
+        verdicts.append(Verdict("kbest", ranking.PLANAR, "under 15 ms", False, f"median {time:.3g} ms", time < 15))
     exact = {row.seed: row.seconds for row in results.of("kbest", ranking.SPATIAL, "exact")}
     spatial = [row.seconds / exact[row.seed] for row in results.of("kbest", ranking.SPATIAL, "kbest")]
     if spatial:
@@ -406,7 +396,5 @@ def _kbest(results: Results) -> list[Verdict]:
         verdicts.append(Verdict("kbest", ranking.SPATIAL, goal, False, text, median(spatial) <= 20))
     for row in results.of("kbest", ranking.SMALL):
         text = f"{row.extra:.0f} of 200"
-        verdicts.append(
-            Verdict("kbest", ranking.SMALL, "ranking equal to brute force", False, text, row.extra == 200)
-        )
+        verdicts.append(Verdict("kbest", ranking.SMALL, "ranking equal to brute force", False, text, row.extra == 200))
     return verdicts

@@ -134,9 +134,7 @@ def _goals(rows: Sequence[Row]) -> str:
     ]
     for v in verdicts:
         star = "* " if v.stretch else ""
-        lines.append(
-            f"| {v.family} | {v.size} | {star}{v.goal} | {v.measured} | {'yes' if v.met else '**no**'} |"
-        )
+        lines.append(f"| {v.family} | {v.size} | {star}{v.goal} | {v.measured} | {'yes' if v.met else '**no**'} |")
     return "\n".join(lines)
 
 

@@ -143,6 +143,4 @@ def _small(count: int) -> Row:
             costs = []
         equal += len(costs) == len(expected) and bool(np.allclose(costs, expected, rtol=0.0, atol=1e-9))
     seconds = time.perf_counter() - start
-    return Row(
-        "kbest", SMALL, FIRST_SEED, 0, 0, "kbest", False, 0.0, 0.0, 0.0, seconds, "optimal", 0.0, True, equal
-    )
+    return Row("kbest", SMALL, FIRST_SEED, 0, 0, "kbest", False, 0.0, 0.0, 0.0, seconds, "optimal", 0.0, True, equal)

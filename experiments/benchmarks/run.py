@@ -127,9 +127,7 @@ def _warm_up_for(cases: Sequence[Case]) -> None:
     )
 
 
-def run_case(
-    case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None
-) -> list[Row]:
+def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None) -> list[Row]:
     """Run everybody on every instance of a case.
 
     Parameters
@@ -158,9 +156,7 @@ def _brief(row: Row) -> str:
 
 def _run_instance(case: Case, instance: Instance, seed: int, item: int) -> list[Row]:
     problem = instance.problem
-    blank = Row(
-        case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, ""
-    )
+    blank = Row(case.family, case.size, seed, item, problem.num_tuples, "", False, 0.0, math.inf, -math.inf, 0.0, "")
     rows = [
         timed(partial(_run_peer, entry, problem, blank))
         for entry in case.peers

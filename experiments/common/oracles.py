@@ -244,9 +244,7 @@ def axial_problem(
     """Random axial problem, square or rectangular; below density 1 it may have no solution."""
     grid = _grid(np.array(sizes), 1)
     tuples = grid[rng.random(len(grid)) < density]
-    return AssignmentProblem(
-        tuples.astype(np.int32), _draw_costs(rng, len(tuples), style), sizes, dummy=False
-    )
+    return AssignmentProblem(tuples.astype(np.int32), _draw_costs(rng, len(tuples), style), sizes, dummy=False)
 
 
 def disconnected_problem(rng: np.random.Generator, parts: int, style: str = "mixed") -> AssignmentProblem:

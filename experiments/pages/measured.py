@@ -209,9 +209,7 @@ def first_call() -> str:
 def sizes() -> str:
     """What an installation takes on the disk, package by package."""
     found = Results("cold_start").claims if result_file("cold_start").exists() else []
-    weights = {
-        c.quantity.removeprefix("installed, "): c.ours for c in found if c.quantity.startswith("installed, ")
-    }
+    weights = {c.quantity.removeprefix("installed, "): c.ours for c in found if c.quantity.startswith("installed, ")}
     if not weights:
         return "`python -m experiments.cold_start --wheel FILE` weighs the packages on your machine."
     whole = weights.pop("all")

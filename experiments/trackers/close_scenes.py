@@ -77,8 +77,12 @@ def _sensors(setting: Setting) -> list[Sensor]:
             noise = setting.noise[number]
             sensors.append(
                 radar_over(
-                    REGION, place, range_noise=noise, angle_noise=noise / REFERENCE_RANGE,
-                    detection_probability=setting.detection_probability, false_alarm_rate=setting.false_alarms,
+                    REGION,
+                    place,
+                    range_noise=noise,
+                    angle_noise=noise / REFERENCE_RANGE,
+                    detection_probability=setting.detection_probability,
+                    false_alarm_rate=setting.false_alarms,
                     name=f"radar {number + 1}",
                 )  # fmt: skip
             )
@@ -86,8 +90,11 @@ def _sensors(setting: Setting) -> list[Sensor]:
             view = padded_azimuth(azimuth_interval(place, REGION), 2e-3)
             sensors.append(
                 BearingSensor(
-                    position=place, noise=np.array([2e-3]), detection_probability=setting.detection_probability,
-                    false_alarm_rate=setting.false_alarms, field_of_view=np.array([view]),
+                    position=place,
+                    noise=np.array([2e-3]),
+                    detection_probability=setting.detection_probability,
+                    false_alarm_rate=setting.false_alarms,
+                    field_of_view=np.array([view]),
                     name=f"bearing sensor {number + 1}",
                 )  # fmt: skip
             )

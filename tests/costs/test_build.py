@@ -32,10 +32,7 @@ def expected_candidates(scene, probability):
     result = {}
     for one, cost in passed.items():
         members = [s for s, i in enumerate(one) if i]
-        couples = [
-            tuple(i if s in two else 0 for s, i in enumerate(one))
-            for two in itertools.combinations(members, 2)
-        ]
+        couples = [tuple(i if s in two else 0 for s, i in enumerate(one)) for two in itertools.combinations(members, 2)]
         if cost < 0 and all(couple in passed for couple in couples):
             result[one] = cost
     return result
@@ -52,9 +49,7 @@ def found_candidates(problem):
 
 @pytest.mark.parametrize("brute", [True, False])
 @sample("probability", [0.9, 0.999, 1.0], every=3)
-@pytest.mark.parametrize(
-    "kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb"]
-)
+@pytest.mark.parametrize("kinds", ["RR", "RRR", "PPP", "ppp", "bbb", "rrr", "Rrb", "PRrb", "bbr", "bbbb", "rp", "Rb"])
 def test_candidates_are_those_of_an_exhaustive_search(kinds, probability, brute, monkeypatch):
     monkeypatch.setattr(pairs, "_BRUTE", 10**9 if brute else -1)
     for seed in range(4):
@@ -70,9 +65,7 @@ def test_candidates_are_those_of_an_exhaustive_search(kinds, probability, brute,
 @given(st.integers(0, 10_000), st.permutations(range(3)), st.sampled_from(["RPb", "RRR", "bbb", "pPp"]))
 def test_the_order_of_sensors_does_not_matter(seed, order, kinds):
     scene, _ = make_scene(kinds, seed)
-    turned = Scene(
-        [scene.sensors[s] for s in order], [0.0], [[scene.measurements[0][s] for s in order]], scene.region
-    )
+    turned = Scene([scene.sensors[s] for s in order], [0.0], [[scene.measurements[0][s] for s in order]], scene.region)
     here = found_candidates(build_problem(scene, 0))
     there = found_candidates(build_problem(turned, 0))
     assert {tuple(one[s] for s in order) for one in here} == set(there)
@@ -83,9 +76,7 @@ def gated_scene(sensors, targets, box, seed=0):
     box = np.asarray(box, dtype=float)
     view = np.stack([0 * box, box], axis=1)
     made = [
-        PositionSensor(
-            position=[0, 0, 0], noise=[100.0] * 3, field_of_view=view, false_alarm_rate=0.1 * targets
-        )
+        PositionSensor(position=[0, 0, 0], noise=[100.0] * 3, field_of_view=view, false_alarm_rate=0.1 * targets)
         for _ in range(sensors)
     ]
     truth = box * rng.random((targets, 3))
@@ -120,9 +111,7 @@ def test_true_tuples_are_rarely_lost():
 
 def test_the_guard_names_the_number_and_what_to_change():
     scene, _ = make_scene("bbb", 0, targets=30)
-    with pytest.raises(
-        LimitExceededError, match=r"scan 0: about .* max_tuples = 100; lower gate_probability"
-    ):
+    with pytest.raises(LimitExceededError, match=r"scan 0: about .* max_tuples = 100; lower gate_probability"):
         build_problem(scene, 0, max_tuples=100)
     crowd = gated_scene(4, 300, [3000, 3000, 1000])
     with pytest.raises(LimitExceededError, match="max_tuples"):

@@ -66,9 +66,7 @@ def test_linear_sensors_have_the_closed_form():
     z = rng.normal(size=(2, 3))
     scene = Scene(sensors, [0.0], [[z[:1], z[1:]]])
     information = sum(np.linalg.inv(c) for c in covariances)
-    mean = np.linalg.solve(
-        information, sum(np.linalg.inv(c) @ v for c, v in zip(covariances, z, strict=True))
-    )
+    mean = np.linalg.solve(information, sum(np.linalg.inv(c) @ v for c, v in zip(covariances, z, strict=True)))
     chi = sum((v - mean) @ np.linalg.inv(c) @ (v - mean) for c, v in zip(covariances, z, strict=True))
     position, covariance = positions_and_covariances(scene, 0, [[1, 1]])
     np.testing.assert_allclose(position[0], mean, rtol=1e-12)
@@ -80,9 +78,7 @@ def test_the_region_never_moves_a_determined_tuple():
     scene, _ = make_scene("RPbb", 1)
     tuples = all_tuples(scene)
     tuples = tuples[(tuples[:, :2] > 0).any(axis=1)]
-    elsewhere = Scene(
-        scene.sensors, scene.times, scene.measurements, region=[[9e4, 9.1e4]] * 2 + [[5e4, 5e4]]
-    )
+    elsewhere = Scene(scene.sensors, scene.times, scene.measurements, region=[[9e4, 9.1e4]] * 2 + [[5e4, 5e4]])
     np.testing.assert_array_equal(tuple_costs(scene, 0, tuples), tuple_costs(elsewhere, 0, tuples))
 
 
@@ -101,12 +97,9 @@ def test_two_range_azimuth_radars_take_an_open_height_from_the_region():
     # target in the plane of the radars: slant ranges do not tell the height there
     truth = np.array([[2e4, 3e4, 0.0]])
     sensors = [
-        Radar2D(position=p, noise=[50, 1e-3], field_of_view=[[0, 1e5], CIRCLE])
-        for p in ([0, 0, 0], [4e4, 0, 0])
+        Radar2D(position=p, noise=[50, 1e-3], field_of_view=[[0, 1e5], CIRCLE]) for p in ([0, 0, 0], [4e4, 0, 0])
     ]
-    scene = Scene(
-        sensors, [0.0], [[s.measure(truth) for s in sensors]], region=[[0, 5e4], [0, 5e4], [-2000, 2000]]
-    )
+    scene = Scene(sensors, [0.0], [[s.measure(truth) for s in sensors]], region=[[0, 5e4], [0, 5e4], [-2000, 2000]])
     position, covariance = positions_and_covariances(scene, 0, [[1, 1]])
     np.testing.assert_allclose(position[0], truth[0], atol=100)
     assert np.isfinite(covariance).all()
@@ -170,9 +163,7 @@ def test_the_order_of_sensors_does_not_matter(seed, order, kinds):
     tuples = all_tuples(scene)
     if not len(tuples):
         return
-    turned = Scene(
-        [scene.sensors[s] for s in order], [0.0], [[scene.measurements[0][s] for s in order]], scene.region
-    )
+    turned = Scene([scene.sensors[s] for s in order], [0.0], [[scene.measurements[0][s] for s in order]], scene.region)
     a, b = tuple_costs(scene, 0, tuples), tuple_costs(turned, 0, tuples[:, list(order)])
     near = a < 50
     np.testing.assert_allclose(a[near], b[near], rtol=1e-6, atol=1e-5)

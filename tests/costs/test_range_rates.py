@@ -21,9 +21,7 @@ def doppler_scene(seed, mixed=False, targets=2):
     mix[3, :3] = [0.5, 0.3, -0.4]
     R = noise @ mix @ mix.T @ noise
     view = [[0, 2e5], CIRCLE, [-0.5, 1.5], [-600, 600]]
-    sensors = [
-        Radar3D(position=[*rng.uniform(-SIDE, SIDE, 2), 0.0], noise=R, field_of_view=view) for _ in range(3)
-    ]
+    sensors = [Radar3D(position=[*rng.uniform(-SIDE, SIDE, 2), 0.0], noise=R, field_of_view=view) for _ in range(3)]
     if mixed:
         sensors[1] = sensors[1].position_part
     places = np.column_stack([rng.uniform(-SIDE, SIDE, (targets, 2)), rng.uniform(1e3, 1e4, targets)])

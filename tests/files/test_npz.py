@@ -42,9 +42,7 @@ def write_members(path, members):
 def test_arrays_come_back(tmp_path):
     path = tmp_path / "a.npz"
     n = np.asfortranarray(np.arange(6, dtype=np.int32).reshape(2, 3))
-    save_npz(
-        path, "assoc.test", 1, {"x": np.arange(3, dtype=np.float32), "n": n, "name": "ümlaut", "other": [1]}
-    )
+    save_npz(path, "assoc.test", 1, {"x": np.arange(3, dtype=np.float32), "n": n, "name": "ümlaut", "other": [1]})
     arrays = load(path)
     assert set(arrays) == {"x", "n", "name"}
     assert arrays["x"].dtype == np.float64 and arrays["n"].dtype == np.int64

@@ -154,9 +154,7 @@ def test_mean_gospa():
     truth = Trajectories([0, 1], [1, 1], np.zeros((2, 3)))
     _, values = gospa_over_time(truth, Trajectories([0], [7], [[3.0, 0, 0]]), 10.0)
     mean = mean_gospa(values)
-    assert mean == pytest.approx(
-        {"distance": 29.5**0.5, "localisation": 4.5**0.5, "missed": 5.0, "false": 0.0}
-    )
+    assert mean == pytest.approx({"distance": 29.5**0.5, "localisation": 4.5**0.5, "missed": 5.0, "false": 0.0})
     assert values[0].pairs.tolist() == [[1, 7]]
 
 

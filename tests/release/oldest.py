@@ -1,6 +1,6 @@
 """Constraints for pip that pin each package which the tests need to the oldest version allowed.
 
-    python -m tests.release.oldest > constraints.txt      (make test-oldest)
+python -m tests.release.oldest > constraints.txt      (make test-oldest)
 """
 
 from __future__ import annotations

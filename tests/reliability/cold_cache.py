@@ -24,9 +24,7 @@ _MEASURED = ("runtime", "compile_time", "seconds")
 """Fields that are measurements of time."""
 
 
-def run(
-    *words: str, cwd: Path, cache: Path | None = None, environment: Mapping[str, str] | None = None
-) -> None:
+def run(*words: str, cwd: Path, cache: Path | None = None, environment: Mapping[str, str] | None = None) -> None:
     """Run a program, with a cache of its own or an environment of its own if that is given."""
     root = Path(__file__).resolve().parents[2]
     paths = os.pathsep.join(filter(None, [str(root), os.environ.get("PYTHONPATH", "")]))

@@ -102,9 +102,7 @@ def _odd_angles(rng: np.random.Generator, sensor: Sensor, z: Floats) -> Floats:
     """Put angles where they turn over: azimuth at +-pi and whole turns away, elevation at +-pi/2."""
     z = z.copy()
     azimuth = 0 if sensor.kind == "bearing" else 1
-    z[:, azimuth] = rng.choice(
-        [math.pi, -math.pi, np.nextafter(math.pi, 4.0), 0.0, -0.0, 3.0 * math.pi, 1e6], len(z)
-    )
+    z[:, azimuth] = rng.choice([math.pi, -math.pi, np.nextafter(math.pi, 4.0), 0.0, -0.0, 3.0 * math.pi, 1e6], len(z))
     if sensor.kind == "radar3d":
         z[:, 2] = rng.choice([math.pi / 2, -math.pi / 2, 0.0], len(z))
     return z

@@ -73,9 +73,7 @@ def test_a_full_disk_while_an_archive_is_written(tmp_path, monkeypatch):
 
     (tmp_path / "a.npz").write_bytes(b"old")
     real = npz.write_atomically
-    monkeypatch.setattr(
-        npz, "write_atomically", lambda path, writer: real(path, lambda file: writer(Full(file)))
-    )
+    monkeypatch.setattr(npz, "write_atomically", lambda path, writer: real(path, lambda file: writer(Full(file))))
     with pytest.raises(InvalidInputError, match=r"cannot be written \(No space left on device\)"):
         save_npz(tmp_path / "a.npz", "assoc.test", 1, {"x": np.random.default_rng(0).random(10_000)})
     assert os.listdir(tmp_path) == ["a.npz"] and (tmp_path / "a.npz").read_bytes() == b"old"
@@ -150,9 +148,7 @@ def children(pid):
 def test_a_killed_worker_is_one_clear_line(tmp_path):
     simulate("three-radar", 2, scans=400).save(tmp_path / "long.npz")
     command = [*PYTHON, "assoc.solve", "long.npz", "--solver", "aco", "--jobs", "2", "--json", "out.json"]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             end = time.monotonic() + 60
             while not children(process.pid) and time.monotonic() < end:

@@ -158,9 +158,7 @@ def test_while_a_kernel_is_loaded():
 @pytest.mark.slow
 def test_in_the_library():
     names = ["exact", "aco", "tabu", "genetic", "milp", "kbest"]
-    done = subprocess.run(
-        [sys.executable, "-c", LIBRARY, ",".join(names)], capture_output=True, text=True, timeout=300
-    )
+    done = subprocess.run([sys.executable, "-c", LIBRARY, ",".join(names)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     late = json.loads(done.stdout)
     # processor time: the machine may be busy with other things; usually it is below a second

@@ -271,7 +271,9 @@ def test_a_trace_stays_short(monkeypatch: pytest.MonkeyPatch) -> None:
         ("crowd", {"targets": 100_000}),
         ("dubins-uav", {"interval": 0.05, "obstacles": 0}),
         ("rotating-radar", {"aircraft": 1, "false_plots": 2000.0}),
-    ], every=5)
+    ],
+    every=5,
+)
 def test_estimates_of_scenes(name: str, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """What was asked for is what was taken, or up to five times that."""
     make: Callable[..., Any] = simulate_recording if name == "rotating-radar" else simulate

@@ -1,6 +1,6 @@
 """Everything in the package and the experiments that writes a file, as functions of its path.
 
-    python -m tests.reliability.writers FOLDER      tries each in FOLDER; prints what it said and what is there then
+python -m tests.reliability.writers FOLDER      tries each in FOLDER; prints what it said and what is there then
 """
 
 from __future__ import annotations

@@ -22,9 +22,7 @@ def sensors():
     common = {"detection_probability": DETECTION, "false_alarm_rate": RATE}
     correlated = np.array([[900.0, 500.0, 0.0], [500.0, 400.0, 50.0], [0.0, 50.0, 100.0]])
     return [
-        Radar3D(
-            position=[0, 0, 0], noise=[30, 0.002, 0.004], field_of_view=[[0, 60e3], FULL, [0, 1.5]], **common
-        ),
+        Radar3D(position=[0, 0, 0], noise=[30, 0.002, 0.004], field_of_view=[[0, 60e3], FULL, [0, 1.5]], **common),
         Radar2D(position=[5e3, -5e3, 100], noise=[30, 0.002], field_of_view=[[0, 60e3], FULL], **common),
         BearingSensor(position=[-9e3, 0, 0], noise=[0.01], field_of_view=[FULL], **common),
         PositionSensor(position=[0, 0, 0], noise=correlated, field_of_view=REGION, **common),
@@ -51,9 +49,7 @@ def test_clutter_is_poisson_and_uniform_in_measurement_space(scene, s):
     assert abs(counts.mean() - RATE) < 4 * math.sqrt(RATE / SCANS)
     # variance over mean of a Poisson law is 1, with standard error sqrt(2 / n)
     assert abs(counts.var(ddof=1) / counts.mean() - 1) < 4 * math.sqrt(2 / SCANS)
-    clutter = np.concatenate(
-        [scene.measurements[k][s][scene.truth.sources[k][s] == -1] for k in range(SCANS)]
-    )
+    clutter = np.concatenate([scene.measurements[k][s][scene.truth.sources[k][s] == -1] for k in range(SCANS)])
     for axis, (low, high) in enumerate(scene.sensors[s].field_of_view):
         assert stats.kstest(clutter[:, axis], "uniform", args=(low, high - low)).pvalue > 1e-3
 

@@ -151,7 +151,9 @@ def test_callback_stops(name, hard):
 
 @sample(
     "name, chosen",
-    [(name, {}) for name in ("aco", "genetic", "tabu", "lagrangian")] + [("aco", {"mode": "paper"})], every=3)
+    [(name, {}) for name in ("aco", "genetic", "tabu", "lagrangian")] + [("aco", {"mode": "paper"})],
+    every=3,
+)
 def test_the_limit_of_iterations_is_named(name, chosen, hard):
     solution = assign(hard, name, iterations=1, time_limit=20.0, **chosen)
     assert solution.stopped_by == "iterations" and solution.iterations >= 1

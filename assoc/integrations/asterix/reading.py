@@ -100,9 +100,7 @@ class SourceRows:
 
 
 @door
-def read_asterix(
-    path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None
-) -> AsterixContent:
+def read_asterix(path: str | os.PathLike[str], *, origin: tuple[float, float, float] | None = None) -> AsterixContent:
     """Read a file of ASTERIX data blocks, plain or in the UDP packets of a pcap.
 
     Parameters

@@ -257,8 +257,10 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
             for t in range(s + 1, num_sensors):
                 one, two = cols[j, s], cols[j, t]
                 # where there is nothing else and both must be covered, there is no question
-                if one < 0 or two < 0 or not (
-                    counts[one] > 1 or counts[two] > 1 or allowed.slack[one] or allowed.slack[two]
+                if (
+                    one < 0
+                    or two < 0
+                    or not (counts[one] > 1 or counts[two] > 1 or allowed.slack[one] or allowed.slack[two])
                 ):
                     continue
                 others = float(counts[one] + counts[two])

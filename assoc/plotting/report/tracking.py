@@ -210,9 +210,7 @@ def _truth(scene: Scene | None, truth: Mapping[int, Array], decimals: int) -> li
         for target in ids:
             seen.setdefault(int(target), []).append(float(time))
     step = max(1, sum(map(len, seen.values())) // _MOST_POINTS)
-    return [
-        {"id": target, **_path(seen[target][::step], path[::step], decimals)} for target, path in truth.items()
-    ]
+    return [{"id": target, **_path(seen[target][::step], path[::step], decimals)} for target, path in truth.items()]
 
 
 def _measured(scene: Scene | None, decimals: int) -> list[dict[str, Any]]:
@@ -273,9 +271,7 @@ def _table(lives: Sequence[Mapping[str, Any]], known: bool) -> str:
     return note + sortable_table("track-table", [header for _, header, _ in used], rows, link="track")
 
 
-def _summary(
-    frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float, plots: PlotTracks | None
-) -> str:
+def _summary(frame: pd.DataFrame, count: int, values: Sequence[Gospa], cutoff: float, plots: PlotTracks | None) -> str:
     content = {"Tracks": (f"{count:,}", f"{len(frame):,} rows")}
     if len(frame):
         spans = frame.groupby("track_id")["time"].agg(["min", "max"])
@@ -292,7 +288,8 @@ def _summary(
     if values:
         mean = mean_gospa(values)
         content["GOSPA"] = (
-            f"{mean['distance']:.4g} m", f"root mean square of {len(values)} instants, cutoff {cutoff:g} m"
+            f"{mean['distance']:.4g} m",
+            f"root mean square of {len(values)} instants, cutoff {cutoff:g} m",
         )
         notes = {"localisation": "errors of tracks", "missed": "targets without a track", "false": "tracks of nothing"}
         for part, note in notes.items():

@@ -159,9 +159,7 @@ def _cluster(graph: PairGraph, kept: Any, start: int, number: int, label: Any, m
     return size
 
 
-def _reduced(
-    graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int
-) -> tuple[Floats, Floats]:
+def _reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:
     """Weights of edges and of leaving vertices alone, relative to the best event's by its multipliers.
 
     The first list are the graph's first so many `rows`.

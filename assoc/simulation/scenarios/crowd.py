@@ -44,9 +44,7 @@ class CrowdParameters(Parameters):
     )
     noise: float = field(
         default=100.0,
-        metadata={
-            "help": "standard deviation of a position (radar: of range, and across at the box), metres"
-        },
+        metadata={"help": "standard deviation of a position (radar: of range, and across at the box), metres"},
     )
     detection_probability: float = field(default=0.9, metadata={"help": "P_d of each sensor"})
     false_alarms_per_target: float = field(

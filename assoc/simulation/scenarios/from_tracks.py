@@ -34,9 +34,7 @@ MAX_SCANS = 1_000_000
 
 def _column(meaning: str, unit: str) -> Any:
     names = ", ".join(COLUMNS[meaning])
-    return field(
-        default=None, metadata={"help": f"column of the {meaning}{unit} (else the first of: {names})"}
-    )
+    return field(default=None, metadata={"help": f"column of the {meaning}{unit} (else the first of: {names})"})
 
 
 @dataclass(frozen=True)
@@ -56,18 +54,14 @@ class FromTracksParameters(Parameters):
     speed_unit: Literal["m/s", "kt"] = field(
         default="m/s", metadata={"help": "unit of velocity and vertrate; with kt the latter is in feet per minute"}
     )
-    interval: float = field(
-        default=10.0, metadata={"help": "seconds from scan to scan (positions are interpolated)"}
-    )
+    interval: float = field(default=10.0, metadata={"help": "seconds from scan to scan (positions are interpolated)"})
     max_gap: float = field(
         default=60.0, metadata={"help": "no target where its reports are further apart than this, seconds"}
     )
     clean: bool = field(
         default=True, metadata={"help": "leave out repeated positions, mend altitudes that cannot be right"}
     )
-    scans: int | None = field(
-        default=None, metadata={"help": "number of scans (without: the whole recording)"}
-    )
+    scans: int | None = field(default=None, metadata={"help": "number of scans (without: the whole recording)"})
     radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
     turns: str | None = field(
         default=None,

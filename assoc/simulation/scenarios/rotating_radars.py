@@ -51,8 +51,13 @@ def simulate(parameters: RotatingRadarsParameters, rng: np.random.Generator, nam
     region = around(np.concatenate([path.positions for path in paths]), 0.05)
     sensors = [
         radar_over(
-            region, place, range_noise=p.noise, angle_noise=p.noise / REFERENCE_RANGE,
-            detection_probability=p.detection_probability, false_alarm_rate=p.false_alarms, name=f"radar {number}",
+            region,
+            place,
+            range_noise=p.noise,
+            angle_noise=p.noise / REFERENCE_RANGE,
+            detection_probability=p.detection_probability,
+            false_alarm_rate=p.false_alarms,
+            name=f"radar {number}",
         )  # fmt: skip
         for number, place in enumerate(on_circle(np.zeros(3), p.radar_distance, len(turns)), start=1)
     ]

@@ -397,9 +397,7 @@ def best_of_both(
 
 
 @inner_njit
-def _compare(
-    packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float
-) -> Any:
+def _compare(packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float) -> Any:
     """Take over better bounds and covers; the columns worth keeping and the components still open."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     col_start, row_start = packing.col_start, packing.row_start

@@ -121,9 +121,7 @@ class TabuSearch:
 
 
 @njit
-def _moves(
-    packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Rules, rng: Any, deadline: float
-) -> int:
+def _moves(packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Rules, rng: Any, deadline: float) -> int:
     """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
 
     A ``forced`` column is inserted first and held for a third of the moves.

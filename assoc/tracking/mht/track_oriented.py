@@ -173,9 +173,7 @@ class TrackOrientedMHT(Tracker):
         history[:, count:] = self._history[:, : history.shape[1] - count]
         return Tables(self._batch.numbers, self._batch.counts, history, self._born)
 
-    def _extended(
-        self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int
-    ) -> tuple[Array, Tables, Array]:
+    def _extended(self, tables: Tables, missed: Array, hits: Hits, roots: Roots, s: int) -> tuple[Array, Tables, Array]:
         most, drop = self.max_branches, self.branch_drop
         done = extend(tables, missed, hits, roots, s, self._scan, most, drop, self._solved)
         if len(done[0]) > self.max_tuples:

@@ -28,9 +28,7 @@ def _single_scan(
     for sensor in sensors:
         exact = sensor.measure(positions)
         # The target must be in view, not its noisy measurement: noise may carry that over the edge.
-        seen = np.flatnonzero(
-            sensor.in_view(exact) & (rng.random(len(positions)) < sensor.detection_probability)
-        )
+        seen = np.flatnonzero(sensor.in_view(exact) & (rng.random(len(positions)) < sensor.detection_probability))
         noisy = exact[seen] + rng.multivariate_normal(np.zeros(sensor.dim), sensor.covariance, len(seen))
         low, high = sensor.field_of_view.T
         alarms = low + (high - low) * rng.random((rng.poisson(sensor.false_alarm_rate), sensor.dim))

@@ -69,9 +69,7 @@ FAULTS = (
         "",
         _OF_PAIRS,
     ),
-    Fault(
-        "the best part of a track stands for all", _PARTS, "np.logaddexp.at(mean", "np.maximum.at(mean", _OF_TRACKER
-    ),
+    Fault("the best part of a track stands for all", _PARTS, "np.logaddexp.at(mean", "np.maximum.at(mean", _OF_TRACKER),
     Fault(
         "what one sensor saw does not change a part's share",
         _PARTS,
