@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+import assoc
 from assoc import solvers
+from assoc._version import __version__ as version
 from assoc.solvers import registry
 from experiments.benchmarks import readme, rows
 
@@ -172,3 +174,13 @@ def test_figures_of_the_readme_are_those_of_the_benchmark():
 def test_the_readme_must_have_its_marks():
     with pytest.raises(ValueError, match="expected the marks"):
         readme.insert(f"{readme.END} {readme.BEGIN}", [])
+
+
+def test_the_version_is_cited():
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_page_of_stability_names_what_is_public():
+    text = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    for name in re.findall(r"`([A-Za-z_]\w*)`", text.partition("| scenes and sensors")[0].partition("|---|")[2]):
+        assert hasattr(assoc, name), name
