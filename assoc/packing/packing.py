@@ -105,7 +105,21 @@ class Packing:
         Rows without slack are kept even if no column covers them any more.
         """
         chosen = np.flatnonzero(keep).astype(np.int32)
-        return assemble(self.cols[chosen], self.weights[chosen], self.slack, chosen, self.granularity)
+        return assemble(self.cols[chosen], self.weights[chosen], self.arrays.slack, chosen, self.granularity)
+
+    def read_only(self) -> Packing:
+        """Return a copy whose fields cannot be written.
+
+        Its ``arrays`` can: numba would compile the kernels that take them anew for arrays that are read-only.
+        """
+        names = (*PackingArrays._fields, "origin", "row_origin")
+        arrays = {name: getattr(self, name).copy() for name in names}
+        copy = Packing(**arrays, granularity=self.granularity)
+        for name, array in arrays.items():
+            view = array.view()
+            view.flags.writeable = False
+            object.__setattr__(copy, name, view)
+        return copy
 
     def component(self, index: int) -> Packing:
         """Return one component as a packing of its own."""
@@ -116,8 +130,8 @@ class Packing:
         pointer = self.row_ptr[top : end + 1]
         return Packing(
             cols,
-            self.weights[first:last],
-            self.slack[top:end],
+            self.arrays.weights[first:last],
+            self.arrays.slack[top:end],
             np.array([0, last - first]),
             np.array([0, end - top]),
             pointer - pointer[0],

@@ -139,9 +139,11 @@ class Outcome:
     iterations : int
         Iterations used.
     lower_bound : float
-        A valid lower bound on the packing's optimum; -inf leaves the bound to the caller.
+        A lower bound on the packing's optimum that this package has proved, by branch and bound, say. What a solver
+        from elsewhere says here is not believed.
     duals : float array or None
-        Multipliers of the packing's rows that prove the bound, where they do.
+        Multipliers of the packing's rows. Where there is no lower bound (-inf) it is computed from these; where there
+        is one they prove it, or are None.
     """
 
     columns: NDArray[np.integer]

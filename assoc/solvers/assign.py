@@ -115,7 +115,7 @@ def assign(
         if solver != "greedy":
             prepare_fallback(packing, run)
         try:
-            outcome = _checked(solve(packing, chosen, run), solver)
+            outcome = solve(packing, chosen, run)
         except InfeasibleError:
             known = run.start if run.fallback is None else run.fallback
             if known is None:
@@ -149,19 +149,6 @@ def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packin
         return watch(state)
 
     return told
-
-
-def _checked(outcome: object, solver: str) -> Outcome:
-    """Refuse what is no outcome: solvers may be anybody's."""
-    if not isinstance(outcome, Outcome):
-        raise InvalidInputError(f"solver {solver!r}: expected it to return an Outcome, got {type(outcome).__name__}")
-    columns = np.asarray(outcome.columns)
-    if columns.ndim != 1 or not (columns.size == 0 or columns.dtype.kind in "iu"):
-        raise InvalidInputError(
-            f"solver {solver!r}: expected the columns of its Outcome to be a list of whole numbers, got an array of "
-            f"shape {columns.shape} and type {columns.dtype}"
-        )
-    return outcome
 
 
 def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._system.compiled import njit
 from assoc.errors import InfeasibleError
-from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound
+from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
 from assoc.packing.prepare import Prepared, PreparedArrays
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
@@ -39,7 +39,10 @@ def certify(
     if not exact:
         raise InfeasibleError("the solver's answer does not use every measurement exactly once")
     bound, duals = outcome.lower_bound, outcome.duals
-    # also where a solver's own bound is no number
+    if bound == -np.inf and duals is not None:
+        hard_pass(packing, duals)
+        bound = certified_bound(packing, duals)
+    # also where a bound is no number
     if not bound > -np.inf:
         duals = dual_bound(packing, run=run)
         bound = certified_bound(packing, duals)

@@ -89,7 +89,7 @@ def parameters(name: str) -> type[Parameters]:
 
 
 def solver(name: str) -> SolveFunction:
-    """Return the solve function of a solver.
+    """Return the solve function of a solver; those from elsewhere are guarded (own_solver.py).
 
     Raises
     ------
@@ -97,7 +97,9 @@ def solver(name: str) -> SolveFunction:
         There is no solver of that name.
     """
     if name in _REGISTERED:
-        return _REGISTERED[name][1]
+        from assoc.solvers.own_solver import guarded  # loads a compiler
+
+        return guarded(name, _REGISTERED[name][1])
     solve: SolveFunction = _module(name, "solve").solve
     return solve
 

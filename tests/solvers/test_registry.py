@@ -72,6 +72,61 @@ def test_an_infeasible_answer_is_caught(registered):
         assoc.assign(PROBLEM, "all")
 
 
+def test_its_packing_is_a_copy_that_cannot_be_written(registered):
+    """What it does to its packing changes no answer, its own or a later one."""
+    problem = assoc.AssignmentProblem(PROBLEM.tuples, PROBLEM.costs, PROBLEM.sizes)
+
+    def spoil(packing, parameters, run):
+        for array in packing.arrays:
+            array[:] = 0
+        for one in (packing, packing.component(0)):
+            assert all(array.flags.writeable for array in one.arrays)  # read-only ones would be compiled for anew
+        with pytest.raises(ValueError, match="read-only"):
+            packing.weights[:] = -packing.weights
+        for name in ("cols", "weights", "slack", "origin", "row_origin", "row_ptr", "row_cols"):
+            array = getattr(packing, name)
+            array.flags.writeable = True
+            array[:] = 0
+        return Outcome([], 1)
+
+    assoc.solvers.register("spoil", LastParameters, spoil)
+    assert assoc.assign(problem, "spoil").lower_bound == pytest.approx(-5.0)
+    assert assoc.assign(problem, "exact").cost == -5.0
+
+
+@pytest.mark.parametrize(
+    "duals, bound",
+    [(None, -5.0), ([-4.0, -2.0, 0.0, 0.0], -6.0), ([9e307] * 4, -6.0), ([0.0, 0.0, -4.0, 1e9], -6.0)],
+)
+@pytest.mark.parametrize("claimed", [np.inf, -1.0, np.nan, "text"])
+def test_its_bound_is_that_of_its_multipliers(registered, claimed, duals, bound):
+    assoc.solvers.register("liar", LastParameters, lambda packing, parameters, run: Outcome([], 1, claimed, duals))
+    solution = assoc.assign(PROBLEM, "liar")
+    assert solution.lower_bound == pytest.approx(bound) and solution.status == "feasible"
+
+
+@pytest.mark.parametrize(
+    "outcome, message",
+    [
+        (lambda: None, "it to return an Outcome, got NoneType"),
+        *((lambda one=one: Outcome(one, 1), "the columns of its Outcome to be a list of whole numbers")
+          for one in ([0.5], ["a"], [[1], [2, 3]], [[0]], {1}, None, [2**64])),
+        *((lambda one=one: Outcome([0, one], 1), f"among the packing's 4, got {one}") for one in (-1, 4, 2**62)),
+        (lambda: Outcome(np.array([2**63], dtype=np.uint64), 1), f"among the packing's 4, got {2**63}"),
+        *((lambda one=one: Outcome([], one), "the iterations of its Outcome to be a whole number")
+          for one in ("a", -1, 1.5, None)),
+        *((lambda one=one: Outcome([], 1, duals=one), "the duals of its Outcome to be 4 numbers, one for each row")
+          for one in ([0.0], ["a"] * 4, [np.nan] * 4, [[0.0] * 4], [1j] * 4, "abc")),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("start", [None, "greedy"])
+def test_what_is_no_outcome_is_one_line(registered, start, outcome, message):
+    assoc.solvers.register("wrong", LastParameters, lambda packing, parameters, run: outcome())
+    with pytest.raises(InvalidInputError, match=f"solver 'wrong': expected .*{message}") as caught:
+        assoc.assign(PROBLEM, "wrong", start=start and assoc.assign(PROBLEM, start))
+    assert "\n" not in str(caught.value)
+
+
 def test_convention():
     """Each name is a folder whose parameters.py loads no compiler and whose solve.py solves."""
     folder = Path(assoc.solvers.__file__).parent

@@ -99,12 +99,12 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
         if status != OPTIMAL or is_over(deadline):
             break
         tight = basis.slack_place[rows:] < 0
-        new = odd_sets(packing.cols, basis, rows)[: max(int(_CUTS * rows) - int(tight.sum()), 0)]
+        new = odd_sets(packing.arrays.cols, basis, rows)[: max(int(_CUTS * rows) - int(tight.sum()), 0)]
         if not len(new) or in_vain >= _IN_VAIN:
             break
         variable = _renumbered(basis.variable, packing.num_columns, rows, tight, len(new))
         sets = np.concatenate([sets[tight], new])
-        program = with_cuts(packing.cols, root.program.weights, rows, sets)
+        program = with_cuts(packing.arrays.cols, root.program.weights, rows, sets)
         allowed = all_allowed(program, np.concatenate([packing.slack, np.ones(len(sets), dtype=np.bool_)]))
         duals = np.concatenate([basis.duals[:rows], basis.duals[rows:][tight], np.zeros(len(new))])
         basis = basis_of(program, allowed, variable, duals)

@@ -139,7 +139,7 @@ class Component(Priced):
     def best_columns(self) -> NDArray[np.int64]:
         """Columns of the best cover, ascending; there must be one."""
         assert self.best is not None
-        return np.asarray(chosen_columns(self.packing.cols, self.best), dtype=np.int64)
+        return np.asarray(chosen_columns(self.packing.arrays.cols, self.best), dtype=np.int64)
 
     def is_complete(self, owner: Owner) -> bool:
         """Whether a cover covers all rows that must be covered."""

@@ -43,7 +43,7 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
         return None
     step = whole.tolerance if whole.packing.granularity else 0.0
     keep = whole.reduced <= whole.weight - whole.bound - step
-    keep[chosen_columns(whole.packing.cols, whole.best)] = True
+    keep[chosen_columns(whole.packing.arrays.cols, whole.best)] = True
     if np.count_nonzero(keep) > share * keep.size:
         return None
     smaller = whole.packing.restrict(keep)

@@ -78,7 +78,7 @@ class ClusterSearch:
         largest = float(np.abs(packing.weights).max(initial=0.0))
         whole = largest < 1e9 and bool((packing.weights == np.rint(packing.weights)).all())
         self.step = 1.0 if whole else 1e-9 * max(1.0, largest)
-        self.by_row = _by_row(packing.cols, packing.row_ptr, ascending(self.prices.reduced))
+        self.by_row = _by_row(packing.arrays.cols, packing.arrays.row_ptr, ascending(self.prices.reduced))
         # a cluster of all rows would be an exact solver, not a local search
         self._most = min(_MOST, max(6, 2 * packing.num_rows // 3))
         self.size = min(_START, self._most)

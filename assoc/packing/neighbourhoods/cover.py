@@ -40,12 +40,12 @@ class Cover:
     def of(cls, packing: Packing, columns: NDArray[np.integer]) -> Cover:
         """Return the cover of columns that share no row."""
         cover = cls.empty(packing)
-        own_all(packing.cols, np.asarray(columns, dtype=np.int32), cover.owner)
+        own_all(packing.arrays.cols, np.asarray(columns, dtype=np.int32), cover.owner)
         return cover
 
     def columns(self) -> NDArray[np.int32]:
         """Return the chosen columns, ascending."""
-        columns: NDArray[np.int32] = chosen_columns(self.packing.cols, self.owner)
+        columns: NDArray[np.int32] = chosen_columns(self.packing.arrays.cols, self.owner)
         return columns
 
     @property
@@ -93,7 +93,7 @@ class Cover:
 
 def weight_of(packing: Packing, owner: NDArray[np.int32]) -> float:
     """Return the weight of a cover."""
-    return float(packing.weights[chosen_columns(packing.cols, owner)].sum())
+    return float(packing.weights[chosen_columns(packing.arrays.cols, owner)].sum())
 
 
 def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:

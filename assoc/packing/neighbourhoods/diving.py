@@ -181,7 +181,7 @@ class Diver:
         found, done = at.completed(self._search, Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
-        own_all(self._packing.cols, self._core.origin[found], owner)
+        own_all(self._packing.arrays.cols, self._core.origin[found], owner)
         return owner
 
     def _next_start(self, cutoff: float, deadline: float) -> _Start:

@@ -34,8 +34,9 @@ def arrange(packing: Packing) -> Arranged:
 
     Sensors whose measurements must all be used come first, so that the 2-D problem keeps what is hardest.
     """
-    cols, sensor, by_pair, group_start = _arrange(packing.cols, packing.slack)
-    return Arranged(cols, packing.weights, packing.slack, sensor, by_pair, group_start)
+    arrays = packing.arrays
+    cols, sensor, by_pair, group_start = _arrange(arrays.cols, arrays.slack)
+    return Arranged(cols, arrays.weights, arrays.slack, sensor, by_pair, group_start)
 
 
 @njit
