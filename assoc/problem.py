@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from assoc._files.problem_text import is_text, read_problem_text, write_problem_text
 from assoc._system import memory
 from assoc._system.door import doors
-from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.errors import InvalidInputError, LimitExceededError, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,7 +150,8 @@ class AssignmentProblem:
         tensor : array_like of float
             With ``dummy``: shape (n_1 + 1, ..., n_S + 1), index 0 is the dummy and the all-dummy entry
             is ignored. Without: shape (n_1, ..., n_S), the classical axial problem, also rectangular.
-            ``inf`` is forbidden; a singleton that is ``inf`` costs 0, as if it were not listed.
+            ``inf`` is forbidden, and so is what a masked array masks; a singleton that is ``inf`` costs 0, as if it
+            were not listed.
         dummy : bool, default True
             Whether index 0 is the dummy.
 
@@ -160,6 +161,11 @@ class AssignmentProblem:
             The tensor has no dimension, an empty dummy dimension, NaN or -inf.
         LimitExceededError
             The problem would take more memory than there is.
+
+        Warns
+        -----
+        AssocWarning
+            With ``dummy`` the all-dummy entry is a finite cost other than 0: the tensor may be an axial one.
         """
         dense = _numbers(tensor, "tensor")
         if dense.ndim == 0:
@@ -171,6 +177,7 @@ class AssignmentProblem:
         keep = ~np.isposinf(dense)
         if dummy:
             keep[(0,) * dense.ndim] = False
+            _doubt(float(dense[(0,) * dense.ndim]), "tensor")
         count = np.count_nonzero(keep)
         # numpy's list of indices and the stacked one; then what a problem of them takes
         memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
@@ -195,16 +202,24 @@ class AssignmentProblem:
         ------
         InvalidInputError
             It is no such array, or holds NaN or -inf.
+
+        Warns
+        -----
+        AssocWarning
+            As in `from_dense`.
         """
         entries = array.tocoo(copy=True) if callable(getattr(array, "tocoo", None)) else array
         if not all(hasattr(entries, name) for name in ("coords", "data", "shape")):
             raise InvalidInputError(f"array: expected a sparse array (scipy.sparse), got {type(array).__name__}")
         if hasattr(entries, "sum_duplicates"):
             entries.sum_duplicates()
-        index, costs = np.stack([np.asarray(one) for one in entries.coords], axis=1), _numbers(entries.data, "array")
+        index = _integers(np.stack([np.asarray(one) for one in entries.coords], axis=1), "array: coords", 2)
+        costs = _numbers(entries.data, "array")
         if dummy and min(entries.shape) == 0:
             raise InvalidInputError(f"array: each dimension needs its dummy at index 0, got {entries.shape}")
         keep = index.any(axis=1) if dummy else np.ones(costs.size, dtype=np.bool_)
+        for cost in costs[~keep]:
+            _doubt(float(cost), "array")
         offset = 0 if dummy else 1
         sizes = [int(n) - (1 - offset) for n in entries.shape]
         return cls(index[keep].astype(np.int64) + offset, costs[keep], sizes, dummy=dummy)
@@ -243,6 +258,8 @@ class AssignmentProblem:
         columns = []
         for name in frame.columns.drop(cost):
             try:
+                if frame[name].dtype.kind in "mM":
+                    raise TypeError("times are no numbers")
                 numbers = frame[name].to_numpy(dtype=np.float64, na_value=0.0)
             except (TypeError, ValueError):
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
@@ -360,8 +377,9 @@ def _integers(values: ArrayLike, name: str, ndim: int) -> NDArray[np.int64]:
         raise InvalidInputError(f"{name}: {error}") from None
     if array.size == 0 and array.dtype.kind == "f":
         array = array.astype(np.int64)
-    if array.dtype.kind not in "iu":
-        raise InvalidInputError(f"{name}: expected integers, got {array.dtype}")
+    if array.dtype.kind not in "iu" or np.ma.is_masked(values):
+        found = "a masked array" if np.ma.is_masked(values) else array.dtype
+        raise InvalidInputError(f"{name}: expected integers, got {found}")
     if array.ndim == 1 and ndim == 2 and array.size == 0:
         array = array.reshape(0, 0)
     if array.ndim != ndim:
@@ -378,7 +396,16 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
         raise InvalidInputError(f"{name}: {error}") from None
     if array.dtype.kind not in "fiu" and array.size:
         raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
-    return array.astype(np.float64, copy=False)
+    numbers = array.astype(np.float64, copy=False)
+    # what is masked is forbidden
+    return np.where(np.ma.getmaskarray(np.ma.asarray(values)), np.inf, numbers) if np.ma.is_masked(values) else numbers
+
+
+def _doubt(cost: float, name: str) -> None:
+    """Warn of an all-dummy entry that is ignored though it looks like a cost."""
+    if cost != 0.0 and np.isfinite(cost):
+        at = "at index 0 of every dimension, which is the dummy"
+        warn(f"{name}: ignores the cost {cost:g} {at}; without dummies, pass dummy=False")
 
 
 def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> NDArray[np.bool_]:
@@ -399,7 +426,8 @@ def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: b
         )
     found = (columns != 0).sum(axis=0, dtype=np.int16)
     if dummy and not found.all():
-        raise InvalidInputError(f"tuples: row {int(np.argmin(found))} is the all-dummy tuple")
+        row = int(np.argmin(found))
+        raise InvalidInputError(f"tuples: row {row} is the all-dummy tuple: indices count from 1, 0 is the dummy")
     alone: NDArray[np.bool_] = found == 1
     return alone
 

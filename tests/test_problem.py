@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import assoc
-from assoc.errors import AssocError, InvalidInputError, LimitExceededError
+from assoc.errors import AssocError, AssocWarning, InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
 from experiments.common.oracles import axial_problem, disconnected_problem, gated_problem, small_problems
 
@@ -32,7 +32,8 @@ BAD_INPUTS = [
     ([[1, 1], [-1, 1]], [1.0, 1.0], [2, 2], True, "tuples: row 1, sensor 1: index -1 is outside 0..2"),
     ([[2**40, 1]], [1.0], [2, 2], True, "tuples: row 0, sensor 1: index 1099511627776 is outside"),
     (np.array([[2**63, 1]], dtype=np.uint64), [1.0], [2, 2], True, "tuples: a value exceeds 64 bits"),
-    ([[1, 1], [0, 0]], [1.0, 1.0], [2, 2], True, "tuples: row 1 is the all-dummy tuple"),
+    ([[1, 1], [0, 0]], [1.0, 1.0], [2, 2], True, "tuples: row 1 is the all-dummy tuple: indices count from 1"),
+    (np.ma.masked_equal([[1, 2]], 2), [1.0], [2, 2], True, "tuples: expected integers, got a masked array"),
     ([[1, 0]], [1.0], [2, 2], False, "tuples: row 0, sensor 2: index 0 is outside 1..2"),
     ([[1, 1]], [1.0], [2, 0], True, "tuples: row 0, sensor 2: index 1 is outside 0..0"),
     ([[1, 1]], [1.0, 2.0], [2, 2], True, r"costs: expected shape \(1,\), got \(2,\)"),
@@ -133,7 +134,8 @@ def test_empty_problems():
 
 def test_dense_with_dummies():
     tensor = np.array([[9.0, 1.0, INF], [INF, -2.0, INF]])
-    problem = AssignmentProblem.from_dense(tensor)
+    with pytest.warns(AssocWarning, match="ignores the cost 9 at index 0 of every dimension"):
+        problem = AssignmentProblem.from_dense(tensor)
     assert problem.sizes.tolist() == [1, 2]
     dense = problem.to_dense()
     # index (0, 0) is ignored and 0; missing singletons cost 0; a listed one keeps its cost

@@ -1,11 +1,13 @@
 """Problems from tables and sparse arrays are those of the tuples and tensors they hold."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.sparse import coo_array
 
-from assoc.errors import InvalidInputError
+from assoc.errors import AssocWarning, InvalidInputError
 from assoc.problem import AssignmentProblem
 
 
@@ -56,7 +58,17 @@ def test_a_table_is_its_tuples():
             lambda: AssignmentProblem.from_frame(pd.DataFrame([[1, 1, -1.0]], columns=["a", "a", "cost"])),
             "frame: expected columns of different names, got 'a' twice",
         ),
+        (
+            lambda: AssignmentProblem.from_frame(pd.DataFrame({"a": pd.to_timedelta([1], "ns"), "cost": [1.0]})),
+            "column 'a': expected whole",
+        ),
         (lambda: AssignmentProblem.from_frame([1, 2]), "frame: expected a pandas DataFrame, got list"),
+        (
+            lambda: AssignmentProblem.from_sparse(
+                SimpleNamespace(coords=[[1.5], [1.0]], data=np.array([1.0]), shape=(2, 2))
+            ),
+            "array: coords: expected integers, got float64",
+        ),
         (lambda: AssignmentProblem.from_sparse(np.zeros((2, 2))), r"array: expected a sparse array \(scipy.sparse\)"),
         (lambda: AssignmentProblem.from_sparse(coo_array(([np.nan], ([1], [1])), shape=(2, 2))), "costs: row 0 is nan"),
     ],
@@ -65,3 +77,20 @@ def test_what_is_none_of_them_is_refused(make, message):
     with pytest.raises(InvalidInputError, match=message) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("dummy", [True, False])
+def test_what_is_masked_is_forbidden(dummy):
+    rng = np.random.default_rng(3)
+    tensor = np.ma.masked_less(rng.integers(1, 9, size=(3, 4)), 4)
+    tensor[0, 0] = 0
+    open_one = AssignmentProblem.from_dense(tensor.astype(float).filled(np.inf), dummy=dummy)
+    assert same(AssignmentProblem.from_dense(tensor, dummy=dummy), open_one)
+
+
+@pytest.mark.parametrize("read", [np.asarray, coo_array])
+def test_a_plain_cost_matrix_read_with_dummies_is_doubted(read):
+    make = AssignmentProblem.from_dense if read is np.asarray else AssignmentProblem.from_sparse
+    with pytest.warns(AssocWarning, match="ignores the cost 7 at index 0 of every dimension"):
+        make(read([[7.0, 1.0], [2.0, -3.0]]))
+    make(read([[0.0, 1.0], [2.0, -3.0]]))

@@ -49,7 +49,7 @@ def pages(tmp_path_factory):
     scene = simulate("three-radar", 0, scans=2)
     association = assoc.associate(scene, "aco")
     write_association_report(folder / "scene.html", association, scene)
-    problem = assoc.AssignmentProblem.from_dense(np.random.default_rng(0).normal(size=(4, 4, 4)))
+    problem = assoc.AssignmentProblem.from_dense(np.random.default_rng(0).normal(size=(4, 4, 4)), dummy=False)
     plan = Plan((problem,), "exact")
     write_association_report(folder / "problem.html", plan.gather(plan.run(plan.items())), problem)
     rows = association.to_frame().rename(columns={"target": "track_id"})
