@@ -105,8 +105,8 @@ def _written(tree: Tree, rows: list[list[int]], alone: Floats, target: int) -> d
     for node in tree.nodes:
         written: dict[str, Any] = {}
         if node.duals.size:
-            # what rounding to some digits had made short is short again
-            written["multipliers"] = np.round(node.duals + base, 12).tolist()
+            # what rounding to some digits had made short is short again; numpy would overflow
+            written["multipliers"] = [round(value, 12) for value in (node.duals + base).tolist()]
         if node.pair is not None:
             written |= {"pair": [names[row] for row in node.pair], "children": list(node.children)}
         nodes.append(written)

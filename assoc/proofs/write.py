@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,9 @@ def _proved(
     prepared = prepare(problem)
     offsets = np.cumsum([0, *problem.sizes.tolist()])
     alone = prepared.single_cost if problem.dummy else np.zeros(offsets[-1])
-    columns, packing = exact.columns, prepared.packing
+    # a tree may lose a little on whole numbers: not where costs are finer than weights, as where all are 0
+    granularity = prepared.packing.granularity if exact.unit >= _ONE else 0.0
+    columns, packing = exact.columns, replace(prepared.packing, granularity=granularity)
     stages: list[list[list[float]]] = []
     while True:
         duals = dual_bound(packing)
@@ -138,7 +141,7 @@ def _proved(
         if len(stages) == _STAGES or len(left) == len(columns):
             break
         columns = left
-        packing = packing_of(columns, exact, alone, prepared.packing.granularity)
+        packing = packing_of(columns, exact, alone, granularity)
     return stages, trees_of(
         Parts(packing, duals, alone, exact.rows, exact.unit / _ONE), _of_columns(exact, chosen), aim
     )

@@ -87,7 +87,8 @@ def assign(
     Warns
     -----
     AssocWarning
-        No tuple costs less than its measurements as false alarms, so that nothing can be a target.
+        No tuple costs less than its measurements as false alarms, so that nothing can be a target. Or the proof could
+        not be written.
     """
     started, compiled = time.perf_counter(), compile_seconds()
     if not isinstance(problem, AssignmentProblem):
@@ -129,7 +130,10 @@ def assign(
         if proof is not None:
             from assoc.proofs import write_proof  # loads what few calls need
 
-            write_proof(proof, problem, solution)
+            try:
+                write_proof(proof, problem, solution)
+            except ValueError as error:  # the answer comes first
+                warn(f"proof: not written: {error}")
     # only where nothing was found is it worth a look why: every column of a problem with dummies is a target
     if advise and problem.dummy and not len(outcome.columns):
         for line in doubts_about_costs(problem):

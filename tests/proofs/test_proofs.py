@@ -74,6 +74,24 @@ def test_what_is_proved_is_the_optimum(tmp_path, dummy):
     assert trees > 3
 
 
+def test_proofs_near_the_largest_costs(tmp_path):
+    problem = assoc.AssignmentProblem(odd_cycle().tuples[:3], [-6.3e298, -5.4e298, -4.5e298], [1, 1, 1])
+    solution = assoc.assign(problem)
+    assert write_proof(tmp_path / "proof.json", problem, solution) == pytest.approx(solution.cost)
+
+
+@pytest.mark.parametrize("sizes", [(1, 2), (2, 3, 3), (1, 1, 2, 2)])
+def test_proofs_where_all_costs_are_0(tmp_path, sizes):
+    problem = assoc.AssignmentProblem.from_dense(np.zeros(sizes), dummy=False)
+    assert write_proof(tmp_path / "proof.json", problem, assoc.assign(problem)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_answer_comes_before_its_proof(tmp_path):
+    problem = assoc.AssignmentProblem([[1, 1]], [-1e-70], [1, 1])
+    with pytest.warns(assoc.AssocWarning, match="proof: not written: problem: cost .* more than 60 decimals"):
+        assert assoc.assign(problem, proof=tmp_path / "proof.json").cost == -1e-70
+
+
 def test_any_solver_s_answer_gets_a_proof_of_its_gap(tmp_path):
     problem = odd_cycle()
     greedy = assoc.assign(problem, "greedy")
