@@ -23,6 +23,8 @@ class PreparedArrays(NamedTuple):
     origin: NDArray[np.int32]
     row_origin: NDArray[np.int32]
     single: NDArray[np.int64]
+    row_ptr: NDArray[np.int64]
+    row_cols: NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +51,9 @@ class Prepared:
     @property
     def arrays(self) -> PreparedArrays:
         """The columns and the way back from them, as kernels take them."""
-        packing = self.packing
-        return PreparedArrays(
-            packing.cols, packing.weights, packing.slack, packing.origin, packing.row_origin, self.single
-        )
+        one = self.packing
+        own = one.cols, one.weights, one.slack, one.origin, one.row_origin
+        return PreparedArrays(*own, self.single, one.row_ptr, one.row_cols)
 
 
 def prepare(problem: AssignmentProblem) -> Prepared:

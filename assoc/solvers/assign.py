@@ -18,12 +18,12 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
-from assoc.packing.prepare import prepare
+from assoc.packing.prepare import Prepared, prepare
 from assoc.packing.run import Callback, Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
-from assoc.solvers.certificate import certify
+from assoc.solvers.certificate import certify, cost_of
 from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.start import start_columns
@@ -59,6 +59,7 @@ def assign(
         Called with each ``TracePoint``; a true answer stops the solver.
     start : Solution, optional
         A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
+        One of an earlier problem is used as far as its tuples are there.
     watch : callable, optional
         Of ``aco``: called after each cycle with its ``Cycle``: pheromone, visibility and probability of the tuples.
         Several ``workers`` call it from threads of their own. ``assoc.solvers.pheromone`` keeps all cycles.
@@ -78,7 +79,7 @@ def assign(
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter, a value out of range, or a start that is no solution of this problem.
+        Unknown solver or parameter, a value out of range, or a start of other sensors or that uses a measurement twice.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
     LimitExceededError
@@ -109,7 +110,7 @@ def assign(
         if watch is not None:
             run.watch = _by_tuple(watch, problem, packing)
         if start is not None:
-            run.start = start_columns(problem, prepared, start)
+            run.start = start_columns(problem, prepared, start, run)
         estimate = chosen.memory(packing.num_columns, packing.num_rows)
         if estimate is not None:
             memory.require(*estimate)
@@ -122,10 +123,11 @@ def assign(
             if known is None:
                 raise
             outcome = Outcome(known, 0)
-        if run.start is not None:
-            outcome = _lighter(packing, outcome, run.start, run)
+        others = [] if run.start is None else [run.start]
         if run.stopped_by == "time_limit":
-            outcome = _not_worse(packing, outcome, run)
+            others.append(better_of(packing, np.asarray(outcome.columns, dtype=np.int64), run))
+        for other in others:
+            outcome = _cheaper(problem, prepared, outcome, other, run)
         solution = certify(problem, prepared, outcome, run, solver, chosen)
         if proof is not None:
             from assoc.proofs import write_proof  # loads what few calls need
@@ -155,17 +157,13 @@ def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packin
     return told
 
 
-def _not_worse(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
-    """Take the greedy choice where the solver's is worse when time is over."""
-    columns = np.asarray(outcome.columns, dtype=np.int64)
-    return _lighter(packing, outcome, better_of(packing, columns, run), run)
-
-
-def _lighter(packing: Packing, outcome: Outcome, other: NDArray[np.integer], run: Run) -> Outcome:
-    """Take another choice where it is lighter than the solver's."""
-    weight = float(packing.weights[other].sum())
-    if weight >= packing.weights[np.asarray(outcome.columns, dtype=np.int64)].sum():
+def _cheaper(
+    problem: AssignmentProblem, prepared: Prepared, outcome: Outcome, other: NDArray[np.integer], run: Run
+) -> Outcome:
+    """Take another choice where it costs less than the solver's: not by weights, whose sums lose the last digits."""
+    if cost_of(problem, prepared, other) >= cost_of(problem, prepared, outcome.columns):
         return outcome
+    weight = float(prepared.packing.weights[other].sum())
     run.record(outcome.iterations, weight, min(outcome.lower_bound, weight))
     return replace(outcome, columns=other)
 

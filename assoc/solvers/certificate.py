@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
 from assoc.packing.prepare import Prepared, PreparedArrays
@@ -71,14 +71,22 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
+def cost_of(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.integer]) -> float:
+    """Cost of a choice of columns, rounded but once; -inf where it is none, which `certify` refuses."""
+    chosen = np.asarray(columns, dtype=np.int64)
+    exact, _, _, costs, _ = as_tuples(problem.tuples, problem.costs, problem.sizes, prepared.arrays, chosen)
+    return math.fsum(costs) if exact else -math.inf
+
+
 @njit
 def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, columns: Any) -> Any:
     """A choice of columns as rows of ``problem.tuples`` in lexicographic order, completed by singletons.
 
     Returns whether each measurement is used exactly once (each that must be, without dummies), the indices, their
-    tuples and costs, and the sum of the chosen weights' magnitudes.
+    tuples and costs, and the sum of the chosen weights' magnitudes. Of tuples that are listed twice it takes the
+    cheaper copies.
     """
-    cols, weights, slack, origin, row_origin, single = prepared
+    cols, weights, slack, origin, row_origin, single, _, _ = prepared
     num_sensors = sizes.size
     start = np.zeros(num_sensors + 1, np.int64)
     for s in range(num_sensors):
@@ -94,6 +102,7 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
         if j < 0 or j >= weights.size:
             exact = False
             continue
+        j = _cheapest_copy(costs, prepared, j)
         magnitude += abs(weights[j])
         for s in range(num_sensors):
             r = cols[j, s]
@@ -130,6 +139,25 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
                 prices[count] = costs[found[r]]
                 count += 1
     return exact, indices, chosen, prices, magnitude
+
+
+@inner_njit
+def _cheapest_copy(costs: Any, prepared: PreparedArrays, j: int) -> int:
+    """The column of the same rows as column j that costs least."""
+    cols, origin, row_ptr, row_cols = prepared.cols, prepared.origin, prepared.row_ptr, prepared.row_cols
+    r = -1
+    for s in range(cols.shape[1]):
+        r = max(r, cols[j, s])
+    best = j
+    for place in range(row_ptr[r], row_ptr[r + 1]):
+        k = row_cols[place]
+        if costs[origin[k]] < costs[origin[best]]:
+            same = True
+            for s in range(cols.shape[1]):
+                same = same and cols[k, s] == cols[j, s]
+            if same:
+                best = k
+    return best
 
 
 def _duals_by_sensor(

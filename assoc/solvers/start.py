@@ -6,19 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc.errors import InvalidInputError
+from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import Prepared
+from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
 
-def start_columns(problem: AssignmentProblem, prepared: Prepared, start: object) -> NDArray[np.int64]:
-    """Return the columns of a packing that a solution of its problem chooses, ascending.
+def start_columns(
+    problem: AssignmentProblem, prepared: Prepared, start: object, run: Run
+) -> NDArray[np.integer] | None:
+    """Return the columns of a packing that a solution chooses, as far as they are there.
+
+    Without dummies what is then left uncovered is covered by ejections; None where that fails.
 
     Raises
     ------
     InvalidInputError
-        It is no solution of this problem: it has other sensors, a tuple that is no candidate here, or does not use
-        every measurement exactly once.
+        It is no solution: it has other sensors, tuples that are no whole numbers, or uses a measurement twice.
     """
     if not isinstance(start, Solution):
         raise InvalidInputError(f"start: expected a Solution, got {type(start).__name__}")
@@ -26,38 +31,30 @@ def start_columns(problem: AssignmentProblem, prepared: Prepared, start: object)
     if tuples.ndim != 2 or tuples.shape[1] != problem.num_sensors:
         shape = " x ".join(map(str, tuples.shape))
         raise InvalidInputError(f"start: expected tuples of {problem.num_sensors} sensors, got an array of {shape}")
-    if ((tuples < 0) | (tuples > problem.sizes)).any():
-        raise InvalidInputError("start: names measurements that the problem does not have")
-    for s, size in enumerate(problem.sizes.tolist()):
-        used = np.bincount(tuples[:, s], minlength=size + 1)[1:]
-        # without dummies only the measurements of the smallest sensors must be used
-        needed = problem.dummy or size == problem.sizes.min()
-        wrong = np.flatnonzero(used != 1) if needed else np.flatnonzero(used > 1)
-        if wrong.size:
-            count = used[wrong[0]]
+    if tuples.size and (tuples.dtype.kind not in "iu" or tuples.min() < 0):
+        found = tuples.min() if tuples.dtype.kind in "iu" else tuples.dtype
+        raise InvalidInputError(f"start: expected tuples of whole numbers, 0 for a miss, got {found}")
+    for s, column in enumerate(tuples.T):
+        used, counts = np.unique(column[column > 0], return_counts=True)
+        if (counts > 1).any():
+            which, count = used[counts.argmax()], counts.max()
             raise InvalidInputError(
-                f"start: expected every measurement exactly once; measurement {wrong[0] + 1} of sensor {s + 1} is in "
-                f"{count} tuples"
+                f"start: expected every measurement once; measurement {which} of sensor {s + 1} is in {count} tuples"
             )
+    tuples = tuples[(tuples <= problem.sizes).all(axis=1)].astype(np.int64)
     before = np.cumsum(problem.sizes) - problem.sizes
-    wanted = np.where(tuples > 0, tuples + before - 1, -1)
     packing = prepared.packing
     rows = np.where(packing.cols >= 0, packing.row_origin[packing.cols], -1) if packing.num_columns else packing.cols
-    which = _places(rows, wanted)
-    known = np.zeros(len(wanted), dtype=bool)
-    known[which[which >= 0]] = True
-    known |= problem.dummy & (np.count_nonzero(tuples, axis=1) == 1)
-    if not known.all():
-        # with dummies, a tuple that costs no less than its false alarms is no column
-        listed = _places(np.where(problem.tuples > 0, problem.tuples + before - 1, -1), wanted)
-        known[listed[listed >= 0]] = True
-    if not known.all():
-        first = ", ".join(map(str, tuples[np.argmin(known)].tolist()))
-        raise InvalidInputError(f"start: the tuple ({first}) is no candidate of this problem")
+    which = _places(rows, np.where(tuples > 0, tuples + before - 1, -1))
     # of tuples that are listed twice the cheaper one
     columns = np.flatnonzero(which >= 0)
     columns = columns[np.argsort(packing.weights[columns], kind="stable")]
-    return np.sort(columns[np.unique(which[columns], return_index=True)[1]])
+    columns = np.sort(columns[np.unique(which[columns], return_index=True)[1]])
+    cover = Cover.of(packing, columns)
+    if cover.is_complete:
+        return columns
+    cover.improve(run.deadline())
+    return cover.columns() if cover.is_complete else None
 
 
 def _places(rows: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -101,6 +101,19 @@ def test_a_bound_holds_where_false_alarms_add_up_badly():
     assert answer(problem, [], bound=-1.0).lower_bound <= math.fsum(alone[1:])
 
 
+@pytest.mark.parametrize("dummy", [True, False])
+def test_of_a_tuple_that_is_listed_twice_the_cheaper_copy_counts(dummy):
+    """Whichever copy a solver chose, as within its tolerance they are the same."""
+    costs = [-1.0 - 1e-10, -3.0, -1.0, -1.0 - 2e-10, -9.0]
+    problem = AssignmentProblem([[1, 1], [2, 2], [1, 1], [1, 1], [2, 1]], costs, [2, 2], dummy=dummy)
+    packing = prepare(problem).packing
+    for place in (0, 2, 3):
+        columns = np.flatnonzero((packing.origin == place) | (packing.origin == 1))
+        solution = answer(problem, columns)
+        assert solution.cost == math.fsum([-3.0, -1.0 - 2e-10])
+        assert 3 in solution.indices
+
+
 def test_a_bound_that_is_none_is_found_anew():
     for bound in (-np.inf, np.nan):
         assert -6.0 < answer(PROBLEM, [column(PROBLEM, 1, 2)], bound).lower_bound <= -5.0

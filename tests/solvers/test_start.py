@@ -98,18 +98,61 @@ def test_what_is_no_solution_is_refused(problem, axial):
             assoc.assign(of, start=start)
 
     refused(best.tuples, "start: expected a Solution, got ndarray")
-    refused(best, "start: names measurements that the problem does not have", axial)
     refused(replace(best, tuples=best.tuples[:, :2]), "start: expected tuples of 3 sensors")
-    refused(replace(best, tuples=best.tuples[1:]), "every measurement exactly once; .* is in 0 tuples")
     refused(replace(best, tuples=np.vstack([best.tuples, best.tuples[-1:]])), "is in 2 tuples")
-    pair = best.tuples[(best.tuples > 0).sum(axis=1) > 1][0]
-    keep = ~(problem.tuples == pair).all(axis=1)
-    fewer = assoc.AssignmentProblem(problem.tuples[keep], problem.costs[keep], problem.sizes)
-    refused(best, rf"start: the tuple \({', '.join(map(str, pair))}\) is no candidate of this problem", fewer)
-    # without dummies the smallest sensors' measurements must be used, and only they
+    for wrong in (best.tuples * 1.0, best.tuples * np.nan, best.tuples.astype(str), best.tuples.astype(object)):
+        refused(
+            replace(best, tuples=wrong), f"start: expected tuples of whole numbers, 0 for a miss, got {wrong.dtype}"
+        )
+    refused(replace(best, tuples=-best.tuples), "start: expected tuples of whole numbers, 0 for a miss, got -")
+
+
+def told_to_a_solver(problem, start):
+    """Tuples of the columns that a solver gets to begin with."""
+    seen = []
+
+    def look(packing, parameters, run):
+        seen.append(None if run.start is None else sorted(packing.origin[run.start].tolist()))
+        return Outcome(packing.arrays.cols[:0, 0] if run.start is None else run.start, 1)
+
+    registry.register("look", registry.parameters("greedy"), look)
+    try:
+        assoc.assign(problem, "look", start=start)
+    finally:
+        registry._REGISTERED.pop("look")
+    return seen[0] if seen[0] is None else problem.tuples[seen[0]].tolist()
+
+
+def test_a_start_is_used_as_far_as_it_goes(problem, axial):
+    """A target is gone, or a measurement is new: the other tuples are still a start."""
+    best = assoc.assign(problem)
+    targets = best.tuples[(best.tuples > 0).sum(axis=1) > 1].tolist()
+    gone = ~(problem.tuples == targets[0]).all(axis=1)
+    fewer = assoc.AssignmentProblem(problem.tuples[gone], problem.costs[gone], problem.sizes)
+    assert sorted(told_to_a_solver(fewer, best)) == targets[1:]
+    assert sorted(told_to_a_solver(problem, replace(best, tuples=best.tuples[1:]))) == sorted(
+        one for one in targets if one != best.tuples[0].tolist()
+    )
+    # measurements that the problem does not have, up to the largest number
+    far = np.vstack([best.tuples, np.full((1, 3), np.iinfo(np.int64).max)])
+    assert sorted(told_to_a_solver(problem, replace(best, tuples=far))) == targets
+    # without dummies the rest is covered anew
     some = assoc.assign(axial)
-    refused(replace(some, tuples=some.tuples[1:]), "every measurement exactly once; .* is in 0 tuples", axial)
-    wide = assoc.AssignmentProblem.from_dense(np.random.default_rng(1).normal(size=(3, 4, 5)), dummy=False)
-    best = assoc.assign(wide)
-    assert assoc.assign(wide, "tabu", start=best).cost == pytest.approx(best.cost)
-    refused(replace(best, tuples=best.tuples[1:]), "every measurement exactly once; .* is in 0 tuples", wide)
+    assert len(told_to_a_solver(axial, replace(some, tuples=some.tuples[1:]))) == 5
+    assert assoc.assign(axial, "tabu", start=best).status == "optimal"
+
+
+@pytest.mark.parametrize("solver, seed", [("greedy", 4), ("tabu", 7), ("greedy", 252), ("aco", 362)])
+def test_costs_are_compared_to_the_last_digit(solver, seed):
+    """Sums of weights lose what costs differ by: an ulp, or a few units beside 1e298."""
+    rng = np.random.default_rng(seed)
+    costs = rng.normal(-1, 2, size=(4, 4, 4)).round(1)
+    if seed > 100:
+        costs = np.where(rng.random(costs.shape) < 0.2, costs * 1e298, costs)
+    else:
+        costs = 1.0 + rng.integers(-3, 4, size=(3, 3, 3)) * 2.3e-16
+    costs[0, 0, 0] = 0.0
+    given = assoc.AssignmentProblem.from_dense(costs)
+    start = assoc.assign(given, advise=False)
+    parameters = {} if solver == "greedy" else {"iterations": 2}
+    assert assoc.assign(given, solver, start=start, advise=False, **parameters).cost <= start.cost
