@@ -151,7 +151,8 @@ def _cheapest_copy(costs: Any, prepared: PreparedArrays, j: int) -> int:
     best = j
     for place in range(row_ptr[r], row_ptr[r + 1]):
         k = row_cols[place]
-        if costs[origin[k]] < costs[origin[best]]:
+        # rounding keeps the order of weights: few columns are looked at any further
+        if prepared.weights[k] <= prepared.weights[best] and costs[origin[k]] < costs[origin[best]]:
             same = True
             for s in range(cols.shape[1]):
                 same = same and cols[k, s] == cols[j, s]
