@@ -166,7 +166,9 @@ def _problems() -> list[AssignmentProblem]:
     rng = np.random.default_rng(1)
     dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
-    planar = AssignmentProblem.from_dense(rng.normal(size=(5, 6)))
+    costs = rng.normal(size=(5, 6))
+    costs[0, 0] = 0.0
+    planar = AssignmentProblem.from_dense(costs)
     return [_small_problem(), axial, dense, planar, AssignmentProblem(np.zeros((0, 3), dtype=int), [], [2, 0, 1])]
 
 
