@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutations.__main__ import put_in
 from tests.mutations.faults import FAULTS
 
 ROOT = Path(__file__).parents[2]
@@ -16,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.what)
 def test_its_text_occurs_once(fault):
     text = (ROOT / fault.file).read_text(encoding="utf-8")
-    changed = put_in(fault, text)
+    changed = fault.put_in(text)
     assert changed != text
     # a fault that is no Python would be noticed by any test
     ast.parse(changed)
