@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import assoc
 from assoc.errors import AssocError, AssocWarning, InvalidInputError, LimitExceededError
 from assoc.problem import AssignmentProblem
-from experiments.common.oracles import axial_problem, disconnected_problem, gated_problem, small_problems
+from tests.oracles import axial_problem, disconnected_problem, gated_problem, small_problems
 
 INF, NAN = float("inf"), float("nan")
 

@@ -10,7 +10,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers.assign import assign
-from experiments.common.oracles import gated_problem
+from tests.oracles import gated_problem
 
 
 def solution(cost, bound, tuples=((1, 1, 0), (0, 0, 1))):

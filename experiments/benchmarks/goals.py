@@ -394,7 +394,4 @@ def _kbest(results: Results) -> list[Verdict]:
         text = f"median {median(spatial):.3g} times"
         goal = "at most 20 times one exact solve"
         verdicts.append(Verdict("kbest", ranking.SPATIAL, goal, False, text, median(spatial) <= 20))
-    for row in results.of("kbest", ranking.SMALL):
-        text = f"{row.extra:.0f} of 200"
-        verdicts.append(Verdict("kbest", ranking.SMALL, "ranking equal to brute force", False, text, row.extra == 200))
     return verdicts

@@ -1,4 +1,4 @@
-"""The k best: against one exact solve, against Murty's algorithm of a peer, and against brute force."""
+"""The k best: against one exact solve and against Murty's algorithm of a peer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 import assoc
-from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.benchmarks import FIRST_SEED
 from experiments.benchmarks.rows import Row
@@ -23,7 +22,6 @@ from experiments.common.instances import scenes, synthetic
 
 PLANAR, PLANAR_K = "2-D n=100 k=100", 100
 SPATIAL, SPATIAL_K = "3x20 k=20", 20
-SMALL = "200 small problems"
 PEER = "nrl_tracker"
 
 Costs = Callable[[AssignmentProblem], list[float]]
@@ -39,7 +37,7 @@ class Ranking(NamedTuple):
 
 
 def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]:
-    """Time both goals' instances and check the ranking on small problems against enumeration."""
+    """Time both goals' instances."""
     from assoc.costs import build_problem
 
     rows: list[Row] = []
@@ -55,9 +53,7 @@ def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]
             found = compared([_ranked(solver, rank, size, problem, k, seed) for solver, rank in ways.items()])
             log(f"kbest {size} seed {seed}: " + ", ".join(f"{r.solver} {1e3 * r.seconds:.3g} ms" for r in found))
             rows += found
-    row = _small(200)
-    log(f"kbest ranking equal to brute force on {row.extra:.0f} of 200 problems")
-    return [*rows, row]
+    return rows
 
 
 def _fresh(problem: AssignmentProblem) -> AssignmentProblem:
@@ -126,21 +122,3 @@ def _murty_peer(problem: AssignmentProblem, k: int) -> Costs:
 
     found = murty(problem.to_dense(), k)
     return lambda original: np.asarray(found.costs).tolist()
-
-
-def _small(count: int) -> Row:
-    """Count the small problems whose ranking equals full enumeration; some have fewer than k solutions."""
-    from experiments.common import oracles
-
-    equal = 0
-    start = time.perf_counter()
-    for number, problem in enumerate(oracles.small_problems(count, seed=FIRST_SEED)):
-        k = (3, 10, 40)[number % 3]
-        expected = [solution.cost for solution in oracles.all_solutions(problem)[:k]]
-        try:
-            costs = [solution.cost for solution in assoc.kbest(problem, k)]
-        except InfeasibleError:
-            costs = []
-        equal += len(costs) == len(expected) and bool(np.allclose(costs, expected, rtol=0.0, atol=1e-9))
-    seconds = time.perf_counter() - start
-    return Row("kbest", SMALL, FIRST_SEED, 0, 0, "kbest", False, 0.0, 0.0, 0.0, seconds, "optimal", 0.0, True, equal)

@@ -178,17 +178,26 @@ def _scip(problem: AssignmentProblem, time_limit: float, threads: int) -> Chosen
     return np.flatnonzero(values > 0.5), bound, result.termination.reason == mathopt.TerminationReason.OPTIMAL
 
 
-def _highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
+def by_milp(problem: AssignmentProblem, time_limit: float, forbidden: Iterable[NDArray[np.integer]] = ()) -> Any:
+    """HiGHS's result; forbidden are solutions that do not count, each by the indices of its tuples."""
     row, column, must = _rows(problem)
     matrix = csc_array((np.ones(row.size), (row, column)), shape=(len(must), problem.num_tuples))
-    result = milp(
+    constraints = [LinearConstraint(matrix, must.astype(float), 1.0)]
+    for indices in forbidden:
+        taken = np.isin(np.arange(problem.num_tuples), indices).astype(float)
+        constraints.append(LinearConstraint(taken, ub=taken.sum() - 1.0))
+    return milp(
         problem.costs,
         integrality=np.ones(problem.num_tuples, dtype=np.int64),
         bounds=Bounds(0, 1),
-        constraints=LinearConstraint(matrix, must.astype(float), 1.0),
+        constraints=constraints,
         # 0 would mean "the default, 1e-4", and wrong answers called optimal
         options={"mip_rel_gap": 1e-9, "time_limit": time_limit},
     )
+
+
+def _highs(problem: AssignmentProblem, time_limit: float) -> Chosen:
+    result = by_milp(problem, time_limit)
     bound = None if result.mip_dual_bound is None else float(result.mip_dual_bound)
     if result.x is None:
         return None, bound, False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -206,23 +205,10 @@ def test_a_ranking_that_misses_a_solution_is_noticed(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(ranking, "SPATIAL_K", 4)
     found = ranking.run(True, 1, lambda text: None)
     assert {row.solver: row.extra for row in found if row.size == ranking.SPATIAL} == {"kbest": 4, "exact": 1}
-    assert all(row.hit and row.cpu > 0 for row in found if row.size != ranking.SMALL)
+    assert all(row.hit and row.cpu > 0 for row in found)
     monkeypatch.setattr(assoc, "kbest", lambda problem, k: real(problem, k + 1)[1:])
     with pytest.raises(AssertionError, match="exact has better"):
         ranking.run(True, 1, lambda text: None)
-
-
-def test_our_check_of_a_peers_answer_is_none_of_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    def slow_check(*arguments: object) -> float:
-        begin = time.process_time()
-        while time.process_time() - begin < 0.1:
-            pass
-        return 0.0
-
-    monkeypatch.setattr(peers, "check_answer", slow_check)
-    case = Case("planted", "S=3", lambda seed: iter([Instance(*synthetic.planted(3, seed, targets=6))]), (),
-                (Entry("sequential", 5.0),), 1)  # fmt: skip
-    assert run_case(case)[0].cpu < 0.05
 
 
 def test_report_has_a_table_for_each_family(tmp_path: Path) -> None:

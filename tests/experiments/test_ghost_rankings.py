@@ -7,9 +7,9 @@ import pytest
 
 import assoc
 from experiments import ghost_rankings
-from experiments.common.oracles import gated_problem
 from experiments.common.results import Results
 from experiments.pages.measured import ghost_rankings as table
+from tests.oracles import gated_problem
 
 
 def test_a_solution_left_out_is_noticed():

@@ -10,8 +10,8 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
-from experiments.common import oracles
 from experiments.common.checking import InfeasibleAnswerError, check_answer
+from tests import oracles
 
 BLACKMAN_POPOLI = (
     "011:10.2 021:4.7 022:5.5 101:6.8 102:5.2 110:6.8 120:10.9 111:18 112:14.8 121:17 122:9.9 "

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from assoc.problem import AssignmentProblem
-from experiments.common import oracles, packing_peers, peers
+from experiments.common import packing_peers, peers
 from experiments.common.instances import synthetic
+from tests import oracles
 
 EXACT = ["cp_sat", "cp_sat_1", "scip", "scip_1", "highs"]
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assoc.costs import build_problem
-from experiments.common import oracles
 from experiments.common.instances import scenes
+from tests import oracles
 
 
 def test_same_seed_same_scene() -> None:

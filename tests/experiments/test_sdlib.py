@@ -11,13 +11,13 @@ import pytest
 
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from experiments.common.oracles import small_problems
 from experiments.sdlib import recorded, store, verify
 from experiments.sdlib.comparison import comparison_tables, excess, is_wrong, time_to_near, time_to_proof
 from experiments.sdlib.contest import representatives
 from experiments.sdlib.instances import instances
 from experiments.sdlib.page import BEGIN, BEGIN_COMPARISON, END, END_COMPARISON, PAGE, tables
 from experiments.sdlib.solve import check_row
+from tests.oracles import small_problems
 
 EVERY = instances()
 NAMES = [one.name for one in EVERY]

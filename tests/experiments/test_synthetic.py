@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.common import oracles
 from experiments.common.instances import synthetic
+from tests import oracles
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])

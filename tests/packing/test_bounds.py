@@ -12,7 +12,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.simplex.program import all_allowed, certified, program_of
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from experiments.common.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems
+from tests.oracles import axial_problem, brute_force, gated_problem, milp_optimum, small_problems
 from tests.sizes import few_or_all, sample
 from tests.solvers.test_against_brute_force import installed
 

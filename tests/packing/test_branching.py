@@ -29,7 +29,7 @@ from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
 from assoc.packing.simplex.program import all_allowed, make_feasible, program_of, weight_limit
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
-from experiments.common.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
+from tests.oracles import all_solutions, axial_problem, brute_force, gated_problem, small_problems
 
 
 def feasible(count, seed):

@@ -11,7 +11,7 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from experiments.common.instances.synthetic import axial_known_optimum, axial_random
-from experiments.common.oracles import brute_force, gated_problem, small_problems
+from tests.oracles import brute_force, gated_problem, small_problems
 from tests.sizes import few_or_all
 
 

@@ -13,7 +13,7 @@ from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.program import weight_limit
 from experiments.common.instances.synthetic import axial_random
-from experiments.common.oracles import small_problems
+from tests.oracles import small_problems
 from tests.packing.test_branching import covers
 from tests.packing.test_passes import ghosts, optimum
 

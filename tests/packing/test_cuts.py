@@ -13,7 +13,7 @@ from assoc.packing.simplex.basis import begin_from_duals, new_basis, primal_valu
 from assoc.packing.simplex.cuts import odd_sets
 from assoc.packing.simplex.dual import OPTIMAL, Effort, solve_dual
 from assoc.packing.simplex.program import all_allowed, certified, make_feasible, program_of, weight_limit
-from experiments.common.oracles import gated_problem
+from tests.oracles import gated_problem
 from tests.packing.test_branching import all_covers
 from tests.packing.test_passes import ghosts
 

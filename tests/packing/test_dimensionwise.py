@@ -10,7 +10,7 @@ from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from experiments.common.instances.synthetic import planar_random
-from experiments.common.oracles import axial_problem, brute_force, gated_problem, small_problems
+from tests.oracles import axial_problem, brute_force, gated_problem, small_problems
 
 
 def _random_cover(packing, rng):

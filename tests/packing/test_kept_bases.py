@@ -11,7 +11,7 @@ from assoc.packing.branching.root import plain_root
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.prepare import prepare
 from assoc.packing.simplex.basis import new_basis, refactor
-from experiments.common.oracles import axial_problem
+from tests.oracles import axial_problem
 from tests.packing.test_trial import packings, part, solved
 
 

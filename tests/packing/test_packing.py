@@ -8,7 +8,7 @@ import pytest
 from assoc.packing.packing import assemble
 from assoc.packing.prepare import prepare
 from assoc.problem import AssignmentProblem
-from experiments.common.oracles import small_problems
+from tests.oracles import small_problems
 
 
 def plain_columns(problem):

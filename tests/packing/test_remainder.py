@@ -13,7 +13,7 @@ from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, Effort, bound_of, solve_dual
 from assoc.packing.simplex.program import Allowed, all_allowed, weight_limit
 from assoc.packing.simplex.remainder import remainder_of
-from experiments.common.oracles import axial_problem
+from tests.oracles import axial_problem
 from tests.packing.test_trial import packings, program_with_cuts, solved
 
 

@@ -19,7 +19,7 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.simulation import simulate
-from experiments.common.oracles import gated_problem, milp_optimum
+from tests.oracles import gated_problem, milp_optimum
 from tests.sizes import sample
 from tests.solvers.pieces import component, problems
 

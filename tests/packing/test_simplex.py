@@ -14,7 +14,7 @@ from assoc.packing.simplex.dual import CUT, INFEASIBLE, OPTIMAL, STOPPED, Effort
 from assoc.packing.simplex.linear_program import LinearProgram
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, program_of, weight_limit
 from assoc.problem import AssignmentProblem
-from experiments.common.oracles import axial_problem, gated_problem
+from tests.oracles import axial_problem, gated_problem
 from tests.sizes import few_or_all
 
 

@@ -11,7 +11,7 @@ from assoc.packing.simplex.dual import CUT, INFEASIBLE, OPTIMAL, STOPPED, Effort
 from assoc.packing.simplex.pricing import list_columns, new_pricing, price, sum_rows
 from assoc.packing.simplex.program import Allowed, all_allowed, certified, make_feasible, program_of, weight_limit
 from assoc.packing.simplex.trial import begin_trials, new_trial, try_dual
-from experiments.common.oracles import axial_problem, gated_problem
+from tests.oracles import axial_problem, gated_problem
 
 
 def packings(count, seed):

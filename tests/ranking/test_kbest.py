@@ -23,7 +23,7 @@ from assoc.ranking.murty.murty import Murty
 from assoc.solvers.assign import assign
 from experiments.common.instances import scenes
 from experiments.common.instances.synthetic import axial_random, planar_random
-from experiments.common.oracles import (
+from tests.oracles import (
     all_solutions,
     axial_problem,
     check_answer,

@@ -10,8 +10,8 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.marginals import marginals
 from assoc.ranking.partition_function import log_partition
-from experiments.common import oracles
-from experiments.common.oracles import all_solutions, axial_problem, gated_problem, small_problems
+from tests import oracles
+from tests.oracles import all_solutions, axial_problem, gated_problem, small_problems
 from tests.sizes import few_or_all
 
 

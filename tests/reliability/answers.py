@@ -23,7 +23,7 @@ SOLVERS = ("exact", "greedy", "aco", "genetic", "tabu", "lagrangian")
 def solutions() -> list[Any]:
     """Solutions of small problems by all solvers that have kernels."""
     from assoc.solvers.assign import assign
-    from experiments.common.oracles import small_problems
+    from tests.oracles import small_problems
 
     found = []
     for number, problem in enumerate(small_problems(5, seed=21, dummy=True)):
@@ -40,7 +40,7 @@ def rankings() -> list[Any]:
     """Ranked solutions, and probabilities."""
     from assoc.ranking.kbest import kbest
     from assoc.ranking.marginals import marginals
-    from experiments.common.oracles import small_problems
+    from tests.oracles import small_problems
 
     found = []
     for number, problem in enumerate(small_problems(3, seed=22, dummy=True)):

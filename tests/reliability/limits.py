@@ -21,7 +21,7 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
-from experiments.common.oracles import gated_problem
+from tests.oracles import gated_problem
 from tests.reliability.big import BIG, axial, ghosts
 
 Way = Callable[[AssignmentProblem, float], Any]

@@ -58,7 +58,7 @@ def measure(make: Make, way: str, limit: float) -> dict[str, Any]:
     """Measure one way of solving in this process."""
     import numpy as np
 
-    from experiments.common.oracles import gated_problem
+    from tests.oracles import gated_problem
 
     for small in (gated_problem(np.random.default_rng(0), (6, 6, 6), 0.3), axial(10), ghosts(40, 20_000)):
         WAYS[way](small, 1.0)

@@ -43,7 +43,7 @@ def _scenes(folder: Path) -> list[Path]:
 
 
 def _problems(folder: Path) -> list[Path]:
-    from experiments.common.oracles import small_problems
+    from tests.oracles import small_problems
 
     paths = []
     for number, problem in enumerate(small_problems(6, seed=3)):
@@ -82,7 +82,7 @@ def _design(folder: Path) -> list[Path]:
 
 def _study(folder: Path) -> list[Path]:
     """A finished study; the log and the manifest are spoiled in place."""
-    from experiments.common.oracles import small_problems
+    from tests.oracles import small_problems
 
     next(iter(small_problems(1, seed=3, dummy=True))).save(folder / "p.npz")
     command = [sys.executable, "-m", "assoc.sweep", str(folder / "p.npz"), "--solver", "aco"]

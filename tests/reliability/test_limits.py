@@ -24,7 +24,7 @@ from assoc.ranking.marginals import marginals
 from assoc.solvers.assign import assign
 from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.solve import greedy_choice
-from experiments.common.oracles import check_answer, small_problems
+from tests.oracles import check_answer, small_problems
 from tests.reliability.big import axial, ghosts
 from tests.reliability.limits import WAYS, lateness
 from tests.sizes import sample

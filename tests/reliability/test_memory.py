@@ -30,7 +30,7 @@ from assoc.ranking.kbest import kbest
 from assoc.simulation import simulate, simulate_recording
 from assoc.simulation.dubins.paths import Pose, shortest
 from assoc.solvers.assign import assign
-from experiments.common.oracles import gated_problem
+from tests.oracles import gated_problem
 from tests.reliability.big import axial, ghosts
 from tests.reliability.memory import peak_of
 from tests.sizes import sample

@@ -20,7 +20,7 @@ from assoc.ranking.marginals import marginals
 from assoc.simulation import simulate
 from assoc.solvers.assign import assign
 from assoc.tracking import MultiSensorTracker
-from experiments.common.oracles import gated_problem, small_problems
+from tests.oracles import gated_problem, small_problems
 from tests.sizes import few_or_all
 
 # a kernel of its own in a copied package: compiling the real ones takes a minute

@@ -10,7 +10,7 @@ from assoc.packing.components.splitting import split_components
 from assoc.packing.prepare import prepare
 from assoc.simulation import simulate
 from experiments.common.instances.synthetic import axial_random
-from experiments.common.oracles import gated_problem
+from tests.oracles import gated_problem
 
 
 def problems():

@@ -10,7 +10,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.assign import assign
-from experiments.common.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
+from tests.oracles import brute_force, check_answer, gated_problem, milp_optimum, small_problems
 from tests.sizes import few_or_all, sample
 
 # milp has a test file of its own, and its backends take their time

@@ -13,7 +13,7 @@ from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.solvers.certificate import certify
 from assoc.solvers.greedy.parameters import GreedyParameters
-from experiments.common.oracles import small_problems
+from tests.oracles import small_problems
 
 PROBLEM = AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], [-3.0, -2.0, -4.0, -0.5], [2, 2])
 AXIAL = AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], [3.0, 2.0, 4.0, 0.5], [2, 2], dummy=False)

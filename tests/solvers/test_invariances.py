@@ -12,7 +12,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from assoc.simulation import simulate
 from assoc.solvers.assign import assign
-from experiments.common.oracles import axial_problem, brute_force, check_answer, gated_problem
+from tests.oracles import axial_problem, brute_force, check_answer, gated_problem
 from tests.sizes import sample
 from tests.solvers.test_against_brute_force import installed
 

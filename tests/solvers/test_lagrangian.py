@@ -11,7 +11,7 @@ from assoc.solvers.assign import assign
 from assoc.solvers.lagrangian.arranged import arrange
 from assoc.solvers.lagrangian.relaxation import relax
 from experiments.common.instances.synthetic import axial_known_optimum, planted
-from experiments.common.oracles import (
+from tests.oracles import (
     axial_problem,
     brute_force,
     check_answer,

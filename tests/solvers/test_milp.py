@@ -9,7 +9,7 @@ from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.solvers.assign import assign
 from experiments.common.instances.synthetic import axial_random, planted
-from experiments.common.oracles import axial_problem, brute_force, check_answer, gated_problem, small_problems
+from tests.oracles import axial_problem, brute_force, check_answer, gated_problem, small_problems
 
 BACKENDS = ("scip", "cp_sat", "highs")
 

@@ -12,24 +12,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import csc_array
 
 from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common.checking import check_answer, price_list
-
-__all__ = [
-    "Ranked",
-    "all_solutions",
-    "axial_problem",
-    "brute_force",
-    "check_answer",
-    "gated_problem",
-    "marginals",
-    "milp_optimum",
-    "small_problems",
-]
+from experiments.common.peers import by_milp
 
 
 @dataclass(frozen=True)
@@ -140,15 +127,7 @@ def marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
 def milp_optimum(
     problem: AssignmentProblem, time_limit: float = 60.0, forbidden: Sequence[NDArray[np.integer]] = ()
 ) -> float:
-    """Optimal cost by HiGHS through scipy, gap 1e-9 (0 would mean "the default, 1e-4").
-
-    Parameters
-    ----------
-    problem : AssignmentProblem
-    time_limit : float
-        Seconds.
-    forbidden : sequence of int arrays
-        Solutions that do not count, each by the places of its tuples in the problem.
+    """Optimal cost by HiGHS through scipy; `forbidden`: solutions that do not count, by the indices of their tuples.
 
     Raises
     ------
@@ -157,27 +136,11 @@ def milp_optimum(
     TimeoutError
         Not proven within the time limit.
     """
-    sizes = problem.sizes
     if problem.num_tuples == 0:
-        if problem.dummy or sizes.min() == 0:
+        if problem.dummy or problem.sizes.min() == 0:
             return 0.0
         raise InfeasibleError("no tuples")
-    offsets = np.concatenate([[0], np.cumsum(sizes)])
-    column, sensor = np.nonzero(problem.tuples)
-    row = offsets[sensor] + problem.tuples[column, sensor] - 1
-    matrix = csc_array((np.ones(row.size), (row, column)), shape=(int(offsets[-1]), problem.num_tuples))
-    must = np.repeat(problem.dummy | (sizes == sizes.min()), sizes)
-    constraints = [LinearConstraint(matrix, np.where(must, 1.0, 0.0), 1.0)]
-    if len(forbidden):
-        taken = np.array([np.isin(np.arange(problem.num_tuples), one) for one in forbidden], dtype=np.float64)
-        constraints.append(LinearConstraint(taken, ub=taken.sum(axis=1) - 1.0))
-    result = milp(
-        problem.costs,
-        integrality=np.ones(problem.num_tuples, dtype=np.int64),
-        bounds=Bounds(0, 1),
-        constraints=constraints,
-        options={"mip_rel_gap": 1e-9, "time_limit": time_limit},
-    )
+    result = by_milp(problem, time_limit, forbidden)
     if result.status == 2:
         raise InfeasibleError("no solution")
     if result.status != 0:
@@ -211,20 +174,9 @@ def gated_problem(
 ) -> AssignmentProblem:
     """Random problem with dummies in which only a share of the tuples survived the gate.
 
-    Parameters
-    ----------
-    rng : Generator
-        Where the numbers come from.
-    sizes : tuple of int
-        Measurements per sensor; 0 is allowed.
-    density : float
-        Share of the tuples with two or more measurements that are kept.
-    style : {"mixed", "positive", "negative", "ties"}
-        How costs are drawn; "ties" are small integers.
-    listed_singletons : float
-        Share of singletons listed with a cost of their own (the rest are added at 0).
-    duplicates : float
-        Share of tuples listed a second time with another cost.
+    `density` is the share of the tuples with two or more measurements that are kept, `listed_singletons` that of
+    singletons with a cost of their own (the rest are added at 0), `duplicates` that of tuples listed a second time with
+    another cost. Costs of style "ties" are small integers.
     """
     grid = _grid(np.array(sizes), 0)
     count = np.count_nonzero(grid, axis=1)
@@ -280,15 +232,6 @@ def small_problems(count: int, seed: int = 0, *, dummy: bool | None = None) -> I
     Sensors 2 to 6; gated at several densities; mixed, positive, negative and tied costs; duplicates,
     empty sensors, listed singletons, disconnected clusters; axial ones square, rectangular and sparse
     (those may have no solution).
-
-    Parameters
-    ----------
-    count : int
-        How many.
-    seed : int
-        Same seed, same problems.
-    dummy : bool, optional
-        Only problems with (True) or without (False) dummies; both by default.
     """
     for number in range(count):
         rng = np.random.default_rng([seed, number])
