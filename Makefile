@@ -3,6 +3,7 @@
 # make test-all         all tests: what a release needs
 # make lint   ruff (rules and format), mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
+# make check-set        the benchmark set (experiments/sdlib): made anew, compared, every solution and proof checked
 # make mutants          faults put in on purpose: each must make the tests of its room fail
 # make fuzz   20,000 spoiled files for every reader and program, then 3,000 problems for every solver
 # make test-oldest      the tests with the oldest version of each dependency that pyproject.toml allows
@@ -33,7 +34,7 @@ UNCOMPILED := tests/sensors tests/test_problem.py tests/costs/test_tracks.py tes
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz mutants dist check-dist audit bench bench-quick bench-cold clean
+.PHONY: demo test test-all test-oldest test-newest test-uncompiled test-cold lint docs fuzz check-set mutants dist check-dist audit bench bench-quick bench-cold clean
 
 demo: $(VENV)/.installed
 	@mkdir -p demo
@@ -60,6 +61,10 @@ docs: $(VENV)/.installed-docs
 fuzz: $(VENV)/.installed-test
 	$(PY) -m tests.reliability.fuzzing --count 20000 --processes 2
 	$(PY) -m tests.reliability.differential --count 3000 --processes 2
+
+check-set: $(VENV)/.installed-test
+	$(PY) -m experiments.sdlib make --compare
+	$(PY) -m experiments.sdlib check
 
 mutants: $(VENV)/.installed-test
 	$(PY) -m tests.mutations

@@ -1,4 +1,4 @@
-"""Command line: ``python -m experiments.benchmarks [--quick] [--families ...] [--seeds N] [--csv FILE]``."""
+"""Our solvers and other people's on families of problems: docs/benchmarks.csv and .md, the tables of README.md."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from statistics import mean, median
 from typing import NamedTuple
@@ -123,4 +122,4 @@ def _middle(rows: list[Row]) -> str:
     return as_time(median(row.taken for row in rows))
 
 
-WHICH_SOLVER: dict[str, Callable[[], str]] = {"which-solver": which_solver}
+TABLES = {"which-solver": which_solver}

@@ -114,7 +114,7 @@ def ant_colony() -> str:
         Row("figure 3, measurements selected", TRUTH, f"{HOLDS}: drawn; no numbers to compare", command),
         Row("table 1, mean cycles", TABLE_1,
             f"{verdict(*settings)}: {number(cycles.ours)} against {number(cycles.paper or 0.0)}; "
-            f"nearest of the [readings](sweeps.md) of what is left open: {number(nearest.ours)} against "
+            f"nearest of the readings of what is left open: {number(nearest.ours)} against "
             f"{number(nearest.paper or 0.0)}, {reading}",
             command),
         Row("alpha > beta is quicker", TABLE_1,
@@ -419,9 +419,9 @@ def dubins_enkf() -> str:
 
 
 TABLES = {
-    "ant_colony": ant_colony,
-    "clustering_time_window": clustering_time_window,
-    "modified_ekf": modified_ekf,
-    "fuzzy_ekf": fuzzy_ekf,
-    "dubins_enkf": dubins_enkf,
+    "papers-ant-colony": ant_colony,
+    "papers-clustering-time-window": clustering_time_window,
+    "papers-modified-ekf": modified_ekf,
+    "papers-fuzzy-ekf": fuzzy_ekf,
+    "papers-dubins-enkf": dubins_enkf,
 }

@@ -315,20 +315,7 @@ def prior() -> str:
     return table(["scene, cost", *heads, "proven optima"], rows)
 
 
-def warm_starts() -> str:
-    """CPU time of a tracker's problem without a start, with what its tracks suggest, and with the optimum."""
-    r = Results("trackers.warm_starts")
-    cells: dict[str, dict[str, list[str]]] = {}
-    for claim in r.claims:
-        if claim.quantity.endswith("CPU time of a problem"):
-            case, solver, _ = claim.quantity.split(": ")[0].rsplit(", ", 2)
-            cells.setdefault(case, {}).setdefault(solver, []).append(number(claim.ours, 2))
-    solvers = [*next(iter(cells.values()))]
-    rows = [[case, *(" / ".join(times[solver]) for solver in solvers)] for case, times in cells.items()]
-    return table(["scene, tracker", *(f"`{solver}`" for solver in solvers)], rows)
-
-
-FILTERS = {
+TABLES = {
     "paper-setting": paper_setting,
     "fuzzy": fuzzy,
     "phases": phases,
@@ -336,12 +323,14 @@ FILTERS = {
     "speed": speed,
     "speed-ratios": speed_ratios,
     "batch": batch,
+    "traffic": traffic,
+    "overhead": overhead,
+    "ant-colony": ant_colony,
+    "readings": readings,
+    "first-call": first_call,
+    "linear-programs": linear_programs,
+    "scan-time": scan_time,
+    "ghost-rankings": ghost_rankings,
+    "sizes": sizes,
+    "prior": prior,
 }
-RECORDINGS = {"traffic": traffic}
-SWEEPS = {"overhead": overhead, "ant-colony": ant_colony, "readings": readings}
-START = {"first-call": first_call}
-SOLVERS = {"linear-programs": linear_programs}
-WHICH_SOLVER = {"scan-time": scan_time, "ghost-rankings": ghost_rankings}
-DEPENDENCIES = {"sizes": sizes}
-CONCEPTS = {"prior": prior}
-TRACKING = {"warm-starts": warm_starts}

@@ -102,9 +102,9 @@ def _plain(claim: Claim) -> str:
     return number(claim.ours, 2)
 
 
-SOLVERS = {
+TABLES = {
     **{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS},
     "workers": workers,
     "chils": beside_chils,
+    "settings": settings,
 }
-ANT_COLONY = {"settings": settings}

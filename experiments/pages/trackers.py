@@ -221,7 +221,7 @@ def goals() -> str:
     return head + table(["experiment", "what", "measured", "goal", "met"], rows, lambda column: column in (2, 3))
 
 
-TRACKING = {
+TABLES = {
     "close-targets": close_targets,
     "close-targets-times": close_times,
     "bearings": bearings,
@@ -232,6 +232,6 @@ TRACKING = {
     "capacity": lambda: plain("trackers.capacity"),
     "live": lambda: plain("trackers.live"),
     "goals": goals,
+    "biases": registration,
+    "fusion": fusion_in_stone_soup,
 }
-REGISTRATION = {"biases": registration}
-STONE_SOUP = {"fusion": fusion_in_stone_soup}

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from experiments.__main__ import EXPERIMENTS
+from experiments.__main__ import programs
 from experiments.common.results import RESULTS, Results, number
-from experiments.pages.__main__ import DOCS, TABLES, insert, main
-from experiments.pages.coverage import ant_colony
+from experiments.pages.__main__ import FOLDER, TABLES, main
 
 PAGES = ("papers.md", "filters.md", "recordings.md", "sweeps.md", "solvers.md", "ant_colony.md")
 ROOT = Path(__file__).parents[2]
-NAMES = {one.name for one in EXPERIMENTS}
+DOCS = ROOT / "docs"
+NAMES = {*programs()}
 # files of parameters that experiments write with their scores
 PARAMETERS = {
     "filters.tune": ROOT / "assoc" / "filters" / "fuzzy" / "tuned_parameters.json",
@@ -64,8 +64,7 @@ def known(name: str) -> list[float]:
 
 
 def figures(text: str) -> list[str]:
-    """Numbers in a part of a page, those of code, links, references to papers, and tables made of results left out."""
-    text = re.sub(r"<!-- table .*?<!-- end of [\w-]+ -->", " ", text, flags=re.DOTALL)
+    """Numbers in a part of a page, those of code, links, references to papers left out."""
     text = re.sub(r"```.*?```", " ", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", " ", text, flags=re.DOTALL)
     text = re.sub(r"`[^`]*`", " ", text)
@@ -106,14 +105,15 @@ def test_the_check_finds_a_wrong_figure():
     assert figures(text) == ["0.71", "2,087"]
 
 
-@pytest.mark.parametrize("page", TABLES)
-def test_tables_are_those_of_the_results(page):
-    text = (DOCS / page).read_text(encoding="utf-8")
-    assert insert(text, TABLES[page]) == text, "run python -m experiments.pages"
+def test_tables_are_those_of_the_results_and_each_stands_on_a_page(capsys):
+    assert main(["--check"]) == 0, capsys.readouterr().out
+    pages = "".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.md"))
+    included = re.findall(r"^```\{include\} _tables/([\w-]+)\.md\n```$", pages, flags=re.MULTILINE)
+    assert sorted(included) == sorted(TABLES) == sorted(path.stem for path in FOLDER.iterdir())
 
 
 def test_every_row_of_the_coverage_says_whether_it_holds_and_what_shows_it():
-    text = (DOCS / "papers.md").read_text(encoding="utf-8")
+    text = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("papers-*.md"))
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in rows if row[0] not in ("element", "---")]
     assert len(rows) > 100
@@ -132,20 +132,16 @@ def test_the_coverage_names_the_reading_that_is_nearest_to_the_paper():
     readings = [c for c in Results("papers.ant_colony").starting("reading, ") if c.quantity.endswith("mean cycles")]
     off = [abs(one.ours - one.paper) for one in readings]
     nearest = readings[off.index(min(off))]
-    row = next(line for line in ant_colony().splitlines() if line.startswith("| table 1, mean cycles"))
+    row = next(line for line in TABLES["papers-ant-colony"]().splitlines() if line.startswith("| table 1, mean cycles"))
     assert f"{nearest.ours:.2f} against 4.03, {nearest.quantity.split(': ')[0].removeprefix('reading, ')} |" in row
 
 
-def test_pages_without_marks_are_refused(tmp_path, monkeypatch, capsys):
-    with pytest.raises(ValueError, match="expected the marks"):
-        insert("no marks", {"x": lambda: "table"})
-    monkeypatch.setattr("experiments.pages.__main__.DOCS", tmp_path)
-    monkeypatch.setattr("experiments.pages.__main__.TABLES", {"p.md": {"x": lambda: "| a |"}})
-    page = tmp_path / "p.md"
-    page.write_text("before\n<!-- table x: written by python -m experiments.pages -->\nold\n<!-- end of x -->\nafter\n")
-    assert main(["--check"]) == 1 and "old" in page.read_text()
-    assert main([]) == 0
-    assert "| a |" in page.read_text() and "old" not in page.read_text() and page.read_text().endswith("after\n")
+def test_a_table_that_is_out_of_date_is_seen_and_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("experiments.pages.__main__.FOLDER", tmp_path)
+    monkeypatch.setattr("experiments.pages.__main__.TABLES", {"x": lambda: "| a |"})
+    (tmp_path / "x.md").write_text("old\n")
+    assert main(["--check"]) == 1 and (tmp_path / "x.md").read_text() == "old\n"
+    assert main([]) == 0 and (tmp_path / "x.md").read_text() == "| a |\n"
     assert main(["--check"]) == 0
     capsys.readouterr()
 
@@ -155,7 +151,7 @@ def test_result_files_are_small_dated_and_name_their_sources(path):
     assert path.stat().st_size < 150_000
     data = json.loads(path.read_text())
     assert data["experiment"] == path.stem
-    assert path.stem in {one.name for one in EXPERIMENTS}
+    assert path.stem in NAMES
     assert isinstance(data["seed"], int) and re.fullmatch(r"20\d\d-\d\d-\d\d", data["date"])
     assert data["about"]
     for claim in data["claims"]:

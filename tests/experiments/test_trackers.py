@@ -21,7 +21,6 @@ from experiments.trackers import (
     labelled,
     live,
     plane,
-    warm_starts,
 )
 from experiments.trackers.goals import three_radar
 from experiments.trackers.running import in_plane
@@ -146,16 +145,3 @@ def test_other_experiments_as_programs(one, tmp_path, capsys):
     # with a number in the column of the papers a page would name a table of a paper for it
     assert all(claim.paper is None for claim in claims)
     capsys.readouterr()
-
-
-def test_starts_for_the_problems_of_trackers():
-    """What the tracks suggest is a solution of the problem, and answers with and without a start cost the same."""
-    scene = close_scenes.simulate(close_scenes.SETTINGS["formations"], 100, 3)
-    for name in ("multi-sensor", "mht"):
-        given = warm_starts.problems(name, scene)
-        assert len(given) == 3 and [known is not None for _, known in given] == [name == "mht"] * 3
-        found = warm_starts.compare(given, "exact")
-        assert found.shape == (3, 3, 2) and (found[:, :, 0] > 0).all()
-        assert np.abs(found[:, :, 1]).max() < 1e-6
-    start = warm_starts.by_tracks(given[-1][0])
-    assert (start.tuples[:, 0] > 0).any() and (np.count_nonzero(start.tuples, axis=1) > 1).any()

@@ -30,6 +30,7 @@ _BUILD = ("pyproject.toml", "hatch_build.py")
 _DESCRIBED = ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")
 _ADDED = ("PKG-INFO", ".gitignore")
 """What the build adds to a source distribution."""
+_NOT_IN_SDIST = tuple(f"experiments/sdlib/{one}/" for one in ("instances", "proofs", "solutions"))
 _PROGRAMS = ("assoc.simulate", "assoc.solve", "assoc.track", "assoc.sweep")
 
 _LARGEST_WHEEL = 5_000_000
@@ -107,6 +108,7 @@ def check_sdist(path: Path) -> None:
     """Check that a source distribution holds what is under version control and is meant for others."""
     folders = tuple(f"{one}/" for one in _FOLDERS)
     files = {name for name in tracked() if name.startswith(folders) or name in _FILES + _BUILD}
+    files = {name for name in files if not name.startswith(_NOT_IN_SDIST)}
     check_members(path, files | {*_ADDED})
 
 

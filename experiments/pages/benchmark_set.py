@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
-from assoc._files.output import write_text
 from experiments.sdlib import store
 from experiments.sdlib.comparison import comparison_tables
-
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmark_set.md"
-BEGIN = "<!-- tables: written by python -m experiments.sdlib page -->"
-END = "<!-- end of tables -->"
-BEGIN_COMPARISON = "<!-- comparison: written by python -m experiments.sdlib page -->"
-END_COMPARISON = "<!-- end of comparison -->"
 
 
 def tables() -> str:
@@ -50,13 +42,4 @@ def _line(name: str, row: dict[str, Any]) -> str:
     )
 
 
-def write_page() -> None:
-    """Put the tables into the page."""
-    text = _filled(PAGE.read_text(), BEGIN, END, tables())
-    write_text(PAGE, _filled(text, BEGIN_COMPARISON, END_COMPARISON, comparison_tables()))
-
-
-def _filled(text: str, begin: str, end: str, content: str) -> str:
-    before, rest = text.split(begin)
-    after = rest.split(end)[1]
-    return f"{before}{begin}\n\n{content}\n\n{end}{after}"
+TABLES = {"benchmark-set": tables, "benchmark-set-comparison": comparison_tables}
