@@ -7,6 +7,7 @@ proven optimum where five seconds will do: with the costs of equation 5, and wit
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,10 +45,10 @@ def answer(targets: int, seed: int, target_density: str | None) -> Answer:
     return Answer(len(several), correct, len(truth), solution.status == "optimal")
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Solve the scans of all scenes with both costs."""
     seeds = rng.integers(2**31, size=6 if quick else 40).tolist()
-    claims, table = [], {}
+    claims = []
     for targets in TARGETS:
         answers = {name: [answer(targets, seed, density) for seed in seeds] for name, density in COSTS.items()}
         for name, ones in answers.items():
@@ -59,12 +60,11 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
                 Claim(f"{words}: chosen tuples that are true", "%", None, *_ratio(correct, found)),
                 Claim(f"{words}: proven optima", "%", None, 100.0 * np.mean([one.optimal for one in ones])),
             ]
-            table[targets, name] = [_ratio(part, true)[0] for part in (found, correct)]
         more = [b.correct - a.correct for a, b in zip(*answers.values(), strict=True)]
         gain = mean_interval(np.array(more, dtype=float))
         words = f"{targets} targets: more true tuples a scan with the prior"
         claims.append(Claim(words, "", None, np.mean(more), gain))
-    return claims, table
+    return claims
 
 
 def _ratio(part: Any, whole: Any) -> tuple[float, tuple[float, float]]:
@@ -76,26 +76,7 @@ def _ratio(part: Any, whole: Any) -> tuple[float, tuple[float, float]]:
     return 100.0 * share, (100.0 * (share + low), 100.0 * (share + high))
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw targets found and true tuples of both costs."""
-    axes = figure.subplots()
-    places = np.arange(len(shown))
-    for shift, column, label in ((-0.2, 0, "found"), (0.2, 1, "of them true")):
-        bars = axes.bar(places + shift, [values[column] for values in shown.values()], 0.38, label=label)
-        axes.bar_label(bars, fmt="%.0f", fontsize=8)
-    axes.axhline(100.0, color="black", linewidth=1, linestyle=":")
-    axes.set_xticks(places, [f"{targets} targets\n{name}" for targets, name in shown])
-    axes.set(ylabel="for each 100 targets")
-    axes.margins(y=0.15)
-    axes.legend()
-
-
-TITLE = "Ambiguous bearings: certified optima with the costs of equation 5 and with a prior of positions"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main("ambiguous_bearings", TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
+program = partial(main, "ambiguous_bearings", experiment, __doc__)
 
 
 if __name__ == "__main__":

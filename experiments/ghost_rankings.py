@@ -1,6 +1,6 @@
 """The ten best associations of scenes full of ghosts, and the probabilities of tuples, each proved.
 
-    python -m experiments.ghost_rankings [--quick] [--only KIND ...] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.ghost_rankings [--quick] [--only KIND ...] [--json FILE] [--publish]
 
 ``kbest`` ranks ten solutions of scenes of three bearing-only sensors (the seeds of the benchmarks), also of those whose
 linear program is far below the optimum; ``marginals`` gives the probability of every tuple from as many. Rankings are
@@ -29,9 +29,8 @@ from experiments.common.command import add_only, make_parser, run
 from experiments.common.instances import scenes
 from experiments.common.peers import by_milp
 
-NAME, TITLE = "ghost_rankings", "The ten best associations of ghost scenes"
+NAME = "ghost_rankings"
 K = 10
-SHOWN = ("median", "longest")
 # what a ranking may take before it is cut, and what HiGHS may take, seconds
 _LIMIT, _CHECK = 60.0, 30.0
 
@@ -115,7 +114,7 @@ def claims_of(name: str, kind: Kind, seeds: tuple[int, ...]) -> list[Claim]:
     return claims
 
 
-def experiment(quick: bool, kinds: list[str]) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, kinds: list[str]) -> list[Claim]:
     """Rank scenes of these kinds."""
     claims = []
     with one_core():
@@ -125,31 +124,16 @@ def experiment(quick: bool, kinds: list[str]) -> tuple[list[Claim], Any]:
         assoc.marginals(build_problem(scene, 0), K)
         for name in kinds:
             claims += claims_of(name, KINDS[name], KINDS[name].seeds[: 2 if quick else None])
-    by_quantity = {claim.quantity: claim.ours for claim in claims}
-    return claims, {name: [by_quantity[f"{name}: kbest, {one}"] for one in SHOWN] for name in kinds}
-
-
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the median and the longest time of each kind."""
-    axes = figure.subplots()
-    places = np.arange(len(shown))
-    for number, words in enumerate(SHOWN):
-        values = [times[number] for times in shown.values()]
-        bars = axes.bar(places + 0.4 * number - 0.2, values, 0.38, label=words)
-        axes.bar_label(bars, [f"{value:.2g}" for value in values], fontsize=8)
-    axes.set_xticks(places, [name.replace(", ", "\n") for name in shown])
-    axes.set(ylabel="s", yscale="log")
-    axes.margins(y=0.15)
-    axes.legend()
+    return claims
 
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the measurement; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
+    parser = make_parser(NAME, __doc__)
     add_only(parser, list(KINDS))
     chosen = parser.parse_args(arguments)
     kinds = chosen.only or list(KINDS)
-    return run(parser, chosen, NAME, TITLE, lambda quick, _: experiment(quick, kinds), draw, (7, 4), __doc__)
+    return run(parser, chosen, lambda quick, _: experiment(quick, kinds), __doc__)
 
 
 if __name__ == "__main__":

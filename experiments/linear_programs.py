@@ -1,6 +1,6 @@
 """The linear programs of ghost scenes and of axial problems: our dual simplex method beside HiGHS.
 
-    python -m experiments.linear_programs [--quick] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.linear_programs [--quick] [--json FILE] [--publish]
 
 Each program is that of the largest component of a problem (seeds of the benchmarks). Ours is solved from the
 multipliers of the dual ascent, whose time counts, too. Then one column after the other of those that the solution takes
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,6 @@ from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.common.instances import scenes, synthetic
 
-NAME, TITLE = "linear_programs", "Linear programs of our simplex method and of HiGHS"
 KINDS: dict[str, Callable[[int], AssignmentProblem]] = {
     **{
         f"ghosts {targets}": lambda seed, targets=targets: build_problem(scenes.ghost(targets, seed), 0)
@@ -117,10 +117,9 @@ def check(ours: float, theirs: float) -> None:
         raise AssertionError(f"the bounds differ: {ours!r}, HiGHS {theirs!r}")
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Solve the programs of every kind."""
     claims: list[Claim] = []
-    shown = {}
     with one_core():
         for name, make in KINDS.items():
             # compiled, and scipy imported, on a problem that is not measured
@@ -128,26 +127,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
             found = [measured(component_of(make(FIRST_SEED + number))) for number in range(2 if quick else SEEDS)]
             medians = {what: float(np.median([one[what] for one in found])) for what in COLUMNS}
             claims += [Claim(f"{name}: {what}", "", None, value) for what, value in medians.items()]
-            shown[name] = medians
-    return claims, shown
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw how many times as fast ours is."""
-    axes = figure.subplots()
-    places = np.arange(len(shown))
-    for number, what in enumerate(("HiGHS / ours", "HiGHS / ours, a column masked")):
-        bars = axes.bar(places + 0.4 * number - 0.2, [one[what] for one in shown.values()], 0.38, label=what)
-        axes.bar_label(bars, [f"{one[what]:.2g}" for one in shown.values()], fontsize=8)
-    axes.set_xticks(places, [name.replace(", ", "\n") for name in shown])
-    axes.set(ylabel="processor time of HiGHS / ours", yscale="log")
-    axes.margins(y=0.15)
-    axes.legend()
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main(NAME, TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
+program = partial(main, "linear_programs", experiment, __doc__)
 
 
 if __name__ == "__main__":

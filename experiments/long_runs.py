@@ -1,6 +1,6 @@
 """Trackers and solvers that run for weeks: memory, speed and covariances must not get worse.
 
-    python -m experiments.long_runs [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.long_runs [--quick] [--seed N] [--json FILE]
 
 The multi-sensor tracker processes 10^5 scans of three radars (four circling targets and false alarms), a tracker of
 each other family a fifth of that. Then 10^5 random problems are solved, most of them by `exact`, one in fifty by
@@ -20,7 +20,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -222,37 +222,16 @@ def solve(count: int, rng: np.random.Generator) -> tuple[list[Claim], Watch]:
     return [*watch.claims("exact"), unproved], watch
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Run all, one after the other, in this process."""
     steps = 2_000 if quick else 100_000
     claims: list[Claim] = []
-    shown: dict[str, Watch] = {}
     for kind, share in KINDS.items():
-        found, shown[kind] = track(kind, int(share * steps), rng)
-        claims += found
-    found, shown["exact"] = solve(steps, rng)
-    return claims + found, shown
+        claims += track(kind, int(share * steps), rng)[0]
+    return claims + solve(steps, rng)[0]
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw memory and pace over the steps."""
-    above, below = figure.subplots(2, 1, sharex=True)
-    for name, watch in shown.items():
-        above.plot(watch.steps, watch.resident, label=name, linewidth=1.0)
-        below.plot(watch.steps[1:], watch.pace()[1:], label=name, linewidth=1.0)
-    above.set(ylabel="resident memory, MB")
-    above.set_ylim(bottom=0.0)
-    below.set(xlabel="steps, solves", ylabel="time of one / fixed work")
-    below.set_ylim(bottom=0.0)
-    above.legend(ncols=4, fontsize=8, loc="lower right")
-
-
-TITLE = "Long runs: memory, time and covariances"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("long_runs", TITLE, experiment, draw, (8, 5.0), arguments)
+program = partial(main, "long_runs", experiment, __doc__)
 
 
 if __name__ == "__main__":

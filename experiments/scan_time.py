@@ -1,6 +1,6 @@
 """From one scan's measurements to a proven answer: what a tracker without tracks waits for, part by part.
 
-    python -m experiments.scan_time [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.scan_time [--quick] [--seed N] [--json FILE] [--publish]
 
 Each scene is taken apart as often as it takes a tenth of a second, and the median counts: ``build_problem`` (the tuples
 within the gates, their positions and costs), ``AssignmentProblem`` of tuples and costs that are there already (for
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,9 +83,9 @@ def parts_of(scene: Scene) -> dict[str, float]:
     }
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Take scenes of every kind apart."""
-    claims, shown = [], {}
+    claims = []
     with one_core():
         for name, kind in KINDS.items():
             seeds = rng.integers(2**31, size=2 if quick else _SCENES)
@@ -99,30 +100,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
                 *(Claim(f"{name}: {part}", "ms", None, value) for part, value in medians.items()),
                 Claim(f"{name}: HiGHS / exact", "", None, ratio),
             ]
-            shown[name] = medians
-    return claims, shown
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw building, solving, and what HiGHS takes for the solving alone."""
-    axes = figure.subplots()
-    places = np.arange(len(shown))
-    parts = ("build_problem", "exact", "HiGHS")
-    for number, part in enumerate(parts):
-        bars = axes.bar(places + 0.27 * (number - 1), [one[part] for one in shown.values()], 0.25, label=part)
-        axes.bar_label(bars, [f"{one[part]:.2g}" for one in shown.values()], fontsize=8)
-    axes.set_xticks(places, [name.replace(", ", "\n").replace(" x ", "\nx ") for name in shown])
-    axes.set(ylabel="ms", yscale="log")
-    axes.margins(y=0.15)
-    axes.legend()
-
-
-TITLE = "From one scan's measurements to a proven answer"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main("scan_time", TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
+program = partial(main, "scan_time", experiment, __doc__)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The overhead of a parameter study, its time without the solves, on every backend.
 
-    python -m experiments.sweep_overhead [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.sweep_overhead [--quick] [--seed N] [--json FILE]
 
 The wall time of a study from the moment when a tenth of its runs is done until its end, less the seconds that those
 runs took in the solver, shared among the workers, is the overhead of these runs: all of it, from design to disk.
@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +40,15 @@ GOALS = {"one process": 1.0, "joblib": 1.0, "dask": 5.0}
 KINDS = {"greedy": Setting("greedy", {}), "ant colony": Setting("aco", {"mode": "paper"})}
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Measure the overhead of each backend."""
     scene = StudySource(simulate("three-radar", int(rng.integers(2**31)), scans=20 if quick else 100), "three-radar")
     repeats = {"greedy": 12 if quick else 30, "ant colony": 3 if quick else 6}
-    claims, table = [], {}
+    claims = []
     for kind, setting in KINDS.items():
         study = Study([scene], [setting], repeats[kind])
         for backend, goal in GOALS.items():
             overhead, processor, start, solving = _overhead(study, backend)
-            table[kind, backend] = 1e3 * overhead, 1e3 * solving
             words = f"{kind}, {backend}"
             claims += [
                 Claim(f"{words}: overhead a run", "ms", None, 1e3 * overhead, None, (None, goal), source=GOAL),
@@ -64,7 +64,7 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
                 Claim(f"{words}: in the solver, a run", "ms", None, 1e3 * solving),
                 Claim(f"{words}: until a tenth of {study.size} runs is done", "s", None, start),
             ]
-    return claims, table
+    return claims
 
 
 def _overhead(study: Study, backend: str) -> tuple[float, float, float, float]:
@@ -128,26 +128,7 @@ def _wait_for_workers(address: str) -> None:
         client.wait_for_workers(WORKERS, timeout=60)
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the overhead beside the time in the solver."""
-    axes = figure.subplots()
-    places = np.arange(len(shown))
-    overhead, solving = np.array(list(shown.values())).T
-    for shift, values, label in ((-0.2, np.maximum(overhead, 0.0), "overhead"), (0.2, solving, "in the solver")):
-        bars = axes.bar(places + shift, values, 0.38, label=label)
-        axes.bar_label(bars, [f"{value:.2g}" for value in values], fontsize=8)
-    axes.set_xticks(places, [f"{kind}\n{backend}" for kind, backend in shown])
-    axes.set(ylabel="ms a run")
-    axes.margins(y=0.15)
-    axes.legend()
-
-
-TITLE = "Overhead of a parameter study"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main("sweep_overhead", TITLE, experiment, draw, (8, 4), arguments, about=__doc__)
+program = partial(main, "sweep_overhead", experiment, __doc__)
 
 
 if __name__ == "__main__":

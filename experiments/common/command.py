@@ -15,48 +15,51 @@ from assoc._types import Array
 from experiments.common.claims import Claim, load_json, print_table, save_json
 from experiments.common.results import result_file
 
-Experiment = Callable[[bool, np.random.Generator], tuple[list[Claim], Any]]
+Experiment = Callable[[bool, np.random.Generator], Any]
+"""From whether it is to be quick, to its claims; with a figure, to these and what the figure shows."""
 Draw = Callable[[Any, Any], None]
+Figure = tuple[Draw, tuple[float, float]]
+"""What draws it, and its size in inches."""
 
 
 def main(
-    name: str,
-    title: str,
-    experiment: Experiment,
-    draw: Draw,
-    size: tuple[float, float],
-    arguments: Sequence[str] | None = None,
-    about: str | None = None,
+    name: str, experiment: Experiment, about: str, arguments: Sequence[str] | None = None, figure: Figure | None = None
 ) -> int:
-    """Run an experiment: print its claims, save its figure and, if asked, its JSON.
-
-    Parameters
-    ----------
-    name : str
-        Of the experiment's module below ``experiments``; its last part names the figure unless --figure does.
-    title : str
-        Of the table.
-    experiment : callable (quick, rng) -> (claims, what the figure shows)
-    draw : callable (figure, what it shows)
-    size : (float, float)
-        Of the figure, inches.
-    about : str, optional
-        What was set, for the result file: the module's description.
-    """
-    parser = make_parser(name, title)
-    return run(parser, parser.parse_args(arguments), name, title, experiment, draw, size, about)
+    """Run ``python -m experiments.NAME``: print its claims, write what is asked; `about` describes it."""
+    parser = make_parser(name, about, figure)
+    return run(parser, parser.parse_args(arguments), experiment, about, figure)
 
 
-def make_parser(name: str, title: str) -> argparse.ArgumentParser:
+def make_parser(name: str, about: str, figure: Figure | None = None) -> argparse.ArgumentParser:
     """Return the parser of the options that the experiments share; an experiment may add its own."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=f"{title}.")
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}", description=about.split("\n")[0])
     parser.add_argument("--quick", action="store_true", help="fewer or shorter runs, for a first look")
     text = "seed of all random numbers (default %(default)s)"
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help=text)
+    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help=text)
     parser.add_argument("--json", metavar="FILE", help="write the results here")
-    parser.add_argument("--figure", metavar="FILE", help=f"write the figure here (default {_picture(name)})")
+    if figure is not None:
+        default = f"{name.rpartition('.')[2]}.png"
+        parser.add_argument(
+            "--figure", metavar="FILE", default=default, help=f"write the figure here (default {default})"
+        )
     add_publish(parser, name)
     return parser
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """Return what reads an option that is a whole number, at least so large."""
+
+    def number(text: str) -> int:
+        if int(text) < least:
+            raise argparse.ArgumentTypeError(f"expected at least {least}, got {text}")
+        return int(text)
+
+    return number
+
+
+def add_seeds(parser: argparse.ArgumentParser, default: int, of: str, least: int = 2) -> None:
+    """Add the option that says how many scenes or runs there are."""
+    parser.add_argument("--seeds", type=whole(least), default=default, metavar="N", help=f"{of} (default {default})")
 
 
 def add_publish(parser: argparse.ArgumentParser, name: str) -> None:
@@ -101,32 +104,25 @@ def replaced(claims: list[Claim], newer: list[Claim]) -> list[Claim]:
 def run(
     parser: argparse.ArgumentParser,
     chosen: argparse.Namespace,
-    name: str,
-    title: str,
     experiment: Experiment,
-    draw: Draw,
-    size: tuple[float, float],
-    about: str | None = None,
+    about: str,
+    figure: Figure | None = None,
 ) -> int:
     """Run an experiment with the options chosen; see `main`."""
-    if chosen.seed < 0:
-        parser.error("--seed must be at least 0")
+    name = parser.prog.removeprefix("python -m experiments.")
     if chosen.publish and chosen.quick:
         parser.error("--publish needs the full run, got --quick")
-    claims, shown = experiment(chosen.quick, np.random.default_rng(chosen.seed))
-    print_table(claims, title)
+    found = experiment(chosen.quick, np.random.default_rng(chosen.seed))
+    claims, shown = (found, None) if figure is None else found
+    print_table(claims, about.split("\n")[0].rstrip("."))
     if chosen.json:
-        save_json(chosen.json, claims, name, chosen.seed, about or "")
+        save_json(chosen.json, claims, name, chosen.seed, about)
     if chosen.publish:
         publish(claims, name, chosen.seed, about, partly=bool(getattr(chosen, "only", None)))
-    figure_file = Path(chosen.figure or _picture(name))
-    save_figure(figure_file, draw, shown, size)
-    print(f"{figure_file}: written")
+    if figure is not None:
+        save_figure(Path(chosen.figure), figure[0], shown, figure[1])
+        print(f"{chosen.figure}: written")
     return 0
-
-
-def _picture(name: str) -> str:
-    return f"{name.rpartition('.')[2]}.png"
 
 
 def save_figure(path: Path, draw: Draw, shown: Any, size: tuple[float, float]) -> None:

@@ -1,6 +1,6 @@
 """Time of one prediction and correction against filterpy and Stone Soup, on the same problem in one run.
 
-    python -m experiments.filters.benchmark [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.filters.benchmark [--quick] [--seed N] [--json FILE]
 
 The problem: tracks of nearly constant velocity; position measurements for the Kalman filter, a radar (range, azimuth,
 elevation) for the others, N = 100 for the ensemble. The other packages take one track at a time. Ours takes all tracks
@@ -17,6 +17,7 @@ import datetime
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -193,13 +194,13 @@ def stonesoup(kind: str, repeats: int) -> float:
     return microseconds(fresh, repeats)
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Time every filter of the three packages, ours compiled from the first call on."""
     with compiled_only():
         return _time_all(quick)
 
 
-def _time_all(quick: bool) -> tuple[list[Claim], Any]:
+def _time_all(quick: bool) -> list[Claim]:
     repeats = 10 if quick else 200
     tracks = 1_000 if quick else 10_000
     claims: list[Claim] = []
@@ -256,29 +257,10 @@ def _time_all(quick: bool) -> tuple[list[Claim], Any]:
         Claim(f"modified EKF, batch of {tracks}: update alone, a track", "us", None,
               microseconds(lambda: modified.update(state, z, RADAR), 1, ROUNDS) / tracks)
     )  # fmt: skip
-    return claims, table
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the times as bars."""
-    axes = figure.subplots()
-    names = list(next(iter(shown.values())))
-    for i, name in enumerate(names):
-        values = [row[name] for row in shown.values()]
-        bars = axes.bar(np.arange(len(shown)) + 0.15 * i, values, 0.14, label=name)
-        axes.bar_label(bars, [f"{value:.2g}" if value < 100 else f"{value:.0f}" for value in values], fontsize=7)
-    axes.set(yscale="log", ylabel="microseconds of processor time")
-    axes.set_xticks(np.arange(len(shown)) + 0.375, list(shown))
-    axes.set_ylim(0.3, 10 * max(max(row.values()) for row in shown.values()))
-    axes.legend(ncols=3, fontsize=8)
-
-
-TITLE = "Time of a prediction and update"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the benchmark; returns its exit code."""
-    return main("filters.benchmark", TITLE, experiment, draw, (9, 4.5), arguments, about=__doc__)
+program = partial(main, "filters.benchmark", experiment, __doc__)
 
 
 if __name__ == "__main__":

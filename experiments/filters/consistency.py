@@ -1,6 +1,6 @@
 """Consistency: NEES and NIS of every filter on a linear case and on B1, with their chi-square bounds.
 
-    python -m experiments.filters.consistency [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.filters.consistency [--quick] [--seed N] [--json FILE]
 
 300 runs of 100 steps. NEES is averaged over the runs at the last step, because NEES of one run is correlated in time.
 NIS is not for an exact filter, so it is averaged over the second half of the steps, too. The bounds are those of means
@@ -11,6 +11,7 @@ and the table says by how much. Ensembles have 100 or 1,000 members.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -95,16 +96,14 @@ def filters(noise: float, radar: bool, rng: np.random.Generator) -> dict[str, Fi
 EXACT = ("Kalman", "EKF", "UKF")
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Measure NEES and NIS of all filters on both cases."""
     count = 30 if quick else 300
     claims: list[Claim] = []
-    shown: dict[str, dict[str, Array]] = {}
     for label, case, noise in (
         ("linear", linear_case(count, rng), NOISE),
         ("B1", b1_case(count, rng), Setting().acceleration_noise),
     ):
-        shown[label] = {}
         for name, filter_ in filters(noise, label == "B1", rng).items():
             result = run(filter_, case)
             for what, values, dim in (("NEES", result[0], 6), ("NIS", result[1], 3)):
@@ -122,40 +121,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
                         "bounds of chi-square",
                     )
                 )  # fmt: skip
-            shown[label][name] = result[0].mean(axis=1)
-    return claims, (shown, count)
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the mean NEES over time."""
-    from matplotlib.ticker import NullLocator
-
-    results, count = shown
-    names = list(dict.fromkeys(name for kinds in results.values() for name in kinds))
-    drawn: dict[str, Any] = {}
-    panels = figure.subplots(1, 2)
-    for panel, (label, kinds) in zip(panels, results.items(), strict=True):
-        for name, values in kinds.items():
-            # Kalman filter, EKF and UKF are one line on the linear case: the later ones are dashed
-            dashes = {"EKF": (6, 2), "UKF": (1, 2)}.get(name, (None, None)) if label == "linear" else (None, None)
-            (drawn[name],) = panel.plot(
-                np.arange(len(values)) + STEPS // 2, values, color=f"C{names.index(name)}", linewidth=1.2, dashes=dashes
-            )
-        low, high = bounds(6, count)
-        drawn["95 % bounds"] = panel.axhspan(low, high, color="0.88")
-        panel.set(xlabel="step", ylabel="mean NEES (ideal 6)", title=label)
-    panels[1].set_yscale("log")
-    panels[1].set_yticks([4, 6, 10, 20, 50, 100, 1000], ["4", "6", "10", "20", "50", "100", "1000"])
-    panels[1].yaxis.set_minor_locator(NullLocator())
-    figure.legend(list(drawn.values()), list(drawn), loc="outside right center", fontsize=8)
-
-
-TITLE = "Consistency of the filters (holds: within the 99.9 % bounds)"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("filters.consistency", TITLE, experiment, draw, (12, 4.8), arguments, about=__doc__)
+program = partial(main, "filters.consistency", experiment, __doc__)
 
 
 if __name__ == "__main__":

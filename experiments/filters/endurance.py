@@ -1,6 +1,6 @@
 """Covariances of every filter through 10^5 predictions and corrections: symmetric, positive definite, bounded?
 
-    python -m experiments.filters.endurance [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.filters.endurance [--quick] [--seed N] [--json FILE]
 
 A target that stands still is measured by a radar (by a position sensor for the Kalman filter), corrections come in
 bursts of three for each prediction, which is the hardest case for a covariance. Checked every 100 steps: the least
@@ -10,6 +10,7 @@ units of the standard deviations.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,13 +55,12 @@ def endure(filter_: Filter[Any], steps: int, rng: np.random.Generator) -> Array:
     return np.array(watched)
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Watch every filter."""
     steps = 2_000 if quick else 100_000
-    claims, shown = [], {}
+    claims = []
     for name, filter_ in filters(rng).items():
-        shown[name] = endure(filter_, steps, rng)
-        least, asymmetry, deviation = shown[name].T
+        least, asymmetry, deviation = endure(filter_, steps, rng).T
         claims += [
             Claim(f"{name}: least eigenvalue of the correlation in {steps} steps", "", None, least.min(), None,
                   (1e-12, None), source="chosen by us"),
@@ -68,32 +68,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
             Claim(f"{name}: largest deviation of the position after {EVERY} steps", "m", None, deviation.max(), None,
                   (None, 300.0), source="chosen by us"),
         ]  # fmt: skip
-    return claims, shown
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the least eigenvalues over the steps, of each fiftieth part the least."""
-    from matplotlib.ticker import NullLocator
-
-    axes = figure.subplots()
-    for name, watched in shown.items():
-        parts = np.array_split(watched[:, 0], min(50, len(watched)))
-        ends = EVERY * np.cumsum([len(part) for part in parts])
-        # EKF, modified EKF and UKF are one line: the later ones are dotted
-        style = {"modified EKF": "--", "UKF": ":"}.get(name, "-")
-        axes.semilogy(ends, [part.min() for part in parts], style, label=name, linewidth=1.4)
-    axes.set(xlabel="corrections", ylabel="least eigenvalue of the correlation", ylim=(0.01, 0.5))
-    axes.set_yticks([0.01, 0.02, 0.05, 0.1, 0.2, 0.5], ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"])
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.legend(ncols=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
-
-
-TITLE = "Covariances through many steps"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("filters.endurance", TITLE, experiment, draw, (8, 4.5), arguments, about=__doc__)
+program = partial(main, "filters.endurance", experiment, __doc__)
 
 
 if __name__ == "__main__":

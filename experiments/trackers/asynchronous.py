@@ -1,6 +1,6 @@
 """Turning radars, each at its own pace: measurements with times of their own, and late ones.
 
-    python -m experiments.trackers.asynchronous [FILE.csv] [--quick] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.trackers.asynchronous [FILE.csv] [--quick] [--seed N] [--json FILE]
                                                 [--seeds N] [--only NAME ...] [--publish]
 
 Three radars with 4, 5 and 5.5 seconds for a turn see thirty airliners, and with a file recorded traffic. GOSPA (order
@@ -25,7 +25,7 @@ from assoc.metrics import Trajectories
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS, LatePlots, TrackTable
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run
+from experiments.common.command import add_only, add_seeds, make_parser, run
 from experiments.trackers.judging import Judged, claims_of, distances, goal, judge, mean_claim, means
 from experiments.trackers.running import through
 
@@ -107,10 +107,9 @@ def late_plots(scene: Scene, rng: np.random.Generator) -> tuple[list[float], flo
 
 def experiment(
     file: str | None, quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES
-) -> tuple[list[Claim], dict[str, dict[str, list[Judged]]]]:
+) -> list[Claim]:
     """Trackers of these names on all scenes, then late plots if the multi-sensor tracker is one of them."""
     claims: list[Claim] = []
-    shown: dict[str, dict[str, list[Judged]]] = {}
     settings: dict[str, dict[str, Any]] = {
         "thirty airliners": {"name": "rotating-radars", "duration": 60.0 if quick else 240.0}
     }
@@ -120,7 +119,6 @@ def experiment(
         count = 2 if quick else (seeds if setting["name"] == "rotating-radars" else max(2, seeds // 2))
         scenes = [simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting) for k in range(count)]
         found = {name: [judge_own_times(name, scene) for scene in scenes] for name in names}
-        shown[label] = found
         for name, runs in found.items():
             claims += claims_of(label, name, runs)
         for name in NEAR_ORACLE:
@@ -128,7 +126,7 @@ def experiment(
                 ratio = means(found[name]) / means(found["oracle"])
                 claims.append(goal(f"{label}: GOSPA, {name} / oracle", "", ratio, WITHIN_ORACLE))
     if "multi-sensor" not in names:
-        return claims, shown
+        return claims
     setting = settings["thirty airliners"] | {"duration": 100.0 if quick else 200.0}
     scenes = [
         simulation.simulate(seed=seed + k, turns=TURNS, interval=INTERVAL, **setting)
@@ -142,37 +140,22 @@ def experiment(
     ratio = values[:, 1] / values[:, 0]
     claims.append(goal("late plots, once all is there: GOSPA / in order", "", ratio, WITHIN_ORDER))
     claims.append(Claim("late plots: CPU time of a scan", "ms", ours=float(np.median([one for _, one in late]))))
-    return claims, shown
+    return claims
 
 
-def draw(figure: Any, shown: dict[str, dict[str, list[Judged]]]) -> None:
-    """GOSPA of each tracker on each kind of scene."""
-    for axes, (label, found) in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown.items(), strict=True):
-        names = list(found)
-        axes.barh(np.arange(len(names)), [means(found[name]).mean() for name in names])
-        axes.set_yticks(np.arange(len(names)), names, fontsize=8)
-        axes.set_title(label, fontsize=10)
-        axes.set_xlabel("GOSPA, m")
-        axes.invert_yaxis()
-        axes.spines[["top", "right"]].set_visible(False)
-
-
-NAME, TITLE = "trackers.asynchronous", "Turning radars: measurements with times of their own"
+NAME = "trackers.asynchronous"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
+    parser = make_parser(NAME, __doc__)
     parser.add_argument("file", nargs="?", metavar="FILE", help="recorded trajectories (.csv), as for from-tracks")
-    parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes of airliners (default {SEEDS})")
+    add_seeds(parser, SEEDS, "scenes of airliners")
     add_only(parser, NAMES)
     chosen = parser.parse_args(arguments)
-    if chosen.seeds < 2:
-        parser.error("--seeds must be at least 2")
     return run(
-        parser, chosen, NAME, TITLE,
+        parser, chosen,
         lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds, chosen.only or NAMES),
-        draw, (11, 4),
         f"{__doc__} {chosen.seeds} scenes of airliners (240 s), half as many (at least 2) of recorded traffic (300 s).",
     )  # fmt: skip
 

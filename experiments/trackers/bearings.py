@@ -1,6 +1,6 @@
 """Bearings alone: which trackers find the targets among the ghosts, and how soon.
 
-    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE] [--figure FILE]
+    python -m experiments.trackers.bearings [--quick] [--seeds N] [--seed N] [--json FILE]
                                             [--only NAME ...] [--publish]
 
 Four targets and three sensors that measure bearings alone (scenario `bearing-only`, 40 scans of 10 s, default
@@ -12,7 +12,7 @@ follow, --seeds of them (20).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from assoc._types import Array
 from assoc.scene import Scene
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import add_only, make_parser, run
+from experiments.common.command import add_only, add_seeds, make_parser, run
 from experiments.trackers.judging import goal, make, mean_claim
 from experiments.trackers.running import through
 
@@ -62,16 +62,13 @@ def judge(name: str, scene: Scene) -> Found:
     return Found(late, np.array(false), np.array(tracked), 1e3 * float(np.median(done.seconds[1:])))
 
 
-def experiment(
-    quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES
-) -> tuple[list[Claim], dict[str, list[Found]]]:
+def experiment(quick: bool, seed: int, seeds: int = SEEDS, names: Sequence[str] = NAMES) -> list[Claim]:
     """Trackers of these names on the same scenes."""
     count, scans = (2, 22) if quick else (seeds, SCANS)
     scenes = [simulation.simulate("bearing-only", seed + k, targets=TARGETS, scans=scans) for k in range(count)]
     claims: list[Claim] = []
-    shown = {}
     for name in names:
-        runs = shown[name] = [judge(name, scene) for scene in scenes]
+        runs = [judge(name, scene) for scene in scenes]
         late = np.array([float(one.late) for one in runs])
         false = np.array([one.false[SETTLED:].mean() for one in runs])
         tracked = np.array([100.0 * one.tracked[SETTLED:].mean() for one in runs])
@@ -81,37 +78,22 @@ def experiment(
             mean_claim(f"{name}: targets with a track after {SETTLED} scans", "%", tracked),
             Claim(f"{name}: CPU time of a scan", "ms", ours=float(np.median([one.milliseconds for one in runs]))),
         ]
-    return claims, shown
+    return claims
 
 
-def draw(figure: Any, shown: dict[str, list[Found]]) -> None:
-    """Targets tracked, and false tracks, over the scans."""
-    for axes, part in zip(figure.subplots(1, 2), ("tracked", "false"), strict=True):
-        for name, runs in shown.items():
-            axes.plot(np.mean([getattr(one, part) for one in runs], axis=0), label=name)
-        axes.set_xlabel("scan")
-        axes.set_ylabel({"tracked": "share of targets with a track", "false": "false tracks"}[part])
-        axes.set_ylim(bottom=0)
-        axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=8, frameon=False)
-
-
-NAME, TITLE = "trackers.bearings", "Trackers of bearings alone"
+NAME = "trackers.bearings"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
-    parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes (default {SEEDS})")
+    parser = make_parser(NAME, __doc__)
+    add_seeds(parser, SEEDS, "scenes")
     add_only(parser, NAMES)
     parser.set_defaults(seed=FIRST)
     chosen = parser.parse_args(arguments)
-    if chosen.seeds < 2:
-        parser.error("--seeds must be at least 2")
-    about = f"{__doc__} {chosen.seeds} scenes."
     return run(
-        parser, chosen, NAME, TITLE,
-        lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds, chosen.only or NAMES), draw, (10, 4), about,
+        parser, chosen, lambda quick, rng: experiment(quick, chosen.seed, chosen.seeds, chosen.only or NAMES),
+        f"{__doc__} {chosen.seeds} scenes.",
     )  # fmt: skip
 
 

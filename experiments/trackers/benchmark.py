@@ -1,6 +1,6 @@
 """Our trackers compared with Stone Soup's, and with a labelled multi-Bernoulli filter, on the same detections.
 
-    python -m experiments.trackers.benchmark [--quick] [--seed N] [--budget S] [--json FILE] [--figure FILE]
+    python -m experiments.trackers.benchmark [--quick] [--seed N] [--budget S] [--json FILE]
                                              [--publish]
 
 Stone Soup's multi-frame assignment (MFA), its global nearest neighbour (GNN) and its JPDA (by loopy belief propagation)
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from experiments.common.claims import Claim
 from experiments.common.command import make_parser, mean_interval, run
 from experiments.trackers import labelled
 from experiments.trackers.judging import GOAL
-from experiments.trackers.plane import DETECTION, Plane, simulate
+from experiments.trackers.plane import Plane, simulate
 from experiments.trackers.running import in_plane
 
 WINDOW, GATE = 3, 0.999
@@ -61,13 +61,11 @@ def judged(runs: Iterator[tuple[float, Array]], plane: Plane, budget: float) -> 
     return Result(np.array(seconds), np.array(values))
 
 
-def against_peers(
-    targets: int, clutter: float, scans: int, seeds: Sequence[int], budget: float
-) -> tuple[list[Claim], dict[str, list[Result]]]:
+def against_peers(targets: int, clutter: float, scans: int, seeds: Sequence[int], budget: float) -> list[Claim]:
     """Compare on some seeds; a peer has `budget` seconds for all of them."""
     from experiments.trackers import stone_soup
 
-    found: dict[str, list[Result]] = {name: [] for name in NAMES}
+    found: dict[str, list[Result]] = {name: [] for name in (*PEERS, *PEERS.values())}
     for seed in seeds:
         plane = simulate(targets, clutter, scans, seed)
         share = budget / len(seeds)
@@ -105,7 +103,7 @@ def against_peers(
         low, high = interval or (worse, worse)
         what = f"goal: {label}: mean GOSPA, ours - GNN"
         claims.append(Claim(what, "m", None, worse, interval, (None, 0.0), low <= ROUNDING, GOAL))
-    return claims, found
+    return claims
 
 
 def _median(results: list[Result]) -> float:
@@ -125,59 +123,23 @@ def _paired(ours: list[Result], peer: list[Result]) -> tuple[float, tuple[float,
     return _median(peer) / _median(mine), (float(differences.mean()), interval), scans
 
 
-def experiment(quick: bool, rng: np.random.Generator, most: float = BUDGET) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator, most: float = BUDGET) -> list[Claim]:
     """All settings."""
     seed = int(rng.integers(2**31))
-    claims, shown = [], {}
+    claims = []
     for targets in TARGETS:
         for clutter in CLUTTER:
             scans, seeds, budget = (5, 2, 10.0) if quick else (SCANS, SEEDS[targets], most)
-            part, found = against_peers(targets, clutter, scans, [seed + k for k in range(seeds)], budget)
-            claims += part
-            shown[targets, clutter] = found
-    return claims, shown
+            claims += against_peers(targets, clutter, scans, [seed + k for k in range(seeds)], budget)
+    return claims
 
 
-NAMES = {
-    "mht": "ours, MHT",
-    "nearest": "ours, GNN",
-    "joint": "ours, joint-probabilistic",
-    "mfa": "Stone Soup, MFA",
-    "gnn": "Stone Soup, GNN",
-    "jpda": "Stone Soup, JPDA",
-    **({"lmb": "multisensor-lmb-filters-rs"} if labelled.AVAILABLE else {}),
-}
-COLOURS = ("#1f77b4", "#7fb3d5", "#17becf", "#d62728", "#e8a0a0", "#ff7f0e", "#9467bd")
-
-
-def draw(figure: Any, found: dict[tuple[int, float], dict[str, list[Result]]]) -> None:
-    """Time of a scan and GOSPA, for each setting and tracker."""
-    labels = [f"{targets} / {clutter:g}" for targets, clutter in found]
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    x = np.arange(len(labels))
-    for i, (name, colour) in enumerate(zip(NAMES, COLOURS, strict=False)):
-        place = x + 0.13 * (i - 0.5 * (len(NAMES) - 1))
-        times = [1e3 * _median(one[name]) for one in found.values()]
-        upper.bar(place, times, 0.12, color=colour, label=NAMES[name])
-        per_target = [_mean(one[name]) / np.sqrt(targets) for (targets, _), one in found.items()]
-        lower.bar(place, per_target, 0.12, color=colour)
-    upper.set_yscale("log")
-    upper.set_ylabel("CPU time of a scan, ms")
-    upper.legend(ncols=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
-    lower.set_ylabel("GOSPA / root of the targets, m")
-    lower.set_xticks(x, labels)
-    lower.set_xlabel(f"targets / false alarms a target and scan (P_d {DETECTION:g})")
-    for axes in (upper, lower):
-        axes.grid(axis="y", alpha=0.3)
-        axes.spines[["top", "right"]].set_visible(False)
-
-
-NAME, TITLE = "trackers.benchmark", "Our trackers compared with those of other packages"
+NAME = "trackers.benchmark"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment as a program; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
+    parser = make_parser(NAME, __doc__)
     parser.add_argument(
         "--budget", type=float, default=BUDGET, metavar="S",
         help=f"CPU seconds of each peer for a setting (default {BUDGET:g})",
@@ -186,9 +148,7 @@ def program(arguments: Sequence[str] | None = None) -> int:
     if not chosen.budget > 0:
         parser.error("--budget must be above 0")
     about = f"{__doc__} Budget {chosen.budget:g} s."
-    return run(
-        parser, chosen, NAME, TITLE, lambda quick, rng: experiment(quick, rng, chosen.budget), draw, (8, 6), about
-    )
+    return run(parser, chosen, lambda quick, rng: experiment(quick, rng, chosen.budget), about)
 
 
 if __name__ == "__main__":

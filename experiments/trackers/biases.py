@@ -1,6 +1,6 @@
 """Biased radars: how exactly registration finds the biases, and what trackers gain by it.
 
-    python -m experiments.trackers.biases [FILE.csv] [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.trackers.biases [FILE.csv] [--quick] [--seed N] [--json FILE] [--publish]
 
 Three radars whose ranges and azimuths are off by up to 300 m and 0.3 degrees, each with signs of its own. First the
 errors of the biases found from about 1,000 plots, then GOSPA of the multi-sensor tracker over 60 scans: without biases,
@@ -11,7 +11,6 @@ recorded trajectories (scenario from-tracks, half as many) if a file is given. N
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from assoc.simulation.observation import observe
 from assoc.simulation.radars import on_circle, radar_over
 from assoc.tracking import TRACKERS
 from experiments.common.claims import Claim
-from experiments.common.command import make_parser, run
+from experiments.common.command import add_seeds, make_parser, run
 from experiments.trackers.judging import distances, goal, mean_claim
 from experiments.trackers.running import through
 
@@ -104,14 +103,13 @@ def _cases(simulate: Simulate, size: tuple[float, float], seeds: Sequence[int]) 
     return [biased(simulate(seed), size, seed) for seed in seeds]
 
 
-def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> tuple[list[Claim], dict[str, list[float]]]:
+def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> list[Claim]:
     """GOSPA with biases, registered before, and online, as multiples of that without biases."""
     claims: list[Claim] = []
-    shown: dict[str, list[float]] = {"with biases": [], "registered": [], "online": []}
     plain = np.array([gospa(scene, scene) for scene in map(simulate, seeds)])
     claims.append(mean_claim(f"{label}, no biases: GOSPA", "m", plain))
     for size in SIZES:
-        found: dict[str, list[float]] = {name: [] for name in shown}
+        found: dict[str, list[float]] = {"with biases": [], "registered": [], "online": []}
         for seed, (scene, _) in zip(seeds, _cases(simulate, size, seeds), strict=True):
             truth = simulate(seed)
             found["with biases"].append(gospa(scene, truth))
@@ -119,60 +117,39 @@ def tracking(label: str, simulate: Simulate, seeds: Sequence[int]) -> tuple[list
             found["online"].append(gospa(scene, truth, "online"))
         for name, values in found.items():
             ratio = np.array(values) / plain
-            shown[name].append(float(np.mean(values)))
             what = f"{label}, {words(size)}, {name}: GOSPA / without biases"
             claims.append(mean_claim(what, "", ratio))
             # the largest biases are to be found, and where there are none nothing is to be spoiled
             if name != "with biases" and size in (SIZES[0], SIZES[-1]):
                 claims.append(goal(what, "", ratio, GOSPA_GOAL))
-    return claims, shown
+    return claims
 
 
-def experiment(
-    file: str | None, quick: bool, seed: int, count: int = SEEDS
-) -> tuple[list[Claim], dict[str, dict[str, list[float]]]]:
+def experiment(file: str | None, quick: bool, seed: int, count: int = SEEDS) -> list[Claim]:
     """Simulated flights, and the file's."""
     kinds: dict[str, Simulate] = {"simulated": flights}
     if file is not None:
         kinds["recorded"] = lambda one: simulation.simulate("from-tracks", one, file=file, scans=SCANS)
-    claims, shown = [], {}
+    claims = []
     for label, simulate in kinds.items():
         scenes = count if label == "simulated" else count // 2
         seeds = [seed + k for k in range(2 if quick else max(2, scenes))]
         claims += accuracy(label, simulate, seeds)
-        more, shown[label] = tracking(label, simulate, seeds)
-        claims += more
-    return claims, shown
+        claims += tracking(label, simulate, seeds)
+    return claims
 
 
-def draw(figure: Any, shown: dict[str, dict[str, list[float]]]) -> None:
-    """GOSPA over the size of the biases."""
-    for axes, (label, curves) in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown.items(), strict=True):
-        for (name, values), style in zip(curves.items(), ("o-", "s--", "^:"), strict=True):
-            axes.plot([size[0] for size in SIZES], values, style, label=name)
-        axes.set_title(label, fontsize=10, loc="left")
-        axes.set_xlabel("bias of range, m (of azimuth: deg / 1000)")
-        axes.set_ylabel("GOSPA, m")
-        axes.set_ylim(bottom=0)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8, frameon=False)
-
-
-NAME, TITLE = "trackers.biases", "Biased radars"
+NAME = "trackers.biases"
 
 
 def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
+    parser = make_parser(NAME, __doc__)
     parser.add_argument("file", nargs="?", metavar="FILE.csv", help="recorded trajectories (default: simulated only)")
-    parser.add_argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"scenes of flights (default {SEEDS})")
+    add_seeds(parser, SEEDS, "scenes of flights")
     chosen = parser.parse_args(arguments)
-    if chosen.seeds < 2:
-        parser.error("--seeds must be at least 2")
-    size = (5.5 if chosen.file is None else 11.0, 4.0)
     return run(
-        parser, chosen, NAME, TITLE,
-        lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds), draw, size,
+        parser, chosen, lambda quick, rng: experiment(chosen.file, quick, chosen.seed, chosen.seeds),
         f"{__doc__} Cutoff of GOSPA 500 m. {chosen.seeds} scenes of flights, half as many (at least 2) recorded.",
     )  # fmt: skip
 

@@ -1,6 +1,6 @@
 """What trackers can bear: three radars for long, crowds of targets, and the time of a scan.
 
-    python -m experiments.trackers.capacity [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.trackers.capacity [--quick] [--seed N] [--json FILE] [--publish]
 
 The multi-sensor tracker on the three-radar scene (100 seeds of 100 scans: the second scan, false tracks, its error
 against that of the best radar alone), with a thousand targets and over a thousand scans; `mht` with 300 targets, both
@@ -10,12 +10,10 @@ flight over 90 x 90 km, seen every 4 s. Times are CPU times.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from assoc._types import Array
 from assoc.tracking import HypothesisOrientedMHT, MultiSensorTracker, TrackOrientedMHT
 from experiments.common.claims import Claim
 from experiments.common.command import main
@@ -55,7 +53,7 @@ def long_runs(quick: bool, seed: int) -> list[Claim]:
     ]
 
 
-def crowds(quick: bool, seed: int) -> tuple[list[Claim], dict[str, Array]]:
+def crowds(quick: bool, seed: int) -> list[Claim]:
     """Times of a scan where there are many targets."""
     for kind in (MultiSensorTracker, TrackOrientedMHT):
         # what is compiled is no time of a scan
@@ -91,36 +89,20 @@ def crowds(quick: bool, seed: int) -> tuple[list[Claim], dict[str, Array]]:
             float(np.median(done.seconds)),
             REID_SCAN,
         ),
-    ], {"multi-sensor": thousand, "mht": hundreds, "mht-hypothesis": done.seconds}
+    ]
 
 
 def _most(quantity: str, unit: str, value: float, most: float) -> Claim:
     return Claim(f"goal: {quantity}", unit, ours=value, band=(None, most), source=GOAL)
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], dict[str, Array]]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Run all parts."""
     seed = int(rng.integers(1_000))
-    claims, shown = crowds(quick, seed)
-    return long_runs(quick, seed) + claims, shown
+    return long_runs(quick, seed) + crowds(quick, seed)
 
 
-def draw(figure: Any, shown: dict[str, Array]) -> None:
-    """Time of each scan."""
-    axes = figure.subplots()
-    for name, seconds in shown.items():
-        axes.plot(np.arange(1, len(seconds) + 1), seconds, ".-", label=name)
-    axes.set(xlabel="scan", ylabel="CPU time, s", yscale="log")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, frameon=False)
-
-
-TITLE = "What trackers can bear"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the experiment as a program; returns its exit code."""
-    return main("trackers.capacity", TITLE, experiment, draw, (7, 4), arguments, about=__doc__)
+program = partial(main, "trackers.capacity", experiment, __doc__)
 
 
 if __name__ == "__main__":

@@ -249,18 +249,18 @@ def draw(figure: Any, shown: Any) -> None:
 
 
 NAME = "trackers.fusion_in_stone_soup"
-TITLE = "Three radars in Stone Soup: fusion by S-D assignment compared with its global nearest neighbour"
 
 
 def program(arguments: list[str] | None = None) -> int:
     """Run the experiment; returns its exit code."""
-    parser = make_parser(NAME, TITLE)
+    figure = draw, (11, 4.6)
+    parser = make_parser(NAME, __doc__, figure)
     parser.add_argument("--tune", action="store_true", help="only try the settings of each way on two other scenes")
     chosen = parser.parse_args(arguments)
     if chosen.tune:
         tune()
         return 0
-    return run(parser, chosen, NAME, TITLE, experiment, draw, (11, 4.6), about=__doc__)
+    return run(parser, chosen, experiment, __doc__, figure)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Plots as they come: the time of a step with 500 aircraft under three turning radars.
 
-    python -m experiments.trackers.live [--quick] [--seed N] [--json FILE] [--figure FILE] [--publish]
+    python -m experiments.trackers.live [--quick] [--seed N] [--json FILE] [--publish]
 
 What `assoc track --live` does with its defaults (tracker multi-sensor) and the antennas' turns of 4, 5 and 5.5 s,
 plots taken in every half second: 500 aircraft (scenario `rotating-radars`), 60 s of plots, the first 10 s not counted.
@@ -11,8 +11,7 @@ machine hold what others do.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -51,7 +50,7 @@ def steps(aircraft: int, duration: float, seed: int) -> tuple[Array, int]:
     return np.array(found), tracks
 
 
-def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def experiment(quick: bool, rng: np.random.Generator) -> list[Claim]:
     """Measure the steps."""
     aircraft, duration = (30, 20.0) if quick else (AIRCRAFT, DURATION)
     seconds, tracks = steps(aircraft, duration, int(rng.integers(1_000)))
@@ -65,25 +64,10 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
         Claim(f"{label}: wall time of a step, median", "ms", ours=middle[1]),
         Claim(f"{label}: wall time of a step, p99", "ms", ours=high[1]),
         Claim(f"{label}: confirmed tracks at the end", "", ours=tracks),
-    ], settled
+    ]
 
 
-def draw(figure: Any, settled: Array) -> None:
-    """CPU and wall time of each step."""
-    axes = figure.subplots()
-    for column, name in enumerate(("CPU", "wall")):
-        axes.plot(settled[:, column], ".", label=name)
-    axes.axhline(GOAL_MS, color="black", linewidth=1, linestyle=":")
-    axes.set(xlabel="step", ylabel="ms", ylim=(0.0, None))
-    axes.legend(fontsize=8, frameon=False)
-
-
-TITLE = "Plots as they come"
-
-
-def program(arguments: Sequence[str] | None = None) -> int:
-    """Run the measurement; returns its exit code."""
-    return main("trackers.live", TITLE, experiment, draw, (7, 4), arguments, about=__doc__)
+program = partial(main, "trackers.live", experiment, __doc__)
 
 
 if __name__ == "__main__":

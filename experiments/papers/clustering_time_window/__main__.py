@@ -14,6 +14,7 @@ pairs of each kind (600 s, 5 nmi apart when parallel), 100 false starts; the IDs
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,6 @@ from experiments.common.claims import Claim
 from experiments.common.command import main
 from experiments.papers.clustering_time_window import false_start, pairs, traffic
 from experiments.papers.clustering_time_window.published import RATES, WITH_WINDOW, WITHOUT_WINDOW
-
-TITLE = "MHT with clustering time window (the paper's figures: its own recording)"
 
 
 def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]:
@@ -100,9 +99,7 @@ def _draw_pair_in_space(panel: Any, example: pairs.Example) -> None:
     panel.set(xlabel="east (km)", ylabel="north (km)", zlabel="altitude (m)")
 
 
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("papers.clustering_time_window", TITLE, experiment, draw, (13, 13), arguments, about=__doc__)
+program = partial(main, "papers.clustering_time_window", experiment, __doc__, figure=(draw, (13, 13)))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ noise is chosen by us as the paper's reported errors, rounded.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,12 +53,7 @@ def draw(figure: Any, shown: Any) -> None:
         row[0].legend(fontsize=8)
 
 
-TITLE = "Dubins paths and the ensemble Kalman filter for an unmanned aircraft"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("papers.dubins_enkf", TITLE, experiment, draw, (14, 10), arguments, about=__doc__)
+program = partial(main, "papers.dubins_enkf", experiment, __doc__, figure=(draw, (14, 10)))
 
 
 if __name__ == "__main__":

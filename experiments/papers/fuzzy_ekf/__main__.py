@@ -17,6 +17,7 @@ the best fixed EKF and at most 1.08 of the IMM; both smoothed over 2 steps too.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -161,12 +162,7 @@ def draw(figure: Any, shown: Any) -> None:
     figures.draw_published(lower, example)
 
 
-TITLE = "EKF with fuzzy inference (the paper's numbers are those of its own trajectory)"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("papers.fuzzy_ekf", TITLE, experiment, draw, (14, 14), arguments, about=__doc__)
+program = partial(main, "papers.fuzzy_ekf", experiment, __doc__, figure=(draw, (14, 14)))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ form / EKF 0.35 to 0.55, NEES at most 9, at most 6 % above a UKF; below beta = 0
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,12 +111,7 @@ def draw(figure: Any, shown: Any) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-TITLE = "Modified EKF for a 3-D radar"
-
-
-def program(arguments: list[str] | None = None) -> int:
-    """Run the experiment; returns its exit code."""
-    return main("papers.modified_ekf", TITLE, experiment, draw, (14, 11), arguments, about=__doc__)
+program = partial(main, "papers.modified_ekf", experiment, __doc__, figure=(draw, (14, 11)))
 
 
 if __name__ == "__main__":
