@@ -1,6 +1,6 @@
 # make demo   simulate the three-radar scene, associate it with the ant colony, print the result
 # make test   install what the tests need and run them, of the slow ones a sample (CONTRIBUTING.md)
-# make test-all         all tests: what a release needs
+# make test-all         all tests, and the share of the lines that they run: what a release needs
 # make lint   ruff (rules and format), mypy and import-linter
 # make docs   the pages of docs/, tutorials executed, into docs/_build/html
 # make check-set        the benchmark set (experiments/sdlib): made anew, compared, every solution and proof checked
@@ -13,8 +13,8 @@
 # make dist             sdist, wheel, and a wheel with compiled kernels for this Python and system, into dist/
 # make check-dist       builds them, checks what they hold, that they work in an empty environment, and compile nothing
 # make audit            what is known of holes in the dependencies (asks an index of advisories)
-# make bench  benchmarks at full size, some hours (bench-quick: a minute's worth;
-#             python -m experiments.benchmarks --brief: everything in 25 minutes)
+# make bench  benchmarks at full size, some hours (python -m experiments.benchmarks --brief: everything in 25 minutes)
+# make bench-quick      a minute: has something become twice as slow, beside HiGHS in the same process?
 # make bench-cold       what a user waits for after an installation, with an empty cache of kernels
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
@@ -47,7 +47,7 @@ test: $(VENV)/.installed-test
 
 test-all: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
-	$(PY) -m pytest -n 2 --dist worksteal -q
+	$(PY) -m pytest -n 2 --dist worksteal -q --cov --cov-report=
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .
@@ -97,7 +97,7 @@ bench: $(VENV)/.installed-peers
 	$(PY) -m experiments.benchmarks
 
 bench-quick: $(VENV)/.installed-test
-	$(PY) -m experiments.benchmarks --quick
+	$(PY) -m experiments.bench_quick
 
 bench-cold: $(VENV)/.installed-test
 	$(PY) -m experiments.cold_start

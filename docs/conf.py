@@ -19,7 +19,7 @@ author = copyright = "The assoc developers"
 version = release = assoc.__version__
 
 extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb"]
-exclude_patterns = ["_build", "_tables", "benchmarks-quick.md"]
+exclude_patterns = ["_build", "_tables"]
 nitpicky = False
 
 html_theme = "furo"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-TABLE, QUICK_TABLE, README = Path("docs/benchmarks.csv"), Path("docs/benchmarks-quick.csv"), Path("README.md")
+TABLE, README = Path("docs/benchmarks.csv"), Path("README.md")
 # what a brief run gives other solvers, in seconds
 _BRIEF_LIMIT = 5.0
 FAMILIES = ("paper", "gated", "ghost", "wide gap", "known optimum", "random axial", "planted", "scale", "kbest")
@@ -33,7 +33,6 @@ def _parser() -> argparse.ArgumentParser:
         description="Run our solvers and other people's on the benchmark families; write the rows, the report "
         f"and, for {TABLE}, the tables of README.md.",
     )
-    parser.add_argument("--quick", action="store_true", help="small instances and few seeds: under 3 minutes")
     parser.add_argument("--families", nargs="+", metavar="NAME", help=f"only these: {', '.join(FAMILIES)}")
     parser.add_argument("--sizes", nargs="+", metavar="SIZE", help="only these sizes of the families")
     parser.add_argument("--solvers", nargs="+", metavar="NAME", help="only these solvers, ours and others")
@@ -77,7 +76,7 @@ def main(argv: list[str] | None = None) -> int:
         parser.error(f"--processes: expected at least 1, got {options.processes}")
     if options.peer_limit is not None and not options.peer_limit > 0:
         parser.error(f"--peer-limit: expected more than 0 seconds, got {options.peer_limit:g}")
-    table: Path = options.csv or (QUICK_TABLE if options.quick else TABLE)
+    table: Path = options.csv or TABLE
     report: Path = options.markdown or table.with_suffix(".md")
     if options.report_only and not table.exists():
         parser.error(f"--report-only: {table} does not exist")
@@ -127,7 +126,6 @@ def main(argv: list[str] | None = None) -> int:
 def _command(options: argparse.Namespace) -> str:
     """What to type for the same run."""
     words = ["python -m experiments.benchmarks"]
-    words += ["--quick"] if options.quick else []
     words += ["--brief"] if options.brief else []
     for name in ("families", "sizes", "solvers"):
         if getattr(options, name):
@@ -156,7 +154,7 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
     def log(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    chosen = [case for case in cases(options.quick) if _to_run(case, families, options.sizes)]
+    chosen = [case for case in cases() if _to_run(case, families, options.sizes)]
     if options.brief:
         chosen = [replace(case, seeds=case.brief, chosen=case.chosen[: case.brief]) for case in chosen]
         options.peer_limit = options.peer_limit or _BRIEF_LIMIT
@@ -168,9 +166,9 @@ def _measure(families: list[str], options: argparse.Namespace) -> Iterator[list[
         chosen = [case.on_one_core() for case in chosen]
     yield from run.run_all(chosen, options.seeds, options.processes, log)
     if "scale" in families:
-        yield scale.run(options.quick, 2 if options.brief else options.seeds, log)
+        yield scale.run(2 if options.brief else options.seeds, log)
     if "kbest" in families:
-        yield ranking.run(options.quick, 2 if options.brief else options.seeds, log)
+        yield ranking.run(2 if options.brief else options.seeds, log)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
@@ -64,7 +64,6 @@ class Case:
     seeds: int = 5
     chosen: tuple[int, ...] = ()
     brief: int = 2
-    quick: bool = field(default=False, kw_only=True)
 
     def restricted_to(self, solvers: Collection[str]) -> Case:
         """Return the same case with only these solvers and peers."""
@@ -95,12 +94,8 @@ def _from_scene(scene: Scene) -> Iterator[Instance]:
         yield Instance(build_problem(scene, scan))
 
 
-def _paper(seed: int, scans: int = 100) -> Iterator[Instance]:
-    from assoc.costs import build_problem
-
-    scene = scenes.three_radar(seed)
-    for scan in range(min(scans, scene.num_scans)):
-        yield Instance(build_problem(scene, scan))
+def _paper(seed: int) -> Iterator[Instance]:
+    return _from_scene(scenes.three_radar(seed))
 
 
 def _gated(sensors: int, targets: int) -> Callable[[int], Iterator[Instance]]:
@@ -127,141 +122,77 @@ def _entries(names: tuple[str, ...], limit: float) -> tuple[Entry, ...]:
     return tuple(Entry(name, limit) for name in names)
 
 
-def cases(quick: bool = False) -> list[Case]:
-    """Return all cases, in the order of the report.
-
-    Parameters
-    ----------
-    quick : bool
-        Fewer seeds and only what ends soon: under three minutes in all.
-    """
-    ghosts = _ghost_cases(quick) + _wide_gap_cases(quick)
-    every = _paper_cases(quick) + _gated_cases(quick) + ghosts + _synthetic_cases(quick)
-    return [case for case in every if case.quick or not quick]
+def cases() -> list[Case]:
+    """Return all cases, in the order of the report."""
+    return [*_paper_cases(), *_gated_cases(), *_ghost_cases(), *_wide_gap_cases(), *_synthetic_cases()]
 
 
-def _paper_cases(quick: bool) -> list[Case]:
+def _paper_cases() -> Iterator[Case]:
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "greedy", "milp"), 1.0)
     peers = _entries(("highs", "sequential", "nrl_tracker"), 10.0)
-    scans = 20 if quick else 100
-    return [Case("paper", "3 radars", lambda s: _paper(s, scans), ours, peers, 1 if quick else 5, quick=True)]
+    yield Case("paper", "3 radars", _paper, ours, peers)
 
 
-def _gated_cases(quick: bool) -> list[Case]:
-    result = []
-    sizes = [(3, 100, 1.0), (3, 300, 1.0), (3, 1000, 3.0), (4, 300, 3.0), (5, 200, 3.0)]
-    for sensors, targets, heuristic_limit in sizes:
+def _gated_cases() -> Iterator[Case]:
+    peers = _entries(("cp_sat", "highs", "scip", "scip_1", "sequential", "nrl_tracker"), 60.0)
+    for sensors, targets, limit in ((3, 100, 1.0), (3, 300, 1.0), (3, 1000, 3.0), (4, 300, 3.0), (5, 200, 3.0)):
         ours = (
             Entry("exact", 60.0),
             Entry("lagrangian", 10.0, stop_gap=1e-3),
             Entry("lagrangian", 10.0),
-            *_entries(HEURISTICS, heuristic_limit),
+            *_entries(HEURISTICS, limit),
             Entry("greedy", 10.0),
         )
-        peers: tuple[str, ...] = ("cp_sat", "highs", "scip", "scip_1", "sequential", "nrl_tracker")
-        if quick:
-            peers = ("cp_sat", "highs", "sequential")
-        result.append(
-            Case(
-                "gated",
-                f"{sensors}x{targets}",
-                _gated(sensors, targets),
-                ours,
-                _entries(peers, 60.0),
-                2 if quick else 5,
-                quick=sensors == 3 and targets <= 300,
-            )
-        )
-    return result
+        yield Case("gated", f"{sensors}x{targets}", _gated(sensors, targets), ours, peers)
 
 
-def _ghost_cases(quick: bool) -> list[Case]:
+def _ghost_cases() -> Iterator[Case]:
     # Limits beside each other: what a peer has after as long as our heuristics get, and much later.
-    plan: list[tuple[int, tuple[float, ...], float, int]] = [
+    plan: tuple[tuple[int, tuple[float, ...], float, int], ...] = (
         (20, (60.0,), 60.0, 10),
         (40, (5.0, 60.0), 60.0, 10),
         (60, (5.0, 60.0), 60.0, 5),
         (100, (5.0, 60.0), 30.0, 5),
-    ]
-    names: tuple[str, ...] = ("cp_sat", "highs", "scip")
-    if quick:
-        plan, names = [(20, (10.0,), 10.0, 2), (40, (5.0, 15.0), 10.0, 1)], ("cp_sat", "highs")
-    result = []
+    )
     for targets, limits, own, seeds in plan:
         ours = (Entry("exact", own), Entry("lagrangian", 5.0), *_entries(HEURISTICS, 5.0), Entry("greedy", 5.0))
-        alone = ("scip_1",) if targets == 20 and not quick else ()
-        peers = [Entry(name, limit) for name in (*names, *alone) for limit in limits]
+        names = ("cp_sat", "highs", "scip", *(("scip_1",) if targets == 20 else ()))
+        peers = [Entry(name, limit) for name in names for limit in limits]
         peers += [Entry("sequential", 5.0), Entry("nrl_tracker", 60.0)]
-        if not quick:
-            # codes for independent sets, two of them where their graph is not too large; none gives a proof, and that
-            # is the question at 20 targets
-            late = 10.0 if targets == 20 else 60.0
-            peers += [Entry("kap", late), *(Entry("chils", limit) for limit in sorted({min(limits[0], late), late}))]
-            peers += _entries(("branch_reduce", "mmwis"), late) if targets <= 40 else ()
+        # codes for independent sets, two of them where their graph is not too large; none gives a proof, and that
+        # is the question at 20 targets
+        late = 10.0 if targets == 20 else 60.0
+        peers += [Entry("kap", late), *(Entry("chils", limit) for limit in sorted({min(limits[0], late), late}))]
+        peers += _entries(("branch_reduce", "mmwis"), late) if targets <= 40 else ()
         brief = {20: 10, 40: 5}.get(targets, 2)
-        result.append(Case("ghost", str(targets), _ghost(targets), ours, tuple(peers), seeds, brief=brief, quick=True))
-    return result
+        yield Case("ghost", str(targets), _ghost(targets), ours, tuple(peers), seeds, brief=brief)
 
 
-def _wide_gap_cases(quick: bool) -> list[Case]:
-    ours = _entries(("exact",), 60.0)
-    peers = _entries(("cp_sat", "highs", "scip", "scip_1"), 60.0)
-    result = []
+def _wide_gap_cases() -> Iterator[Case]:
+    ours, peers = _entries(("exact",), 60.0), _entries(("cp_sat", "highs", "scip", "scip_1"), 60.0)
     for targets, seeds in WIDE_GAPS.items():
-        chosen = seeds[:2] if quick else seeds
-        result.append(
-            Case(
-                "wide gap",
-                str(targets),
-                _ghost(targets),
-                ours,
-                peers,
-                len(chosen),
-                chosen,
-                brief=5 if targets == 20 else 2,
-                quick=targets == 20,
-            )
-        )
-    return result
+        brief = 5 if targets == 20 else 2
+        yield Case("wide gap", str(targets), _ghost(targets), ours, peers, len(seeds), seeds, brief)
 
 
-def _synthetic_cases(quick: bool) -> list[Case]:
-    return [*_known_cases(quick), *_axial_cases(quick), *_planted_cases(quick)]
-
-
-def _known_cases(quick: bool) -> Iterator[Case]:
+def _synthetic_cases() -> Iterator[Case]:
     for n, limit, seeds in ((10, 5.0, 10), (20, 5.0, 10), (30, 5.0, 10), (50, 10.0, 5), (100, 10.0, 3)):
-        ours: tuple[Entry, ...] = (
-            Entry("exact", 20.0),
-            *_entries((*HEURISTICS, "lagrangian", "greedy"), limit),
-        )
-        peers: tuple[Entry, ...] = (Entry("highs", 30.0), Entry("scip_1", 30.0), Entry("cp_sat", 10.0))
+        ours = (Entry("exact", 20.0), *_entries((*HEURISTICS, "lagrangian", "greedy"), limit))
+        peers = (Entry("highs", 30.0), Entry("scip_1", 30.0), Entry("cp_sat", 10.0))
         peers += _entries(("sequential", "nrl_tracker"), limit)
-        if quick:
-            ours, peers, seeds = ours[:4], peers[:1], 2
-        elif n == 100:
+        if n == 100:
             # a million tuples, which no other solver takes
             ours, peers = ours[:1], _entries(("sequential",), limit)
-        yield Case("known optimum", f"n={n}", _known(n), ours, peers, seeds, quick=n <= 20)
-
-
-def _axial_cases(quick: bool) -> Iterator[Case]:
+        yield Case("known optimum", f"n={n}", _known(n), ours, peers, seeds)
     limits = {12: 5.0, 20: 10.0, 26: 10.0}
     # 60 instances of the sizes of Balas and Saltzman, heuristics on three sizes
     for n in range(4, 27, 2):
-        ours: tuple[Entry, ...] = _entries(("exact",), 60.0)
-        peers: tuple[Entry, ...] = _entries(("highs", "scip_1"), 60.0)
+        ours, peers = _entries(("exact",), 60.0), _entries(("highs", "scip_1"), 60.0)
         if n in limits:
             ours += _entries((*HEURISTICS, "lagrangian", "greedy"), limits[n])
             peers += (Entry("cp_sat", 30.0), *_entries(("sequential", "nrl_tracker"), limits[n]))
-        if quick:
-            ours, peers = ours[:4], peers[:1]
-        yield Case("random axial", f"n={n}", _axial(n), ours, peers, 2 if quick else 5, quick=n == 12)
-
-
-def _planted_cases(quick: bool) -> Iterator[Case]:
+        yield Case("random axial", f"n={n}", _axial(n), ours, peers)
     ours = _entries(("exact", "lagrangian", *HEURISTICS, "milp", "greedy"), 5.0)
-    peers = _entries(("highs",) if quick else ("highs", "cp_sat", "sequential"), 30.0)
+    peers = _entries(("highs", "cp_sat", "sequential"), 30.0)
     for sensors in (3, 4, 5, 6):
-        seeds = 2 if quick else 5
-        yield Case("planted", f"S={sensors}", _planted(sensors), ours, peers, seeds, quick=True)
+        yield Case("planted", f"S={sensors}", _planted(sensors), ours, peers)

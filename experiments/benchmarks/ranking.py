@@ -36,14 +36,14 @@ class Ranking(NamedTuple):
     costs: list[float]
 
 
-def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]:
+def run(seeds: int | None, log: Callable[[str], None]) -> list[Row]:
     """Time both goals' instances."""
     from assoc.costs import build_problem
 
     rows: list[Row] = []
     assoc.kbest(synthetic.planar_random(5, 0), 3)
     assoc.kbest(build_problem(scenes.gated(3, 5, 0), 0), 3)
-    for seed in range(FIRST_SEED, FIRST_SEED + (seeds or (2 if quick else 5))):
+    for seed in range(FIRST_SEED, FIRST_SEED + (seeds or 5)):
         planar = synthetic.planar_random(100, seed)
         spatial = build_problem(scenes.gated(3, 20, seed), 0)
         for size, problem, k in ((PLANAR, planar, PLANAR_K), (SPATIAL, spatial, SPATIAL_K)):

@@ -65,11 +65,11 @@ def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
 
 
-def run(quick: bool, seeds: int | None, log: Callable[[str], None]) -> list[Row]:
+def run(seeds: int | None, log: Callable[[str], None]) -> list[Row]:
     """Measure every size, each run in a process of its own."""
     rows = []
-    for targets in SIZES[:2] if quick else SIZES:
-        for seed in range(FIRST_SEED, FIRST_SEED + (seeds or (1 if quick else 5))):
+    for targets in SIZES:
+        for seed in range(FIRST_SEED, FIRST_SEED + (seeds or 5)):
             command = [sys.executable, "-m", "experiments.benchmarks.scale", str(targets), str(seed)]
             done = subprocess.run(command, check=True, capture_output=True, text=True)
             found = json.loads(done.stdout)
