@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import datetime
-import io
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -114,24 +112,6 @@ def load_json(path: str | Path) -> list[Claim]:
     if data.get("version") != VERSION:
         raise ValueError(f"{path}: version {data.get('version')} is not {VERSION}")
     return [Claim(**claim) for claim in data["claims"]]
-
-
-def save_csv(path: str | Path, claims: Iterable[Claim]) -> None:
-    """Write one row per claim; interval and band become two columns each."""
-    columns: list[str] = []
-    for field in fields(Claim):
-        pair = field.name in ("interval", "band")
-        columns += [f"{field.name}_low", f"{field.name}_high"] if pair else [field.name]
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    for claim in claims:
-        row: list[object] = []
-        for field in fields(Claim):
-            value = getattr(claim, field.name)
-            row += list(value or (None, None)) if field.name in ("interval", "band") else [value]
-        writer.writerow(["" if value is None else value for value in row])
-    write_text(path, text.getvalue())
 
 
 def print_table(claims: Sequence[Claim], title: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
@@ -60,15 +59,6 @@ def test_json_round_trip_and_form(tmp_path: Path) -> None:
     path.write_text("[]")
     with pytest.raises(ValueError, match=r"not an assoc\.claims file"):
         claims.load_json(path)
-
-
-def test_csv(tmp_path: Path) -> None:
-    path = tmp_path / "claims.csv"
-    claims.save_csv(path, SAMPLE)
-    rows = list(csv.DictReader(path.read_text().splitlines()))
-    assert rows[0]["interval_low"] == "4.8"
-    assert (rows[1]["band_low"], rows[1]["band_high"], rows[1]["holds"]) == ("", "2.0", "False")
-    assert rows[2]["holds"] == ""
 
 
 def test_table_shows_every_claim(capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,16 +19,17 @@ from tests.sizes import few_or_all
 
 @pytest.mark.slow
 @few_or_all("module", modified_ekf, dubins_enkf)
-def test_programs_whose_claims_hold(module, tmp_path, capsys):
-    files = [str(tmp_path / "a.json"), str(tmp_path / "a.png")]
-    assert module.program(["--quick", "--json", files[0], "--figure", files[1], "--seed", "1"]) == 0
-    claims = load_json(files[0])
+def test_programs_whose_claims_hold(module, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert module.program(["--quick", "--json", "a.json", "--seed", "1"]) == 0
+    claims = load_json("a.json")
     # what the papers claim and does not hold is on the page; what we accept by limits of our own must hold
     judged = [c for c in claims if c.holds is not None and c.source.endswith("chosen by us") and "%" not in c.source]
     judged = [c for c in judged if not re.search("table|figure|section|equation|abstract", c.source)]
     assert len(judged) >= 5
     assert not [c.quantity for c in judged if not (c.holds or may_hold(c))]
-    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    if module is dubins_enkf:
+        assert (tmp_path / "dubins_enkf.png").read_bytes()[:4] == b"\x89PNG"
     assert "holds" in capsys.readouterr().out
 
 

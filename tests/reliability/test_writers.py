@@ -19,7 +19,7 @@ from tests.reliability.writers import outcome, writers
 
 NAMES = (
     "scene", "problem", "tracker", "association", "tracks", "plots of a radar", "truth", "picture", "report",
-    "report of tracks", "claims", "claims as a table", "figure of an experiment", "benchmarks",
+    "report of tracks",
 )  # fmt: skip
 
 

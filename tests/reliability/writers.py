@@ -26,9 +26,6 @@ def writers() -> Mapping[str, Writer]:
     from assoc.recordings import write_plots, write_tracks
     from assoc.simulation import simulate, simulate_recording
     from assoc.tracking import MultiSensorTracker, track_scene
-    from experiments.benchmarks import rows
-    from experiments.common.claims import Claim, save_csv, save_json
-    from experiments.common.command import save_figure
 
     scene = simulate("three-radar", 2, scans=6)
     recording = simulate_recording("rotating-radar", 1, duration=60.0)
@@ -39,7 +36,6 @@ def writers() -> Mapping[str, Writer]:
     found = assoc.associate(scene, "greedy")
     tracker = MultiSensorTracker(scene.sensors, region=scene.region)
     table, _ = track_scene(tracker, scene, confirmed=False)
-    claims = [Claim(f"quantity {i}", ours=1.0, band=(0.0, 2.0)) for i in range(30)]
     sources = [scene] * scene.num_scans
     return {
         "scene": scene.save,
@@ -52,10 +48,6 @@ def writers() -> Mapping[str, Writer]:
         "picture": lambda path: save_png(path, new_figure()),
         "report": lambda path: write_association_report(path, found, sources, ["scene"] * len(sources)),
         "report of tracks": lambda path: write_tracking_report(path, table.to_frame(), scene),
-        "claims": lambda path: save_json(path, claims, "experiment", 0),
-        "claims as a table": lambda path: save_csv(path, claims),
-        "figure of an experiment": lambda path: save_figure(path, lambda *_: None, None, (4, 3)),
-        "benchmarks": lambda path: rows.save(path, rows.load(Path("docs/benchmarks.csv").resolve())[:20]),
     }
 
 

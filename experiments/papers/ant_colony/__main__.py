@@ -1,4 +1,6 @@
-"""Table 1 of the ant colony paper: ``python -m experiments.papers.ant_colony [--quick] [--json FILE]``.
+"""Table 1 of the ant colony paper: 24 settings of alpha, beta and rho on the scene of the paper.
+
+    python -m experiments.papers.ant_colony [--quick] [--json FILE] [--figure FILE] [--study FOLDER] [--publish]
 
 All 24 settings of alpha, beta and rho on the paper's scene (three radars, 100 scans, 15 ants), in mode
 "paper" (equations 7 to 11 exactly as published) and in mode "mmas", several seeds each.
@@ -18,24 +20,17 @@ Beside it: why the paper's cycles are not met (readings.py), and its conclusion 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import os
-import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._files.output import write_atomically, write_text
-from experiments.common import claims as forms
 from experiments.common.claims import Claim
-from experiments.common.command import add_publish, publish
+from experiments.common.command import make_parser, run, whole
 from experiments.papers.ant_colony import readings, truth
 
 if TYPE_CHECKING:
@@ -59,7 +54,6 @@ PAPER = {(a, b, rho): value for (a, b), row in _TABLE_1.items() for rho, value i
 """Mean iterations of the paper by alpha, beta, rho."""
 
 BEST = (2, 1, 0.3)
-_CELLS = ("cycles", "cycles_low", "cycles_high", "optimal", "ms")
 MODES = ("paper", "mmas")
 ANTS = 15
 TOLERANCE = 0.1
@@ -80,75 +74,35 @@ class Measured:
     seconds: Any
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def program(arguments: Sequence[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
-    from assoc._cli.program import run_program
-
-    return run_program(lambda: _main(arguments), "experiments.papers.ant_colony")
-
-
-def _main(arguments: Sequence[str] | None) -> None:
-    parser = _parser()
-    options = parser.parse_args(arguments)
-    if options.publish and (options.quick or options.scans or options.seeds):
-        parser.error("--publish needs the full run, got --quick, --scans or --seeds")
-    started = time.perf_counter()
-    scans, seeds = (30, 2) if options.quick else (100, 10)
-    scans, seeds = options.scans or scans, options.seeds or seeds
-    folder = Path(options.output)
-    folder.mkdir(parents=True, exist_ok=True)
-    held: Any = nullcontext(options.study) if options.study else tempfile.TemporaryDirectory(prefix="assoc-")
-    with held as study:
-        frame = run_study(study, options.seed, scans, seeds, options.jobs)
-    elapsed = time.perf_counter() - started
-    measured = {mode: gather(frame, mode) for mode in MODES}
-    rows = table(measured)
-    found = claims(measured, int((frame["parameter_iterations"] <= frame["iterations"]).sum()))
-    found += readings.judge(scans, min(seeds, 5), options.seed)
-    about_truth, shown = truth.judge(scans, options.seed)
-    found += about_truth
-    print_rows(rows)
-    print()
-    forms.print_table(
-        [claim for claim in found if not claim.quantity.startswith("setting")], "Table 1 and its conclusions"
-    )
-    _write_csv(folder / "settings.csv", rows)
-    forms.save_csv(folder / "claims.csv", found)
-    for path in (folder / "claims.json", options.json):
-        if path is not None:
-            forms.save_json(path, found, NAME, options.seed, __doc__ or "")
-    if options.publish:
-        publish(found, NAME, options.seed, __doc__)
-    draw(measured, folder / "table_1.png")
-    truth.draw(shown, folder / "figure_3.png")
-    print(f"{len(frame)} runs ({scans} scans, {seeds} seeds) in {elapsed:.0f} s; tables and figure in {folder}")
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments.papers.ant_colony",
-        description="Table 1 of the ant colony paper: 24 settings of alpha, beta and rho on the scene of the paper.",
-    )
-    parser.add_argument("--quick", action="store_true", help="30 scans and 2 seeds: under a minute")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the scene and the ants (default 0)")
-    parser.add_argument("--scans", type=int, metavar="N", help="scans of the scene (default 100)")
-    parser.add_argument("--seeds", type=int, metavar="N", help="runs of each setting on each scan (default 10)")
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the results here")
+    figure = truth.draw, (12, 4.2)
+    parser = make_parser(NAME, __doc__, figure)
+    parser.add_argument("--scans", type=whole(1), metavar="N", help="scans of the scene (default 100; --quick: 30)")
+    parser.add_argument("--seeds", type=whole(2), metavar="N", help="runs of each setting (default 10; --quick: 2)")
+    jobs = os.cpu_count() or 1
+    parser.add_argument("--jobs", type=whole(1), default=jobs, metavar="N", help="processes (default: all cores)")
     parser.add_argument(
         "--study", metavar="FOLDER", help="keep the runs in this folder, and run only what is missing there"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        default="results/aco_parameters",
-        metavar="FOLDER",
-        help="where to write tables and figures (default results/aco_parameters)",
-    )
-    add_publish(parser, NAME)
-    return parser
+    chosen = parser.parse_args(arguments)
+    if chosen.publish and (chosen.scans or chosen.seeds):
+        parser.error("--publish needs the full run, got --scans or --seeds")
+    return run(parser, chosen, lambda quick, _: experiment(quick, chosen), __doc__, figure)
+
+
+def experiment(quick: bool, chosen: argparse.Namespace) -> tuple[list[Claim], Any]:
+    """Table 1, the readings, and the paper's conclusion against the truth, which the figure shows."""
+    scans, seeds = chosen.scans or (30 if quick else 100), chosen.seeds or (2 if quick else 10)
+    held: Any = nullcontext(chosen.study) if chosen.study else tempfile.TemporaryDirectory(prefix="assoc-")
+    with held as study:
+        frame = run_study(study, chosen.seed, scans, seeds, chosen.jobs)
+    print(f"{len(frame)} runs ({scans} scans, {seeds} seeds)")
+    measured = {mode: gather(frame, mode) for mode in MODES}
+    found = claims(measured, int((frame["parameter_iterations"] <= frame["iterations"]).sum()))
+    found += readings.judge(scans, min(seeds, 5), chosen.seed)
+    about_truth, shown = truth.judge(scans, chosen.seed)
+    return found + about_truth, shown
 
 
 def run_study(folder: str, seed: int, scans: int, seeds: int, jobs: int) -> pd.DataFrame:
@@ -186,21 +140,6 @@ def gather(frame: pd.DataFrame, mode: str) -> Measured:
     return Measured(*arrays)
 
 
-def table(measured: dict[str, Measured]) -> list[dict[str, Any]]:
-    """One row a setting: the paper's mean, and ours with interval, optimal rate and time in both modes."""
-    rows = []
-    for i, ((alpha, beta, rho), paper) in enumerate(PAPER.items()):
-        row: dict[str, Any] = {"alpha": alpha, "beta": beta, "rho": rho, "paper_iterations": paper}
-        for mode, one in measured.items():
-            low, high = _interval(one.cycles[i])
-            row[f"{mode}_cycles"] = float(one.cycles[i].mean())
-            row[f"{mode}_cycles_low"], row[f"{mode}_cycles_high"] = low, high
-            row[f"{mode}_optimal"] = float(one.optimal[i].mean())
-            row[f"{mode}_ms"] = float(1e3 * one.seconds[i].mean())
-        rows.append(row)
-    return rows
-
-
 def _interval(values: Any) -> tuple[float, float]:
     from assoc.sweeps.bootstrap import mean_interval
 
@@ -208,15 +147,7 @@ def _interval(values: Any) -> tuple[float, float]:
 
 
 def claims(measured: dict[str, Measured], cut_off: int = 0) -> list[Claim]:
-    """What the paper says beside what we found.
-
-    Parameters
-    ----------
-    measured : dict of Measured
-        For each mode.
-    cut_off : int
-        Runs that reached the limit of cycles.
-    """
+    """What the paper says beside what we found in each mode; `cut_off` runs reached the limit of cycles."""
     found = _conclusions(measured["paper"], "paper", np.array(list(PAPER.values())))
     found.append(
         Claim("mode paper: runs cut off at the limit of cycles", "", None, cut_off, band=(0, 0), source="chosen by us")
@@ -331,52 +262,5 @@ def _ends(values: Any) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def print_rows(rows: list[dict[str, Any]]) -> None:
-    """Print one line a setting."""
-    print(f"{'':14}  {'paper':>6}  {'mode paper':>36}  {'mode mmas':>36}")
-    head = f"{'cycles':>6}  {'95 %':>12}  {'optimal':>7}  {'ms':>5}"
-    print(f"{'alpha beta rho':14}  {'cycles':>6}  {head}  {head}")
-    for row in rows:
-        line = f"{row['alpha']:5} {row['beta']:4} {row['rho']:3}  {row['paper_iterations']:6.2f}"
-        for mode in MODES:
-            cycles, low, high, rate, ms = (row[f"{mode}_{end}"] for end in _CELLS)
-            line += f"  {cycles:6.2f}  {f'{low:.2f}..{high:.2f}':>12}  {100 * rate:5.1f} %  {ms:5.2f}"
-        print(line)
-
-
-def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_text(path, text.getvalue())
-
-
-def draw(measured: dict[str, Measured], path: Path) -> None:
-    """Draw the mean cycles of all settings with their intervals, the paper's beside them."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 6.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(2, 1, sharex=True)
-    places = np.arange(len(PAPER))
-    labels = [f"{a} {b} {rho}" for a, b, rho in PAPER]
-    for ax, (mode, one) in zip(axes, measured.items(), strict=True):
-        means = one.cycles.mean(axis=(1, 2))
-        ends = np.array([_interval(values) for values in one.cycles])
-        spread = np.maximum(0.0, np.stack([means - ends[:, 0], ends[:, 1] - means]))
-        ax.errorbar(places, means, yerr=spread, fmt="o", capsize=3, label=f"ours, mode {mode}, 95 % interval")
-        if mode == "paper":
-            ax.plot(places, list(PAPER.values()), "s", color="C3", markersize=4, label="the paper's Table 1")
-        ax.set_ylim(bottom=0)
-        ax.set_ylabel("mean cycles")
-        ax.grid(alpha=0.3)
-        ax.legend(loc="lower right", fontsize=8)
-    axes[-1].set_xticks(places, labels, rotation=90)
-    axes[-1].set_xlabel("alpha, beta, rho")
-    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=130))
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(program())

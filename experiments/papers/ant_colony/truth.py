@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import assoc
-from assoc._files.output import write_atomically
 from assoc.simulation import simulate
 from experiments.common.claims import Claim
 
@@ -68,14 +66,9 @@ def judge(scans: int, seed: int) -> tuple[list[Claim], Any]:
     return claims, (scene, by_name["mode paper"])
 
 
-def draw(shown: Any, path: Path) -> None:
+def draw(figure: Any, shown: Any) -> None:
     """Figures 1 to 3 of the paper: targets, measurements, and what the ants selected."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     scene, association = shown
-    figure = Figure(figsize=(12, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(1, 3, sharex=True, sharey=True)
     truth = np.concatenate([scene.scan(k).truth_positions for k in range(scene.num_scans)]) / 1e3
     panels[0].plot(*truth[:, :2].T, ".", markersize=2)
@@ -95,4 +88,3 @@ def draw(shown: Any, path: Path) -> None:
     panels[2].set_title("figure 3: targets that the ants selected")
     for panel in panels:
         panel.set(xlabel="x (km)", ylabel="y (km)")
-    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=130))

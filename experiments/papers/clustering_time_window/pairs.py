@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from assoc._types import Array
@@ -19,21 +17,12 @@ TRAFFIC = ("crossing", "parallel", "head-on")
 DURATION = 600.0
 GOAL = 95.0
 FIGURES = {"crossing": "4.18", "parallel": "4.20", "head-on": "4.22"}
-IN_SPACE = {"crossing": "4.19", "parallel": "4.21", "head-on": "4.23"}
 SOURCE = "figure {}: no switch in its one pair; 95 % chosen by us"
 
 
-@dataclass(frozen=True, eq=False)
-class Example:
-    """One pair and what the multiple hypothesis tracker made of it, for the figure."""
-
-    recording: Recording
-    taken: Taken
-
-
-def judge(runs: int, rng: np.random.Generator) -> tuple[list[Claim], dict[str, Example]]:
+def judge(runs: int, rng: np.random.Generator) -> list[Claim]:
     """Identity switches over seeds."""
-    claims, examples = [], {}
+    claims = []
     for traffic in TRAFFIC:
         without: dict[str, list[bool]] = {}
         astray: list[int] = []
@@ -54,24 +43,14 @@ def judge(runs: int, rng: np.random.Generator) -> tuple[list[Claim], dict[str, E
             for name, taken in by_method.items():
                 without.setdefault(name, []).append(switches(recording, taken) == 0)
             astray.append(label_switches(_sources(recording, decided), np.where(decided.confirmed, decided.tracks, -1)))
-            examples.setdefault(traffic, Example(recording, decided))
         for number, (name, good) in enumerate(without.items()):
             what = f"{traffic}: pairs without an identity switch, {name}"
             share = 100.0 * float(np.mean(good))
-            claims.append(
-                Claim(
-                    what,
-                    "%",
-                    None,
-                    share,
-                    wilson(good),
-                    (GOAL, None) if number == 0 else None,
-                    source=SOURCE.format(FIGURES[traffic]),
-                )
-            )
+            band = (GOAL, None) if number == 0 else None
+            claims.append(Claim(what, "%", None, share, wilson(good), band, source=SOURCE.format(FIGURES[traffic])))
         what = f"{traffic}: changes of track from plot to plot, single plots gone astray included, MHT"
         claims.append(Claim(what, "a pair", None, float(np.mean(astray)), source="chosen by us"))
-    return claims, examples
+    return claims
 
 
 def _sources(recording: Recording, taken: Taken) -> Array:

@@ -1,13 +1,12 @@
 """The thesis's tables 2.1, 4.1 to 4.24 read again, and its five aircraft tracked by us.
 
-    python -m experiments.papers.clustering_time_window.tables FOLDER [-o OUTPUT] [--json FILE] [--publish]
+    python -m experiments.papers.clustering_time_window.tables FOLDER [--json FILE] [--publish]
 
 FOLDER holds the tables as CSV files, named as t4_09_groundtruth_mode3_902.csv. Checked are the groups of tables 4.1 to
 4.8, the conversion and headings (equations 3.1 to 3.8), and which of an aircraft's plots (tables 4.9 to 4.17) its
 tracks hold without and with the window (tables 4.10 to 4.23). The recording is not public and the tables have no
 times: for our tracks of the same plots the times are chosen by us, a turn of 9.5 s for each plot, more where an
-aircraft has gone further than 220 m/s take it in that time. Into OUTPUT go our tables for the five aircraft, in the
-columns of the thesis, and a figure with its figures 4.1 to 4.15. (Tables 4.25 and 4.26: 183 groups without window in
+aircraft has gone further than 220 m/s take it in that time. (Tables 4.25 and 4.26: 183 groups without window in
 1,130 s, 6.2 s on average, and 119 windows.)
 """
 
@@ -15,14 +14,11 @@ from __future__ import annotations
 
 import argparse
 import csv
-import io
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from assoc._files.output import write_atomically, write_text
 from assoc._types import Array
 from assoc.recordings import Recording, clustering_time_window, estimate_rotation, radar_of, read_plots
 from assoc.recordings.columns import NAUTICAL_MILE
@@ -40,7 +36,6 @@ SPEED = 220.0
 """Metres per second at which aircraft are taken to cross what lies between two rows of a table; chosen by us."""
 PIXEL = 5.0 / 7.0
 """Screen pixels for a nautical mile: what stands in the tables in place of equations 3.1 and 3.2."""
-COLUMNS = ("mode3_dec", "x_px", "y_px", "heading_deg", "altitude_fl")
 
 
 def read(folder: Path, number: int) -> list[dict[str, float]]:
@@ -140,24 +135,24 @@ def _plots(recording: Recording, rows: Array) -> list[tuple[float, int]]:
     return list(zip(recording.ranges[rows].tolist(), recording.identities[rows].tolist(), strict=True))
 
 
-def judge(folder: Path) -> tuple[list[Claim], dict[int, dict[str, Any]]]:
-    """All checks, and for each aircraft its tables and our track."""
+def judge(folder: Path) -> list[Claim]:
+    """All checks."""
     claims = groups(folder)
     tables = {identity: read(folder, numbers[0]) for identity, numbers in AIRCRAFT.items()}
-    shown: dict[int, dict[str, Any]] = {}
     on_grid, total, right, turned = 0, 0, 0, 0
     better = 0
     for identity, numbers in AIRCRAFT.items():
         truth = plane(tables[identity])
         parts = {"truth": truth, "without": plane(read(folder, numbers[1])), "with": plane(read(folder, numbers[2]))}
-        shown[identity] = dict(parts)
-        for places in parts.values():
-            distance, bearing = polar(places).T
+        if identity == 2428:
+            places = len(np.unique(np.round(parts["without"], 2), axis=0))
+        for one in parts.values():
+            distance, bearing = polar(one).T
             steps = bearing / BEARING_STEP
             on_grid += int(
                 ((np.abs(distance - np.round(distance)) < 0.01) & (np.abs(steps - np.round(steps)) < 0.02)).sum()
             )
-            total += len(places)
+            total += len(one)
         printed = np.array([row["heading_deg"] for row in tables[identity]])[1:]
         off = np.abs((headings(truth) - printed + 180.0) % 360.0 - 180.0)
         right, turned = right + int((off[printed > 0] < 1.0).sum()), turned + int((printed > 0).sum())
@@ -169,7 +164,6 @@ def judge(folder: Path) -> tuple[list[Claim], dict[int, dict[str, Any]]]:
             words = f"aircraft {identity}: other plots or repeats in the track {name} the window"
             claims.append(Claim(words, "", None, other, source=f"tables 4.{numbers[0]} and 4.{number}"))
         better += counts["with"] > counts["without"]
-    places = len(np.unique(np.round(shown[2428]["without"], 2), axis=0))
     claims += [
         Claim("aircraft 2428: places in its track without the window", "", 3, places, None, (3, 3),
               source="section 4.2.2.1 against table 4.18"),
@@ -185,73 +179,24 @@ def judge(folder: Path) -> tuple[list[Claim], dict[int, dict[str, Any]]]:
     apart = math.dist((zero["x_px"], zero["y_px"]), (first["x_px"], first["y_px"]))
     claims.append(Claim("table 4.24: pixels between the plot without identity and the first of 958", "", None, apart,
                         None, (0.0, 0.01), source="section 4.2.2.3"))  # fmt: skip
-    ours = ours_of(as_recording(tables), shown)
+    ours = ours_of(as_recording(tables))
     for identity, count in ours.items():
         words = f"aircraft {identity}: plots of its {len(tables[identity])} in our track, times chosen by us"
         claims.append(Claim(words,
                             "", None, count, source=f"table 4.{AIRCRAFT[identity][0]}; chosen by us"))  # fmt: skip
-    return claims, shown
+    return claims
 
 
-def ours_of(recording: Recording, shown: dict[int, dict[str, Any]]) -> dict[int, int]:
+def ours_of(recording: Recording) -> dict[int, int]:
     """Track the five aircraft together, window and time stamps; how many of its plots each one's main track holds."""
-    windows = clustering_time_window(recording, ROTATION, by="time")
     tracker = HypothesisTracker(radar_of(recording))
-    run(tracker, windows)
+    run(tracker, clustering_time_window(recording, ROTATION, by="time"))
     taken = tracker.decided()
     found = {}
-    for identity in shown:
+    for identity in AIRCRAFT:
         own = recording.identities[taken.rows] == identity
-        tracks = taken.tracks[own & (taken.tracks >= 0)]
-        names, counts = np.unique(tracks, return_counts=True)
-        rows = taken.rows[taken.tracks == names[np.argmax(counts)]] if len(names) else np.zeros(0, dtype=int)
-        shown[identity]["ours"] = _screen(recording, rows)
-        shown[identity]["rows"] = rows
-        shown[identity]["recording"] = recording
-        found[identity] = int((recording.identities[rows] == identity).sum())
+        found[identity] = int(np.bincount(taken.tracks[own & (taken.tracks >= 0)], minlength=1).max())
     return found
-
-
-def _screen(recording: Recording, rows: Array) -> Array:
-    places = recording.positions[rows] / NAUTICAL_MILE * PIXEL
-    return places * np.array([1.0, -1.0])
-
-
-def write_tables(folder: Path, shown: dict[int, dict[str, Any]]) -> None:
-    """Our tracks of the five aircraft in the thesis's columns."""
-    for identity, parts in shown.items():
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        recording, rows, places = parts["recording"], parts["rows"], parts["ours"]
-        angles = np.concatenate([[0.0], headings(places)]) if len(places) else []
-        for row, (x, y), angle in zip(rows.tolist(), places, angles, strict=True):
-            level = recording.altitudes[row] / 30.48
-            writer.writerow([recording.identities[row], f"{x:.4f}", f"{y:.4f}", f"{angle:.4f}", f"{level:.0f}"])
-        write_text(folder / f"track_ours_mode3_{identity}.csv", text.getvalue())
-
-
-def draw(shown: dict[int, dict[str, Any]], path: Path) -> None:
-    """Figures 4.11 to 4.15, which hold 4.1 to 4.10, with our tracks beside."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15, 7), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(2, 5, squeeze=False)
-    for column, (identity, parts) in enumerate(shown.items()):
-        for row, names in enumerate((("without", "with"), ("ours",))):
-            panel = panels[row, column]
-            panel.plot(*parts["truth"].T, "o", color="0.8", markersize=6, label="truth")
-            for name, style in zip(names, ("C1x", "C0.") if row == 0 else ("C2.",), strict=True):
-                label = {"without": "without window", "with": "with window", "ours": "ours"}[name]
-                panel.plot(*parts[name].T, style, markersize=5, label=label)
-            panel.invert_yaxis()
-            panel.set_title(f"Mode 3 {identity}{f', figure 4.{11 + column}' if row == 0 else ''}", fontsize=9)
-            panel.set_aspect("equal", adjustable="datalim")
-    for panel in panels[:, 0]:
-        panel.legend(fontsize=7)
-    write_atomically(path, lambda file: figure.savefig(file, format=path.suffix[1:] or "png", dpi=110))
 
 
 def program(arguments: list[str] | None = None) -> int:
@@ -260,23 +205,17 @@ def program(arguments: list[str] | None = None) -> int:
         prog=f"python -m experiments.{NAME}", description="Read the thesis's tables again and track its five aircraft."
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the thesis's tables as CSV files")
-    parser.add_argument("-o", "--output", type=Path, default=Path("results/thesis_tables"), metavar="FOLDER",
-                        help="where to write our tables and the figure (default results/thesis_tables)")  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results here")
     add_publish(parser, NAME)
     chosen = parser.parse_args(arguments)
     if not chosen.folder.is_dir():
         parser.error(f"{chosen.folder}: expected a folder with the thesis's tables")
-    claims, shown = judge(chosen.folder)
+    claims = judge(chosen.folder)
     print_table(claims, "Tables of the thesis on the clustering time window")
-    chosen.output.mkdir(parents=True, exist_ok=True)
-    write_tables(chosen.output, shown)
-    draw(shown, chosen.output / "aircraft.png")
     if chosen.json:
         save_json(chosen.json, claims, NAME, 0, __doc__ or "")
     if chosen.publish:
         publish(claims, NAME, 0, __doc__)
-    print(f"our tables and the figure are in {chosen.output}")
     return 0
 
 

@@ -81,7 +81,7 @@ def rms(squared: Array) -> Array:
     return result
 
 
-def judge(count: int, rng: np.random.Generator) -> tuple[list[Claim], Any]:
+def judge(count: int, rng: np.random.Generator) -> list[Claim]:
     """Both simulations, ensemble sizes, noises and what is measured."""
     claims: list[Claim] = []
     fixed = Simulation(np.full(STEPS, ATTACK), Q_SIGMA, count, rng)
@@ -102,11 +102,7 @@ def judge(count: int, rng: np.random.Generator) -> tuple[list[Claim], Any]:
     claims += _against("changing attack, N 100", others[100], CHANGING_RMS, "section d, changing attack")
     claims += _sizes("changing attack", {size: rms(squared) for size, squared in others.items()}, turned, 200)
     claims += _measured(fixed, rng) + _limits(fixed, changing)
-    example = {
-        name: (one.truth[:, 0], one.follow(EnsembleKalmanFilter(one.motion, size, rng))[:, 0])
-        for name, one, size in (("fixed", fixed, 300), ("changing", changing, 100))
-    }
-    return claims, (example, {size: rms(squared) / base for size, squared in by_size.items()})
+    return claims
 
 
 def _against(label: str, squared: Array, paper: tuple[float, ...], source: str) -> list[Claim]:

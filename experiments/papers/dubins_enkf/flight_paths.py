@@ -117,8 +117,9 @@ def _tightest(one: Path) -> float:
     return 1 / max(abs(segment.curvature) for segment in one.segments)
 
 
-def draw(left: Any, right: Any, shown: dict[str, Any]) -> None:
+def draw(figure: Any, shown: dict[str, Any]) -> None:
     """Figure 2 with our path around the obstacle, and figure 3 with ours beside the paper's."""
+    left, right = figure.subplots(1, 2)
     for panel in (left, right):
         turn = np.linspace(0, 2 * np.pi, 100)
         panel.fill(

@@ -74,18 +74,16 @@ def experiment(quick: bool, rng: np.random.Generator) -> tuple[list[Claim], Any]
     """Compare fixed EKFs, the paper's rules, the tuned rules and the IMM on C to H; --quick has fewer runs, no less."""
     count = 40 if quick else 400
     claims: list[Claim] = []
-    shown: dict[str, dict[str, Array]] = {}
     example = None
     for name, flight in {**SCENARIOS, **NEW_SCENARIOS}.items():
         batch = Batch.draw([flight], count, rng)
-        found, shown[name] = judge(name, flight, batch, rng)
-        claims += found
+        claims += judge(name, flight, batch, rng)
         example = example or batch
-    return claims, (shown, example)
+    return claims, example
 
 
-def judge(name: str, flight: Flight, batch: Batch, rng: np.random.Generator) -> tuple[list[Claim], dict[str, Array]]:
-    """All filters on one scenario; the squared errors that the figure shows."""
+def judge(name: str, flight: Flight, batch: Batch, rng: np.random.Generator) -> list[Claim]:
+    """All filters on one scenario."""
     data = tuned_data()
     tried = {label: errors(ExtendedKalmanFilter(m), batch) for turns in (False, True) for label, m in fixed(turns)}
 
@@ -141,28 +139,10 @@ def judge(name: str, flight: Flight, batch: Batch, rng: np.random.Generator) -> 
     for phase, rows in (("straight flight", straight), ("turns and 5 s after", ~straight)):
         for what, squared in (("tuned rules", tuned), ("IMM", mixed)):
             claims.append(Claim(f"{name}: RMSE in {phase}, {what}", "m", None, rmse(squared[rows]), source=CHOSEN))
-    return claims, {"best fixed EKF": plain, "paper's rules, tuned sets": rules, "tuned rules": tuned, "IMM": mixed}
+    return claims
 
 
-def draw(figure: Any, shown: Any) -> None:
-    """Draw the error over time for each scenario, turns shaded, above the paper's figures 3 to 13."""
-    errors_by_scenario, example = shown
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.1, 1.0))
-    panels = upper.subplots(2, 3, sharey=True).ravel()
-    for panel, (name, results) in zip(panels, errors_by_scenario.items(), strict=False):
-        for label, squared in results.items():
-            panel.plot(np.arange(2, len(squared) + 2), np.sqrt(squared.mean(axis=1)), label=label, linewidth=1.2)
-        for turn in {**SCENARIOS, **NEW_SCENARIOS}[name].turns:
-            panel.axvspan(turn.start, turn.end, color="0.9")
-        panel.axhline(PRINTED["raw"], color="black", linestyle=":", linewidth=0.8, label="raw measurements")
-        panel.set(xlabel="time (s)", title=f"scenario {name}", ylim=(0, 150))
-    for panel in panels[::3]:
-        panel.set_ylabel("RMSE of position (m)")
-    panels[0].legend(fontsize=7, loc="upper left")
-    figures.draw_published(lower, example)
-
-
-program = partial(main, "papers.fuzzy_ekf", experiment, __doc__, figure=(draw, (14, 14)))
+program = partial(main, "papers.fuzzy_ekf", experiment, __doc__, figure=(figures.draw_published, (14, 7)))
 
 
 if __name__ == "__main__":

@@ -109,12 +109,11 @@ def follow(one: Filter[Gaussian], sensor: Measurement, seen: Array) -> tuple[Arr
     return np.stack(means), float(np.mean(spreads))
 
 
-def judge(count: int, rng: np.random.Generator) -> tuple[list[Claim], dict[str, Runs]]:
+def judge(count: int, rng: np.random.Generator) -> list[Claim]:
     """Simulation 1 in every reading, variable by variable, then simulation 2."""
     claims: list[Claim] = []
-    shown = {}
     for reading in READINGS:
-        runs = shown[reading] = simulate(reading, count, rng)
+        runs = simulate(reading, count, rng)
         label = f"simulation 1, reading {reading}"
         short, plain = (runs.squared(name)[..., :3].sum(axis=-1) for name in ("modified", "EKF"))
         for i, variable in enumerate(VARIABLES):
@@ -154,12 +153,10 @@ def judge(count: int, rng: np.random.Generator) -> tuple[list[Claim], dict[str, 
         Claim("simulation 1: largest printed RMSE / root of Q_k", "", None, max(PRINTED["EKF"]) / Q**0.5,
               source="tables 4.2 and 4.3"),
     ]  # fmt: skip
-    second, track = simulation_2(count, rng)
-    shown["simulation 2"] = track
-    return claims + second, shown
+    return claims + simulation_2(count, rng)
 
 
-def simulation_2(count: int, rng: np.random.Generator) -> tuple[list[Claim], Runs]:
+def simulation_2(count: int, rng: np.random.Generator) -> list[Claim]:
     """x, y and z are measured with R_k; the modified EKF has nothing to modify there."""
     motion = UnitRates(Q * np.eye(6))
     truth = draw_truth(motion, count, rng)
@@ -183,29 +180,4 @@ def simulation_2(count: int, rng: np.random.Generator) -> tuple[list[Claim], Run
                   rmse(squared[-1]), holds=bool(abs(ENDS["EKF"][i] - ENDS["real"][i]) <= 2 * rmse(squared[-1])),
                   source="section 4.4.2, figure 4.9 less figure 4.8; within two RMSE, chosen by us")
         )  # fmt: skip
-    return claims, runs
-
-
-def draw_variables(figure: object, shown: dict[str, Runs]) -> None:
-    """Figures 4.1 to 4.6 (one run), 4.7 (errors) and 4.8 to 4.10 (paths)."""
-    runs, panels = shown["sigmas"], figure.subplots(2, 4)  # type: ignore[attr-defined]
-    steps = np.arange(STEPS + 1)
-    for i, variable in enumerate(VARIABLES):
-        panel = panels[i // 3, i % 3]
-        panel.plot(steps, runs.truth[:, 0, i], "C2", label="truth")
-        panel.plot(steps, runs.estimates["EKF"][:, 0, i], "C0", label="EKF")
-        panel.plot(steps, runs.estimates["modified"][:, 0, i], "C3--", label="modified EKF")
-        panel.set(title=f"{variable} ({'m' if i < 3 else 'm/s'}), as figure 4.{i + 1}", xlabel="step")
-    panels[0, 0].legend(fontsize=8)
-    errors = panels[0, 3]
-    for name, style in (("EKF", "C0"), ("modified", "C3--")):
-        squared = runs.squared(name).mean(axis=1)
-        errors.plot(steps[1:], np.sqrt(squared[:, :3].sum(axis=1)), style, label=f"{name}, position (m)")
-        errors.plot(steps[1:], np.sqrt(squared[:, 3:].sum(axis=1)), style, alpha=0.4, label=f"{name}, velocity (m/s)")
-    errors.set(title="RMSE over all runs, as figure 4.7", xlabel="step", ylim=(0, None))
-    errors.legend(fontsize=7)
-    path, second = panels[1, 3], shown["simulation 2"]
-    path.plot(*second.truth[:, 0, :2].T, "C2", label="truth")
-    path.plot(*second.estimates["EKF"][:, 0, :2].T, "C0", linewidth=0.8, label="EKF")
-    path.set(title="x and y (m), as figures 4.8, 4.9", aspect="equal", adjustable="datalim")
-    path.legend(fontsize=8)
+    return claims
