@@ -11,7 +11,7 @@ refinement="none" until 900 ants have walked, with refinement="full" for three c
 does not depend on the machine. A figure is the mean excess over the optimum in percent; intervals are 95 %, from
 resampling problems. The best setting is chosen on every second problem, and judged on the others.
 
-Figures: mean excess over alpha and beta, and over rho and ants, the other two averaged.
+The gallery draws the published figures: mean excess over alpha and beta, and over rho and ants, the other two averaged.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import argparse
 import itertools
 import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -34,7 +33,7 @@ from assoc.sweeps import Setting, Study, load
 from assoc.sweeps.bootstrap import mean_interval
 from assoc.sweeps.sources import StudySource
 from experiments.common.claims import Claim, load_json, print_table, save_json
-from experiments.common.command import add_publish, publish, save_figure
+from experiments.common.command import add_publish, publish
 from experiments.common.results import result_file
 from experiments.metaheuristics.problems import problem
 from experiments.metaheuristics.running import UNLIMITED, log
@@ -189,7 +188,6 @@ def program(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cases", nargs="+", default=names, metavar="NAME", help="; ".join(names))
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the ants (default 0)")
     parser.add_argument("--json", metavar="FILE", help="write the results here")
-    parser.add_argument("--figures", metavar="FOLDER", default=".", help="write surfaces-*.png here")
     add_publish(parser, NAME)
     chosen = parser.parse_args(arguments)
     for one in chosen.cases:
@@ -224,10 +222,6 @@ def program(arguments: Sequence[str] | None = None) -> int:
         save_json(chosen.json, claims, NAME, chosen.seed, __doc__ or "")
     if chosen.publish:
         publish(claims, NAME, chosen.seed, __doc__)
-    for name, (shown, size) in pictures(claims).items():
-        path = Path(chosen.figures) / f"{name}.png"
-        save_figure(path, draw, shown, size)
-        print(f"{path}: written")
     return 0
 
 

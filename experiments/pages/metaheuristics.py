@@ -8,7 +8,6 @@ from experiments.common.claims import Claim
 from experiments.common.results import Results, number, table
 from experiments.metaheuristics import parts, sweep
 from experiments.metaheuristics.ablation import WORKERS
-from experiments.metaheuristics.against_peers import BESIDE, CORES, Entry
 from experiments.metaheuristics.problems import PROBLEMS
 
 
@@ -60,21 +59,6 @@ def workers() -> str:
     return table(["excess in %", *heads], rows)
 
 
-def beside_chils() -> str:
-    """What CHILS costs more than tabu search, by seconds and cores."""
-    r = Results("metaheuristics.against_peers")
-    groups = [claim.quantity.split(": ")[0] for claim in r.claims if claim.quantity.endswith(": problems")]
-    rows = []
-    for cores in CORES:
-        for own, theirs in BESIDE:
-            ours, chils = Entry("tabu", own, cores), Entry("chils", theirs, cores)
-            claims = [r[f"{group}: {chils.words}, less {ours.words}"] for group in groups]
-            words = f"{theirs:g} s of CHILS, {own:g} s of `tabu`, {'one core' if cores == 1 else f'{cores} cores'}"
-            rows.append([words, *map(_cell, claims)])
-    heads = [f"{group}, {r[f'{group}: problems'].ours:.0f} problems" for group in groups]
-    return table(["CHILS's cost less `tabu`'s, in %", *heads], rows)
-
-
 def settings() -> str:
     """Best setting and advice of every case."""
     r = Results("metaheuristics.sweep")
@@ -105,6 +89,5 @@ def _plain(claim: Claim) -> str:
 TABLES = {
     **{f"parts-{solver}": _of_solver(solver) for solver in parts.SOLVERS},
     "workers": workers,
-    "chils": beside_chils,
     "settings": settings,
 }

@@ -12,8 +12,8 @@ import assoc
 from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 from assoc.solvers.aco.parameters import AcoParameters
-from experiments.common.claims import Claim
-from experiments.metaheuristics import ablation, against_peers, parts, running, sweep
+from experiments.common.claims import Claim, load_json
+from experiments.metaheuristics import ablation, parts, running, sweep
 from experiments.metaheuristics.problems import problem
 
 
@@ -169,9 +169,9 @@ def test_sweep_finds_the_best_setting(tmp_path, monkeypatch, capsys):
     cases = tuple(sweep.Case("ghosts 10", 2, how) for how in sweep.HOW)
     monkeypatch.setattr(sweep, "CASES", cases)
     file = tmp_path / "results.json"
-    assert sweep.program(["--json", str(file), "--figures", str(tmp_path)]) == 0
+    assert sweep.program(["--json", str(file)]) == 0
     capsys.readouterr()
-    assert (tmp_path / "surfaces-ghosts-10.png").stat().st_size > 10_000
+    assert list(sweep.pictures(load_json(file))) == ["surfaces-ghosts-10"]
     claims = {one["quantity"]: one["ours"] for one in json.loads(file.read_text())["claims"]}
     # the same runs by hand
     one = problem("ghosts 10", 0)
@@ -204,64 +204,12 @@ def test_claims_of_a_case():
     assert claims[f"rank of table 1's advice of {len(every)}"].ours == (share + 1) / 2
 
 
-@pytest.mark.slow
-def test_answers_of_ours_and_peers(tmp_path, monkeypatch, capsys):
-    entries = (against_peers.Entry("tabu", 0.3), against_peers.Entry("highs", 20.0))
-    monkeypatch.setattr(against_peers, "ENTRIES", entries)
-    kept, file = tmp_path / "answers.json", tmp_path / "results.json"
-    words = ["--problems", "ghosts 10", "--count", "2", "--answers", str(kept), "--json", str(file)]
-    assert against_peers.program([*words, "--only", "tabu", "highs"]) == 0
-    claims = {one["quantity"]: one for one in json.loads(file.read_text())["claims"]}
-    assert claims["ghosts 10: problems"]["ours"] == 2
-    # both find the optimum of so small a scene
-    assert claims["ghosts 10: tabu, 0.3 s, excess"]["ours"] == pytest.approx(0.0, abs=1e-6)
-    assert claims["ghosts 10: highs, 20 s, excess"]["ours"] == pytest.approx(0.0, abs=1e-6)
-    assert claims["ghosts 10: tabu, 0.3 s, worst less the best peer"]["holds"]
-    optima = [assoc.assign(problem("ghosts 10", against_peers.FIRST + number)).cost for number in range(2)]
-    answers = json.loads(kept.read_text())
-    assert [answers[f"ghosts 10 {against_peers.FIRST + i}: highs, 20 s"][0] for i in range(2)] == pytest.approx(optima)
-    # what is kept is not run again
-    monkeypatch.setattr(against_peers, "_ask", lambda *_: pytest.fail("asked again"))
-    assert against_peers.program([*words, "--only", "tabu", "highs"]) == 0
-    capsys.readouterr()
-
-
-def test_claims_against_peers():
-    ours, peer = against_peers.Entry("aco", 5.0), against_peers.Entry("chils", 60.0)
-    lost = against_peers.Entry("highs", 60.0)
-    costs = {ours: [-99.0, -50.0], peer: [-100.0, -49.0], lost: [np.inf, -50.0]}
-    taken = {one: [1.0, 3.0] for one in costs}
-    claims = {claim.quantity: claim for claim in against_peers.claims_of("ghosts 40", costs, taken)}
-    assert claims["ghosts 40: aco, 5 s, excess"].ours == pytest.approx(0.5)
-    assert claims["ghosts 40: highs, 60 s, problems without an answer"].ours == 1
-    assert "ghosts 40: highs, 60 s, excess" not in claims
-    assert claims["ghosts 40: chils, 60 s, processor time"].ours == 2.0
-    worst = claims["ghosts 40: aco, 5 s, worst less the best peer"]
-    assert worst.ours == pytest.approx(1.0) and not worst.holds
-    # CHILS is 1 below -99, and 1 above -50
-    less = claims["ghosts 40: chils, 60 s, less aco, 5 s"]
-    assert less.ours == pytest.approx(50.0 * (-1.0 / 99.0 + 1.0 / 50.0))
-    assert not claims["ghosts 40: chils, 60 s, less aco, 5 s, least"].holds
-
-
-def test_two_cores_are_compared_with_two_cores():
-    ours, peer = against_peers.Entry("tabu", 1.0, 2), against_peers.Entry("chils", 1.0, 2)
-    costs = {ours: [-50.0, -50.0], peer: [-49.0, -49.0], against_peers.Entry("chils", 1.0): [-60.0, -60.0]}
-    names = [claim.quantity for claim in against_peers.claims_of("ghosts 40", costs, {one: [1.0] for one in costs})]
-    assert [name for name in names if "less tabu" in name] == [
-        "ghosts 40: chils, 1 s on 2 cores, less tabu, 1 s on 2 cores",
-        "ghosts 40: chils, 1 s on 2 cores, less tabu, 1 s on 2 cores, least",
-    ]
-
-
 @pytest.mark.parametrize(
     ("program", "words", "said"),
     [
         (ablation.program, ["--problems", "nothing"], "unknown 'nothing'"),
         (ablation.program, ["--solvers", "exact"], "unknown 'exact'"),
         (ablation.program, ["--count", "1"], "at least 2"),
-        (against_peers.program, ["--only", "nothing"], "unknown 'nothing'"),
-        (against_peers.program, ["--count", "1"], "at least 2"),
         (sweep.program, ["--cases", "nothing"], "unknown 'nothing'"),
         (sweep.program, ["--quick", "--publish"], "needs the full run"),
     ],
