@@ -8,12 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from assoc._system.compiled import njit
 from assoc._types import Array
-from assoc.costs.conversion import convert
+from assoc.costs.symmetric import inverse_by_cofactors
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.sensors.codes import BEARING, CODES
+from assoc.sensors.kernels.dispatch import convert_one
+from assoc.sensors.kernels.radar import START_REACH
+
+HEIGHTS = 3.0
+"""Where no sensor measures full positions, heights are sought this many half heights around the middle."""
 
 
 class SensorArrays(NamedTuple):
@@ -51,7 +57,7 @@ class ScanArrays(NamedTuple):
     start: Array
     """Where each sensor's measurements begin, int64 (S + 1,)."""
     centre: Array
-    """Position that a measurement points at, (N, 3); see `assoc.costs.conversion.convert`."""
+    """Position that a measurement points at, (N, 3); see `convert`."""
     spread: Array
     """Covariance of that position (xx, xy, xz, yy, yz, zz), (N, 6), widened for gating."""
     information: Array
@@ -128,16 +134,49 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
         else:
             z[rows, : sensors.dim[s]] = measured[:, : sensors.dim[s]]
         index[rows] = order + 1
-    centre, spread, information = convert(
-        sensors.code,
-        sensors.dim,
-        sensors.place,
-        sensors.covariance,
-        sensors.middle,
-        sensors.half,
-        z,
-        owner,
-        reach,
-        least,
-    )
+    centre, spread, information = convert(sensors, z, owner, reach, least)
     return ScanArrays(z, owner, start, centre, spread, information), index
+
+
+@njit
+def convert(sensors: SensorArrays, z: Array, owner: Array, reach: float, least: float) -> tuple[Array, Array, Array]:
+    """Convert measurements (N, 3) to positions.
+
+    The covariance is the linearised one, widened where the measurement bends so much that its ellipsoid of
+    chi-square value `least` would not hold all positions within `reach`, the largest gate: by the sagitta of
+    the arc for radars, and by the ground ranges of all heights sought where the height is open.
+
+    Returns
+    -------
+    centre (N, 3), spread (N, 6), information (N, 6)
+        Position, covariance as (xx, xy, xz, yy, yz, zz) for the gate, and the inverse covariance for a start,
+        which does not depend on the gate. Zeros for bearings, and of x and y alone for measurements that
+        leave the height open.
+    """
+    # out of the record first: a field read in the loop costs a reference count each time
+    code, dim, place, covariance = sensors.code, sensors.dim, sensors.place, sensors.covariance
+    middle, half = sensors.middle[2], sensors.half[2]
+    count = len(z)
+    centre, spread, information = np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6))
+    heights = (middle - HEIGHTS * half, middle, middle + HEIGHTS * half)
+    for n in range(count):
+        s = owner[n]
+        if code[s] == BEARING:
+            continue
+        R = covariance[s]
+        U = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
+        measured, at = (z[n, 0], z[n, 1], z[n, 2]), (place[s, 0], place[s, 1], place[s, 2])
+        # as wide as the gate asks, then as for any start
+        _, wide = convert_one(code[s], dim[s], measured, at, U, heights, reach, least)
+        there, c = convert_one(code[s], dim[s], measured, at, U, heights, START_REACH, START_REACH)
+        ok, i0, i1, i2, i3, i4, i5 = inverse_by_cofactors(c)
+        if not ok:
+            # too flat to invert: a ball of the same size will do for a start
+            i0 = i3 = i5 = 1.0 / (c[0] + c[3] + (c[5] if dim[s] == 3 else 0.0))
+            i1 = i2 = i4 = 0.0
+        centre[n, 0], centre[n, 1], centre[n, 2] = there
+        for i, value in enumerate(wide):
+            spread[n, i] = value
+        for i, value in enumerate((i0, i1, i2, i3, i4, i5)):
+            information[n, i] = value
+    return centre, spread, information

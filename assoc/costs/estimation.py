@@ -20,8 +20,7 @@ import numpy as np
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
-from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.conversion import HEIGHTS
+from assoc.costs.arrays import HEIGHTS, ScanArrays, SensorArrays
 from assoc.costs.residuals import (
     CENTRE,
     CODE,
@@ -240,7 +239,7 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
         Measurement (row of `scan`) of each sensor, or -1.
     gating : bool
         If true, positions and covariances come back empty, and chi-square is infinite where the height lies
-        beyond those sought (`assoc.costs.conversion.HEIGHTS`) and no sensor measures full positions.
+        beyond those sought (`assoc.costs.arrays.HEIGHTS`) and no sensor measures full positions.
 
     Returns
     -------

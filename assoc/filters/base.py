@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.filters.kernels.gates import pairs
-from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, STATUSES
+from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, PLAIN, STATUSES
 from assoc.filters.kernels.linear_algebra import all_factors
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
@@ -116,6 +116,8 @@ class Filter(ABC, Generic[S]):
     ----------
     motion : Motion
     """
+
+    kind = PLAIN
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -262,7 +264,7 @@ class Filter(ABC, Generic[S]):
         # read once: another thread may ask with another sensor
         seen = self._seen
         if seen[0] is not sensor:
-            seen = self._seen = (sensor, observation(sensor, self.motion))
+            seen = self._seen = (sensor, observation(sensor, self.motion, self.kind))
         found: Observation = seen[1]
         return found
 
@@ -308,6 +310,25 @@ def factors(covariance: Array) -> Array:
     if bad >= 0:
         complain(BAD_COVARIANCE + STATUSES * bad)
     return found
+
+
+def given_points(o: Observation, points: Array, z: Array) -> tuple[Array, Array, Array]:
+    """What kernels need of a user's model at points (B, m, n).
+
+    Returns
+    -------
+    models
+        Packed, with the measurements of the points relative to the first.
+    residuals (B, d)
+        Of measurements z (B, d) from those of the first points; (0, d) where z is empty.
+    first (B, d)
+        Measurements of the first points.
+    """
+    B, m, n = points.shape
+    measured = o.model.measure(points.reshape(-1, n))
+    first = measured[::m]
+    relative = o.model.residual(measured, np.repeat(first, m, axis=0)).reshape(B, m, o.dim)
+    return o.given(relative), np.ascontiguousarray(o.model.residual(z, first)) if len(z) else z, first
 
 
 def check_dimension(state: Gaussian, dim: int) -> Gaussian:

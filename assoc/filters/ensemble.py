@@ -12,7 +12,16 @@ from assoc._parameters import is_whole, positive
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
+from assoc.filters.base import (
+    Expected,
+    Filter,
+    Update,
+    check_dimension,
+    complain,
+    given_points,
+    measured_array,
+    update_of,
+)
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.points import ensemble_update, move_ensemble
 from assoc.filters.measurement import Measurement, Observation
@@ -99,11 +108,8 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
 
     def predict(self, state: Ensemble, dt: float) -> Ensemble:
         """Return the ensembles dt seconds later, each member with noise of its own."""
-        members = state.members
+        members, motion = self._checked(state), self.motion
         B, N, n = members.shape
-        if n != self.motion.dim:
-            raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
-        motion = self.motion
         positive(dt, "dt", zero=True)
         if motion.linear:
             moved, F = _NOTHING3, motion.jacobian(_NOTHING2, dt)
@@ -132,40 +138,34 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
     def update(self, state: Ensemble, measured: Array, sensor: Measurement) -> Update[Ensemble]:
         """Correct each target with a measurement of its own; see `Filter.update`."""
         o = self.observe(sensor)
-        z = measured_array(measured, len(state.members), o.dim)
-        return self._run(state, z, o, True)
+        return self._run(state, measured_array(measured, len(state.members), o.dim), o)[0]
 
     def expected(self, state: Ensemble, sensor: Measurement) -> Expected:
         """Return the expected measurements and their covariances; see `Filter.expected`."""
         o = self.observe(sensor)
-        done = self._run(state, np.zeros((len(state.members), o.dim)), o, False)
-        return Expected(done.innovation, done.covariance)
+        done, first = self._run(state, np.zeros((0, o.dim)), o)
+        return Expected(done.innovation + first, done.covariance)
 
-    def _run(self, state: Ensemble, z: Array, o: Observation, correcting: bool) -> Update[Ensemble]:
-        members = state.members
-        B, N, n = members.shape
-        if n != self.motion.dim:
-            raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
-        d = o.dim
-        given, first, base = _NOTHING3, _NOTHING2, None
+    def _run(self, state: Ensemble, z: Array, o: Observation) -> tuple[Update[Ensemble], Array]:
+        """The kernel's results, and what is to be added to expected measurements."""
+        members = self._checked(state)
+        (B, N, _), d = members.shape, o.dim
+        models, first = o.packed, np.zeros((1, d))
         if o.code < 0:
-            seen = o.model.measure(members.reshape(-1, n)).reshape(B, N, d)
-            base = np.ascontiguousarray(seen[:, 0])
-            repeated = np.repeat(base, N, axis=0)
-            given = np.ascontiguousarray(o.model.residual(seen.reshape(-1, d), repeated).reshape(B, N, d))
-            first = np.ascontiguousarray(o.model.residual(z, base)) if correcting else z
-        shocks = self.rng.standard_normal((B, N, d)) if correcting else _NOTHING3
-        out = np.empty(members.shape if correcting else (0, 0, 0))
-        v, S, nis, ll = np.empty((B, d)), np.empty((B, d, d)), np.empty(B), np.empty(B)
-        status = ensemble_update(
-            members, z, o.code, o.place, o.columns, o.matrix, o.covariance, given, first, shocks, correcting,
-            out, v, S, nis, ll,
-        )  # fmt: skip
+            models, z, first = given_points(o, members, z)
+        shocks = self.rng.standard_normal((B, N, d)) if len(z) else _NOTHING3
+        out, rest = np.empty(members.shape), np.empty(B * (d + d * d + 2))
+        status = ensemble_update(members, z, models, shocks, out, rest)
         if status != GOOD:
             complain(status)
-        if base is not None and not correcting:
-            v += base
-        return Update(_ensemble(out), v, S, nis, ll)
+        return update_of(_ensemble(out), rest, d), first
+
+    def _checked(self, state: Ensemble) -> Array:
+        """Members of the right dimension."""
+        n = state.members.shape[2]
+        if n != self.motion.dim:
+            raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")
+        return state.members
 
 
 def _lower_roots(Q: Array) -> Array:

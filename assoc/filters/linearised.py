@@ -20,7 +20,7 @@ from assoc.filters.base import (
     update_of,
 )
 from assoc.filters.kernels.gates import expect
-from assoc.filters.kernels.gaussian import GOOD, PLAIN, STATUSES, follow
+from assoc.filters.kernels.gaussian import GOOD, STATUSES, follow
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.gaussian import step as step_kernel
 from assoc.filters.kernels.gaussian import update as update_kernel
@@ -29,7 +29,6 @@ from assoc.filters.motion.models import LinearMotion, Motion
 from assoc.filters.state import Gaussian, gaussian
 
 _NOTHING2 = np.zeros((0, 0))
-_NO_ROW2, _NO_ROW3 = np.zeros((1, 0)), np.zeros((1, 0, 0))
 _FLOAT = np.dtype(np.float64)
 _empty = np.empty
 _PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
@@ -37,8 +36,6 @@ _PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
 
 class GaussianFilter(Filter[Gaussian]):
     """What Kalman's filter and those that linearise have in common."""
-
-    kind = PLAIN
 
     def __init__(self, motion: Motion) -> None:
         super().__init__(motion)
@@ -89,16 +86,16 @@ class GaussianFilter(Filter[Gaussian]):
         known = self._plan
         if known[0] is not sensor or known[1] != dt:
             known = self._make_plan(sensor, dt)
-        _, _, seen, code, c, models, d, n = known
+        _, _, models, motion, d, n = known
         before, z = state.mean, measured
-        if models is None or before.shape[0] != 1:
+        if motion is None or before.shape[0] != 1:
             return super().step(state, dt, measured, sensor)
         if before.shape[1] != n:
             check_dimension(state, n)
         if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (1, d) or not z.flags.c_contiguous:
             z = measured_array(measured, 1, d)
         mean, P, rest = _empty((1, n)), _empty((1, n, n)), _empty(d + d * d + 2)
-        status = step_kernel(before, state.covariance, models, z, seen, code, c, self.kind, mean, P, rest)
+        status = step_kernel(before, state.covariance, motion, z, models, mean, P, rest)
         if status != GOOD:
             complain(status)
         return update_of(gaussian(mean, P), rest, d)
@@ -106,8 +103,8 @@ class GaussianFilter(Filter[Gaussian]):
     def _make_plan(self, sensor: Measurement, dt: float) -> tuple[Any, ...]:
         """What `step` needs to know of a sensor and a time step; the last plan is remembered."""
         o, n, d = self.observe(sensor), self.motion.dim, self.observe(sensor).dim
-        models = None if self._linear is None or o.code < 0 else self._linear.models(dt)[2]
-        plan = self._plan = (sensor, dt, o.packed, o.code, len(o.columns), models, d, n)
+        motion = None if self._linear is None or o.code < 0 else self._linear.models(dt)[2]
+        plan = self._plan = (sensor, dt, o.packed, motion, d, n)
         return plan
 
     def run(
@@ -119,18 +116,16 @@ class GaussianFilter(Filter[Gaussian]):
             return super().run(state, measured, sensor, dt)
         check_dimension(state, self.motion.dim)
         z, times = self._steps(state, measured, sensor, dt)
-        models = [linear.matrices(step) for step in (times if len({*times}) > 1 else times[:1])]
-        F, Q = np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
+        motion = np.concatenate(
+            [linear.models(step)[2] for step in (times if len({*times}) > 1 else times[:1])], axis=1
+        )
         K, (B, n) = len(z), state.mean.shape
-        means, Ps, nis, ll = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((K, B)), np.empty((K, B))
-        status = follow(
-            state.mean, state.covariance, F, Q, z, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind,
-            means, Ps, nis, ll,
-        )  # fmt: skip
+        means, Ps, scores = np.empty((K, B, n)), np.empty((K, B, n, n)), np.empty((2, K, B))
+        status = follow(state.mean, state.covariance, motion, z, o.packed, means, Ps, scores)
         if status != GOOD:
             step, target = divmod(status // STATUSES, B)
             complain(status % STATUSES + STATUSES * target, f" at step {step}")
-        return History(means, Ps, nis, ll, gaussian(means[-1], Ps[-1]))
+        return History(means, Ps, scores[0], scores[1], gaussian(means[-1], Ps[-1]))
 
     def move(self, state: Gaussian, dt: float) -> tuple[Gaussian, Array]:
         """`predict`, and the covariance P F' of the states before and after it."""
@@ -141,10 +136,10 @@ class GaussianFilter(Filter[Gaussian]):
         """Correct each target with a measurement of its own; see `Filter.update`."""
         seen = self._seen
         o = seen[1] if seen[0] is sensor else self.observe(sensor)
-        return self.correct(state, measured, o, o.covariance)
+        return self.correct(state, measured, o)
 
-    def correct(self, state: Gaussian, measured: Array, o: Observation, R: Array) -> Update[Gaussian]:
-        """Correct with a measurement covariance R (B or 1, d, d) of the caller's."""
+    def correct(self, state: Gaussian, measured: Array, o: Observation, scale: Array | None = None) -> Update[Gaussian]:
+        """Correct, on request with the measurement covariance multiplied by a scale for each target, (B,)."""
         mean = state.mean
         B, n = mean.shape
         d = o.dim
@@ -153,15 +148,14 @@ class GaussianFilter(Filter[Gaussian]):
         z = measured
         if type(z) is not np.ndarray or z.dtype is not _FLOAT or z.shape != (B, d) or not z.flags.c_contiguous:
             z = measured_array(measured, B, d)
-        given, slopes = _NO_ROW2, _NO_ROW3
+        models = o.packed
         if o.code < 0:
-            given = np.ascontiguousarray(o.model.residual(z, o.model.measure(mean)))
-            slopes = np.ascontiguousarray(o.model.jacobian(mean))
+            z = np.ascontiguousarray(o.model.residual(z, o.model.measure(mean)))
+            models = o.given(o.model.jacobian(mean))
+        if scale is not None:
+            models = o.with_noise(models, scale)
         new_mean, new_P, rest = _empty((B, n)), _empty((B, n, n)), _empty(B * (d + d * d + 2))
-        status = update_kernel(
-            mean, state.covariance, z, o.code, o.place, o.columns, o.matrix, R, given, slopes, self.kind,
-            new_mean, new_P, rest,
-        )  # fmt: skip
+        status = update_kernel(mean, state.covariance, z, models, new_mean, new_P, rest)
         if status != GOOD:
             complain(status)
         return update_of(gaussian(new_mean, new_P), rest, d)
@@ -173,6 +167,4 @@ class GaussianFilter(Filter[Gaussian]):
         if o.code < 0:
             H = o.model.jacobian(state.mean)
             return Expected(o.model.measure(state.mean), H @ state.covariance @ H.transpose(0, 2, 1) + o.covariance)
-        return Expected(
-            *expect(state.mean, state.covariance, o.code, o.place, o.columns, o.matrix, o.covariance, self.kind)
-        )
+        return Expected(*expect(state.mean, state.covariance, o.packed, o.dim))

@@ -9,14 +9,14 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.kernels.gaussian import GIVEN, LINEAR
+from assoc.filters.kernels.gaussian import GIVEN, LINEAR, PLAIN
 from assoc.filters.motion.models import Motion, differences
 from assoc.filters.state import finite, positive_definite
 from assoc.sensors.base import Sensor
 from assoc.sensors.codes import CODES, POSITION
 
 _NO_MATRIX = np.zeros((0, 0))
-_NO_PLACE = np.zeros(3)
+_NO_POSITION = np.zeros(3)
 
 
 class LinearMeasurement:
@@ -100,19 +100,37 @@ Measurement = Sensor | LinearMeasurement | FunctionMeasurement
 
 
 class Observation(NamedTuple):
-    """A measurement model in the form that the kernels take; see `assoc.filters.kernels.gaussian.update`."""
+    """A measurement model in the form that the kernels take."""
 
     code: int
+    """That of a sensor (`assoc.sensors.codes`), LINEAR or GIVEN."""
     dim: int
-    place: Array
-    columns: Array
-    matrix: Array
     covariance: Array
     """(1, d, d)."""
     model: FunctionMeasurement
     """The user's model; used only where `code` is GIVEN."""
     packed: Array
-    """Place, columns (the bits of integers), matrix and covariance in one piece."""
+    """All that kernels need, in one piece, (1, ...); see `assoc.filters.kernels.gaussian.unpack`."""
+
+    def given(self, values: Array) -> Array:
+        """Packed models, one for each target, with what the user's functions gave for it, (B, rows, columns)."""
+        B, rows, columns = values.shape
+        empty = pack(GIVEN, PLAIN, _NO_POSITION, np.arange(columns), np.zeros((rows, columns)), self.covariance)
+        models = np.repeat(empty, B, axis=0)
+        models[:, 6 + columns : -self.covariance.size] = values.reshape(B, rows * columns)
+        return models
+
+    def with_noise(self, models: Array, scale: Array) -> Array:
+        """Packed models whose covariances are multiplied by the scale of each target, (B,)."""
+        scaled = np.repeat(models, len(scale), axis=0) if len(models) == 1 else models.copy()
+        scaled[:, -self.covariance.size :] *= scale[:, None]
+        return scaled
+
+
+def pack(code: int, kind: int, position: Array, columns: Array, matrix: Array, covariance: Array) -> Array:
+    """Put a measurement model in one piece, (1, ...), integers of `columns` by their bits."""
+    bits = columns.astype(np.int64).view(np.float64)
+    return np.concatenate(([code, kind, len(columns)], position, bits, matrix, covariance), axis=None)[None]
 
 
 class _SensorAsFunction(FunctionMeasurement):
@@ -163,16 +181,8 @@ def _velocity_columns(motion: Motion) -> Array:
     return columns
 
 
-def _observation(
-    code: int, dim: int, place: Array, columns: Array, matrix: Array, R: Array, model: FunctionMeasurement
-) -> Observation:
-    packed = np.concatenate((place, columns.astype(np.int64).view(np.float64), matrix, R), axis=None)
-    return Observation(code, dim, place, columns, matrix, R, model, packed)
-
-
-def observation(measurement: Measurement, motion: Motion) -> Observation:
+def observation(measurement: Measurement, motion: Motion, kind: int = PLAIN) -> Observation:
     """Put a measurement model in the form that the kernels take, for states of a motion model."""
-    every = np.arange(motion.dim)
     if isinstance(measurement, Sensor):
         columns = np.array(motion.position, dtype=np.int64)
         code = CODES.get(type(measurement))
@@ -188,8 +198,8 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
             columns = np.concatenate([columns, _velocity_columns(motion)])
         if code is not None:
             R = np.ascontiguousarray(measurement.covariance)[None].copy()
-            place = np.array(measurement.position)
-            return _observation(code, measurement.dim, place, columns, _NO_MATRIX, R, _NO_MODEL)
+            packed = pack(code, kind, measurement.position, columns, _NO_MATRIX, R)
+            return Observation(code, measurement.dim, R, _NO_MODEL, packed)
         measurement = _SensorAsFunction(measurement, columns, motion.dim)
     if isinstance(measurement, LinearMeasurement):
         if measurement.matrix.shape[1] != motion.dim:
@@ -198,8 +208,8 @@ def observation(measurement: Measurement, motion: Motion) -> Observation:
         # most entries are zeros: only the components that are read take part
         read = np.flatnonzero(measurement.matrix.any(axis=0))
         matrix = np.ascontiguousarray(measurement.matrix[:, read])
-        return _observation(LINEAR, measurement.dim, _NO_PLACE, read, matrix, R, _NO_MODEL)
+        packed = pack(LINEAR, kind, _NO_POSITION, read, matrix, R)
+        return Observation(LINEAR, measurement.dim, R, _NO_MODEL, packed)
     if isinstance(measurement, FunctionMeasurement):
-        R = measurement.covariance[None]
-        return _observation(GIVEN, measurement.dim, _NO_PLACE, every, _NO_MATRIX, R, measurement)
+        return Observation(GIVEN, measurement.dim, measurement.covariance[None], measurement, _NO_MATRIX)
     raise InvalidInputError(f"sensor must be a sensor or a measurement model, got {type(measurement).__name__}")

@@ -6,7 +6,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, factors
+from assoc.filters.base import factors
 from assoc.filters.kernels.gaussian import LOG_TURN, MODIFIED, SIMPLIFIED
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
@@ -53,10 +53,6 @@ class ModifiedEKF(GaussianFilter):
             raise InvalidInputError("sensor: a modified EKF needs uncorrelated noise")
         self._seen = (sensor, o)
         return o
-
-    def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
-        """Return the expected measurements before debiasing, and the widened covariances."""
-        return super().expected(state, sensor)
 
     def compare(self, state: Gaussian, measurements: Array, sensor: Measurement) -> tuple[Array, Array]:
         """`log_likelihood` and `distances` of debiased residuals, (B, M) each."""

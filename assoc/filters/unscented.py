@@ -9,7 +9,16 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import Expected, Filter, Update, check_dimension, complain, measured_array
+from assoc.filters.base import (
+    Expected,
+    Filter,
+    Update,
+    check_dimension,
+    complain,
+    given_points,
+    measured_array,
+    update_of,
+)
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.points import moments, sigma_points, unscented
@@ -18,7 +27,6 @@ from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, gaussian
 
 _NOTHING2 = np.zeros((0, 0))
-_NOTHING3 = np.zeros((0, 0, 0))
 
 
 class UnscentedKalmanFilter(Filter[Gaussian]):
@@ -44,11 +52,11 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
             raise InvalidInputError(
                 f"alpha, kappa: alpha^2 (n + kappa) must be above 0, got {alpha!r}, {kappa!r} for n = {n}"
             )
-        self.scale = math.sqrt(spread)
-        self.mean_weights = np.full(2 * n + 1, 0.5 / spread)
-        self.covariance_weights = self.mean_weights.copy()
-        self.mean_weights[0] = 1 - n / spread
-        self.covariance_weights[0] = 1 - n / spread + 1 - alpha**2 + beta
+        scale = math.sqrt(spread)
+        self.weights = np.full((3, 2 * n + 1), 0.5 / spread)
+        """Steps of the points in columns of the covariance's factor, weights of means, weights of covariances."""
+        self.weights[0] = [0.0, *[scale] * n, *[-scale] * n]
+        self.weights[1:, 0] = 1 - n / spread, 1 - n / spread + 1 - alpha**2 + beta
 
     def start(self, state: Gaussian) -> Gaussian:
         """Return the Gaussian itself."""
@@ -72,21 +80,14 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
         points = self._points(state)
         moved = self.motion.propagate(points.reshape(-1, self.motion.dim), dt).reshape(points.shape)
         mean, P = np.empty(state.mean.shape), np.empty(state.covariance.shape)
-        cross = moments(
-            np.ascontiguousarray(moved),
-            points,
-            self.mean_weights,
-            self.covariance_weights,
-            self.motion.noise(state.mean, dt),
-            mean,
-            P,
-        )
+        Q = self.motion.noise(state.mean, dt)
+        cross = moments(np.ascontiguousarray(moved), points, self.weights[1], self.weights[2], Q, mean, P)
         return gaussian(mean, P), cross
 
     def _points(self, state: Gaussian) -> Array:
         B, n = state.mean.shape
         points = np.empty((B, 2 * n + 1, n))
-        status = sigma_points(state.mean, state.covariance, self.scale, points)
+        status = sigma_points(state.mean, state.covariance, self.weights[0, 1], points)
         if status != GOOD:
             complain(status)
         return points
@@ -95,35 +96,23 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
         """Correct each target with a measurement of its own; see `Filter.update`."""
         check_dimension(state, self.motion.dim)
         o = self.observe(sensor)
-        z = measured_array(measured, len(state.mean), o.dim)
-        return self._run(state, z, o, True)
+        return self._run(state, measured_array(measured, len(state.mean), o.dim), o)[0]
 
     def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
         """Return the expected measurements and their covariances; see `Filter.expected`."""
         check_dimension(state, self.motion.dim)
         o = self.observe(sensor)
-        done = self._run(state, np.zeros((len(state.mean), o.dim)), o, False)
-        return Expected(done.innovation, done.covariance)
+        done, first = self._run(state, np.zeros((0, o.dim)), o)
+        return Expected(done.innovation + first, done.covariance)
 
-    def _run(self, state: Gaussian, z: Array, o: Observation, correcting: bool) -> Update[Gaussian]:
+    def _run(self, state: Gaussian, z: Array, o: Observation) -> tuple[Update[Gaussian], Array]:
+        """The kernel's results, and what is to be added to expected measurements."""
         B, d = len(state.mean), o.dim
-        given, first, base = _NOTHING3, _NOTHING2, None
+        models, first = o.packed, np.zeros((1, d))
         if o.code < 0:
-            points = self._points(state)
-            base = o.model.measure(state.mean)
-            seen = o.model.measure(points.reshape(-1, points.shape[2]))
-            given = np.ascontiguousarray(
-                o.model.residual(seen, np.repeat(base, points.shape[1], axis=0)).reshape(B, -1, d)
-            )
-            first = np.ascontiguousarray(o.model.residual(z, base)) if correcting else z
-        mean, P = np.empty(state.mean.shape), np.empty(state.covariance.shape)
-        v, S, nis, ll = np.empty((B, d)), np.empty((B, d, d)), np.empty(B), np.empty(B)
-        status = unscented(
-            state.mean, state.covariance, z, o.code, o.place, o.columns, o.matrix, o.covariance, given, first,
-            self.scale, self.mean_weights, self.covariance_weights, correcting, mean, P, v, S, nis, ll,
-        )  # fmt: skip
+            models, z, first = given_points(o, self._points(state), z)
+        mean, P, rest = np.empty(state.mean.shape), np.empty(state.covariance.shape), np.empty(B * (d + d * d + 2))
+        status = unscented(state.mean, state.covariance, z, models, self.weights, mean, P, rest)
         if status != GOOD:
             complain(status)
-        if base is not None and not correcting:
-            v += base
-        return Update(gaussian(mean, P), v, S, nis, ll)
+        return update_of(gaussian(mean, P), rest, d), first

@@ -256,7 +256,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         o = self._ekf.observe(sensor)
         if self.components is not None and max(self.components, default=0) >= o.dim:
             raise InvalidInputError(f"components must be below {o.dim} for this sensor, got {self.components}")
-        first = self._ekf.correct(state.gaussian, measured, o, o.covariance)
+        first = self._ekf.correct(state.gaussian, measured, o)
         variances = np.einsum("bii->bi", first.covariance)
         fresh = first.innovation / np.sqrt(variances)
         past = state.innovations
@@ -272,7 +272,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             prior = state.without_noise + _scaled(q, state.process_noise)
         done = first
         if self.immediate or self.measurement is not None:
-            done = self._ekf.correct(gaussian(state.mean, prior), measured, o, r[:, None, None] * o.covariance)
+            done = self._ekf.correct(gaussian(state.mean, prior), measured, o, r)
         mean, covariance = done.state.mean, done.state.covariance
         if calm is not None:
             mean, covariance = _calmed(mean, covariance, calm)

@@ -1,4 +1,4 @@
-"""What gates and associations ask of a filter: expected measurements, and how well others fit them."""
+"""Expected measurements, and how well others fit them: for gates and associations."""
 
 from __future__ import annotations
 
@@ -8,9 +8,18 @@ import numpy as np
 
 from assoc._system.compiled import njit
 from assoc._types import Array
-from assoc.filters.kernels.gaussian import BAD_COVARIANCE, GOOD, LINEAR, LOG_TURN, PLAIN, STATUSES, modify
+from assoc.filters.kernels.gaussian import (
+    BAD_COVARIANCE,
+    GOOD,
+    LOG_TURN,
+    PLAIN,
+    STATUSES,
+    linearise_at,
+    modify,
+    unpack,
+)
 from assoc.filters.kernels.linear_algebra import factor
-from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
+from assoc.sensors.kernels.dispatch import wrap
 
 
 @njit
@@ -44,27 +53,15 @@ def pairs(h: Array, S: Array, z: Array, code: int) -> tuple[int, Array, Array]:
 
 
 @njit
-def expect(
-    mean: Array, P: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array, kind: int
-) -> tuple[Array, Array]:
-    """Expected measurements (B, d) of linearised models and their covariances (B, d, d)."""
-    B, d, c = len(mean), R.shape[1], len(columns)
-    hs, S = np.empty((B, d)), np.empty((B, d, d))
-    h, H, v, R1 = np.empty(d), np.empty((d, max(3, c))), np.zeros(d), np.empty((d, d))
+def expect(mean: Array, P: Array, models: Array, d: int) -> tuple[Array, Array]:
+    """Expected measurements (B, d) of a linearised model, packed (1, ...), and their covariances (B, d, d)."""
+    B = len(mean)
+    code, kind, position, columns, matrix, noise = unpack(models[0], d)
+    c = len(columns)
+    hs, S, h = np.empty((B, d)), np.empty((B, d, d)), np.empty(d)
+    H, v, R = np.empty((d, max(3, c))), np.zeros(d), noise.copy()
     for b in range(B):
-        m = mean[b]
-        if code == LINEAR:
-            for a in range(d):
-                total = 0.0
-                for p in range(c):
-                    total += matrix[a, p] * m[columns[p]]
-                    H[a, p] = matrix[a, p]
-                h[a] = total
-        elif c > 3:
-            linearise_moving(place, m, columns, h, H)
-        else:
-            height = m[columns[2]] if c > 2 else 0.0
-            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
+        linearise_at(code, position, columns, matrix, mean[b], h, H)
         for a in range(d):
             hs[b, a] = h[a]
             for e in range(d):
@@ -73,12 +70,10 @@ def expect(
                     for q in range(c):
                         total += H[a, p] * P[b, columns[p], columns[q]] * H[e, q]
                 S[b, a, e] = total
-        Rb = R[b if len(R) > 1 else 0]
         if kind != PLAIN:
             v[:] = 0.0
-            modify(kind, h[0], h[2], v, Rb, S[b, 1, 1], S[b, 2, 2], R1)
-            Rb = R1
+            modify(kind, h[0], h[2], v, noise, S[b, 1, 1], S[b, 2, 2], R)
         for a in range(d):
             for e in range(d):
-                S[b, a, e] += Rb[a, e]
+                S[b, a, e] += R[a, e]
     return hs, S

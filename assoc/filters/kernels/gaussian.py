@@ -19,16 +19,58 @@ from assoc.sensors.kernels.dispatch import linearise, linearise_moving, wrap
 LINEAR = 4
 """Measurement model: a matrix on the state, beside the codes of the sensors."""
 GIVEN = -1
-"""Measurement model of the user's: prediction and Jacobian come with the call."""
+"""A user's measurement model: residuals and Jacobians come with the call."""
 
 PLAIN, MODIFIED, SIMPLIFIED = 0, 1, 2
 """Kinds of correction; the last two are those of the modified EKF."""
 
 GOOD, BAD_MEASUREMENT, BAD_COVARIANCE, BAD_MEAN = 0, 1, 2, 3
-"""What a kernel found."""
+"""Statuses that kernels return."""
 STATUSES = 4
 
 LOG_TURN = math.log(2.0 * math.pi)
+
+
+H, R, V = 0, 1, 2
+"""Planes of a linearised measurement, (3, d, max(3, c, d)): Jacobian, noise covariance, residual (its first row)."""
+X, K, G, M, L, W = range(6)
+"""Planes of the working space of a correction, (6, max(n, d), max(n, d)); `correct` leaves the gain in K."""
+
+
+@inner_njit
+def unpack(packed: Array, d: int) -> tuple[int, int, Array, Array, Array, Array]:
+    """Take a measurement model of d quantities apart, which `assoc.filters.measurement.pack` has put in one piece.
+
+    numba takes 0.1 microsecond for each array that Python passes, and 0.8 for a record.
+
+    Returns
+    -------
+    code : int
+        That of a sensor (`assoc.sensors.codes`), LINEAR or GIVEN.
+    kind : int
+        PLAIN, MODIFIED or SIMPLIFIED.
+    position : (3,)
+        The sensor's.
+    columns : (c,)
+        Components of the state that are read; for sensors x, y (and z), with a range rate their velocities after them.
+    matrix : (d, c)
+        Of a linear model. GIVEN: Jacobian (d, n), or measurements of points (m, d).
+    noise : (d, d)
+        Covariance.
+    """
+    c, end = int(packed[2]), len(packed) - d * d
+    matrix = packed[6 + c : end]
+    return (
+        int(packed[0]), int(packed[1]), packed[3:6], packed[6 : 6 + c].view(np.int64),
+        matrix.reshape((len(matrix) // max(c, 1), c)), packed[end:].reshape((d, d)),
+    )  # fmt: skip
+
+
+@inner_njit
+def parts_of(rest: Array, B: int, d: int) -> tuple[Array, Array, Array, Array]:
+    """Views of innovations (B, d), their covariances (B, d, d), NIS (B,) and log-likelihoods (B,), in one piece."""
+    v, S = B * d, B * d + B * d * d
+    return rest[:v].reshape((B, d)), rest[v:S].reshape((B, d, d)), rest[S : S + B], rest[S + B :]
 
 
 @inner_njit
@@ -98,63 +140,57 @@ def predict(mean: Array, P: Array, F: Array, Q: Array, moved: Array, new_mean: A
 
 @literal_njit
 def correct(
-    d: int, c: int, mean: Array, P: Array, columns: Array, H: Array, R: Array, v: Array, S: Array,
-    new_mean: Array, new_P: Array, X: Array, K: Array, L: Array, W: Array, G: Array, M: Array,
-) -> tuple[bool, float, float]:  # fmt: skip
-    """Joseph's correction of one Gaussian; returns whether S is positive definite, NIS and ln det S.
+    d: int, c: int, P: Array, columns: Array, linear: Array, work: Array, S: Array, new_P: Array
+) -> tuple[bool, float, float]:
+    """Joseph's correction of one covariance; returns whether S is positive definite, NIS and ln det S.
 
     d and c are the numbers of measured quantities and of columns: the compiler unrolls the loops of a caller
-    that gives them literally. X, K and G (n, d), L and W (d, d), M (n, n) are working space.
+    that gives them literally. S receives the residual's covariance.
     """
-    n = len(mean)
+    n = len(P)
     for i in range(n):
         for a in range(d):
             total = 0.0
             for p in range(c):
-                total += P[i, columns[p]] * H[a, p]
-            X[i, a] = total
+                total += P[i, columns[p]] * linear[H, a, p]
+            work[X, i, a] = total
     for a in range(d):
         for e in range(a + 1):
-            total = R[a, e]
+            total = linear[R, a, e]
             for p in range(c):
-                total += H[a, p] * X[columns[p], e]
+                total += linear[H, a, p] * work[X, columns[p], e]
             S[a, e] = total
             S[e, a] = total
-    if not factor(S, d, L):
+    if not factor(S, d, work[L]):
         return False, 0.0, 0.0
     # the inverse of S; what rounding makes of the gain, Joseph's form forgives
     log_det = nis = 0.0
     for a in range(d):
-        log_det += 2.0 * math.log(L[a, a])
-        L[a, a] = 1.0 / L[a, a]
+        log_det += 2.0 * math.log(work[L, a, a])
+        work[L, a, a] = 1.0 / work[L, a, a]
     for a in range(d):
         for e in range(a + 1, d):
             total = 0.0
             for k in range(a, e):
-                total -= L[e, k] * (L[k, a] if k > a else L[a, a])
-            L[e, a] = total * L[e, e]
+                total -= work[L, e, k] * work[L, k, a]
+            work[L, e, a] = total * work[L, e, e]
         total = 0.0
         for e in range(a + 1):
-            total += L[a, e] * v[e]
+            total += work[L, a, e] * linear[V, 0, e]
         nis += total * total
     for a in range(d):
         for e in range(a + 1):
             total = 0.0
             for k in range(a, d):
-                total += L[k, a] * L[k, e]
-            W[a, e] = total
-            W[e, a] = total
+                total += work[L, k, a] * work[L, k, e]
+            work[W, a, e] = total
+            work[W, e, a] = total
     for i in range(n):
         for a in range(d):
             total = 0.0
             for e in range(d):
-                total += X[i, e] * W[e, a]
-            K[i, a] = total
-    for i in range(n):
-        total = mean[i]
-        for a in range(d):
-            total += K[i, a] * v[a]
-        new_mean[i] = total
+                total += work[X, i, e] * work[W, e, a]
+            work[K, i, a] = total
     # M = (I - K H) P, then M (I - K H)' + K R K'
     # (of M only the lower half and the columns that H reads are needed)
     last = 0
@@ -164,24 +200,34 @@ def correct(
         for j in range(max(i + 1, last)):
             total = P[i, j]
             for a in range(d):
-                total -= K[i, a] * X[j, a]
-            M[i, j] = total
+                total -= work[K, i, a] * work[X, j, a]
+            work[M, i, j] = total
     for i in range(n):
         for a in range(d):
             total = 0.0
             for e in range(d):
-                total += K[i, e] * R[e, a]
+                total += work[K, i, e] * linear[R, e, a]
             for p in range(c):
-                total -= M[i, columns[p]] * H[a, p]
-            G[i, a] = total
+                total -= work[M, i, columns[p]] * linear[H, a, p]
+            work[G, i, a] = total
     for i in range(n):
         for j in range(i + 1):
-            total = M[i, j]
+            total = work[M, i, j]
             for a in range(d):
-                total += G[i, a] * K[j, a]
+                total += work[G, i, a] * work[K, j, a]
             new_P[i, j] = total
             new_P[j, i] = total
     return True, nis, log_det
+
+
+@inner_njit
+def correct_mean(mean: Array, work: Array, v: Array, new_mean: Array) -> None:
+    """Add the gain that `correct` has left times the residual."""
+    for i in range(len(mean)):
+        total = mean[i]
+        for a in range(len(v)):
+            total += work[K, i, a] * v[a]
+        new_mean[i] = total
 
 
 @inner_njit
@@ -210,167 +256,124 @@ def modify(kind: int, r: float, e: float, v: Array, R: Array, bt: float, bp: flo
 
 
 @inner_njit
-def update_one(
-    m: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
-    given: Array, given_H: Array, kind: int, new_mean: Array, new_P: Array, v: Array, S: Array,
-) -> tuple[int, float, float]:  # fmt: skip
-    """`update` for one target: what was found, NIS and log-likelihood."""
-    n, d, c = len(m), len(z), len(columns)
-    # few allocations: for a single target they count
-    tall, small, M, h, H = (
-        np.empty((3, n, d)),
-        np.empty((2, d, d)),
-        np.empty((n, n)),
-        np.empty(d),
-        np.empty((d, max(3, c))),
-    )
-    X, K, G, L, W = tall[0], tall[1], tall[2], small[0], small[1]
-    for a in range(d):
-        if not math.isfinite(z[a]):
-            return BAD_MEASUREMENT, 0.0, 0.0
-    if code == GIVEN:
-        for a in range(d):
-            v[a] = given[a]
-            for p in range(c):
-                H[a, p] = given_H[a, p]
-    elif code == LINEAR:
-        for a in range(d):
+def linearise_at(code: int, position: Array, columns: Array, matrix: Array, m: Array, h: Array, J: Array) -> None:
+    """Write the measurement expected of a mean into h (d,) and its derivatives by the columns into J (d, c)."""
+    if code == LINEAR:
+        for a in range(len(h)):
             total = 0.0
-            for p in range(c):
+            for p in range(len(columns)):
                 total += matrix[a, p] * m[columns[p]]
-                H[a, p] = matrix[a, p]
-            v[a] = z[a] - total
+                J[a, p] = matrix[a, p]
+            h[a] = total
+    elif len(columns) > 3:
+        linearise_moving(position, m, columns, h, J)
     else:
-        if c > 3:
-            linearise_moving(place, m, columns, h, H)
-        else:
-            height = m[columns[2]] if c > 2 else 0.0
-            linearise(code, d, place, m[columns[0]], m[columns[1]], height, h, H)
-        for a in range(d):
-            v[a] = z[a] - h[a]
-        wrap(code, v)
-        if kind != PLAIN:
-            bt, bp = 0.0, 0.0
-            for p in range(c):
-                for q in range(c):
-                    cov = P[columns[p], columns[q]]
-                    bt += H[1, p] * H[1, q] * cov
-                    bp += H[2, p] * H[2, q] * cov
-            widened = np.empty((d, d))
-            modify(kind, h[0], h[2], v, R, bt, bp, widened)
-            R = widened
-    for a in range(d):
-        if not math.isfinite(v[a]):
-            return BAD_MEAN, 0.0, 0.0
-    if d == 3 and c == 3:
-        good, nis, log_det = correct(3, 3, m, P, columns, H, R, v, S, new_mean, new_P, X, K, L, W, G, M)
-    else:
-        good, nis, log_det = correct(d, c, m, P, columns, H, R, v, S, new_mean, new_P, X, K, L, W, G, M)
-    if not good:
-        return BAD_COVARIANCE, 0.0, 0.0
-    return GOOD, nis, -0.5 * (nis + log_det + d * LOG_TURN)
+        height = m[columns[2]] if len(columns) > 2 else 0.0
+        linearise(code, len(h), position, m[columns[0]], m[columns[1]], height, h, J)
 
 
 @njit
-def update(
-    mean: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
-    given: Array, given_H: Array, kind: int,
-    new_mean: Array, new_P: Array, rest: Array,
-) -> int:  # fmt: skip
+def update(mean: Array, P: Array, z: Array, models: Array, new_mean: Array, new_P: Array, rest: Array) -> int:
     """Correct a batch with one measurement for each, into the last three arrays.
 
     Parameters
     ----------
     mean, P : (B, n), (B, n, n)
     z : (B, d)
-    code : int
-        Measurement model: that of a sensor, LINEAR or GIVEN.
-    place : (3,)
-        The sensor's.
-    columns : (c,)
-        Components of the state that the model reads; for sensors those of x, y (and z), with a range rate
-        their velocities after them.
-    matrix : (d, c)
-        Of a linear model.
-    R : (B or 1, d, d)
-    given, given_H : (B, d), (B, d, n)
-        Residuals and Jacobians of the user's model.
-    kind : int
-        PLAIN, MODIFIED or SIMPLIFIED.
-
+        Measurements; residuals where the model is GIVEN.
+    models : (B or 1, ...)
+        Packed measurement models; see `unpack`.
     new_mean, new_P, rest
-        Corrected Gaussians; innovations (B, d), their covariances (B, d, d), NIS (B,) and log-likelihoods (B,), one
-        after the other.
+        Corrected Gaussians; innovations, their covariances, NIS and log-likelihoods, see `parts_of`.
 
     Returns
     -------
-    GOOD, or what was found plus STATUSES times the number of the target.
+    GOOD, or the status plus STATUSES times the number of the target.
     """
     B, d = z.shape
-    begin, end = B * d, B * d + B * d * d
-    v, S = rest[:begin].reshape((B, d)), rest[begin:end].reshape((B, d, d))
-    nis, ll = rest[end : end + B], rest[end + B :]
+    wide = max(mean.shape[1], d)
+    v, S, nis, ll = parts_of(rest, B, d)
+    # few allocations: for a single target they count
+    work, h = np.empty((6, wide, wide)), np.empty(d)
     for b in range(B):
-        own = b if code == GIVEN else 0
-        status, nis[b], ll[b] = update_one(
-            mean[b], P[b], z[b], code, place, columns, matrix, R[b if len(R) > 1 else 0], given[own], given_H[own],
-            kind, new_mean[b], new_P[b], v[b], S[b],
-        )  # fmt: skip
-        if status != GOOD:
-            return status + STATUSES * b
+        if b == 0 or len(models) > 1:
+            code, kind, position, columns, matrix, noise = unpack(models[b], d)
+            c = len(columns)
+            linear = np.empty((3, d, max(3, c, d)))
+            # number by number: assigning slices takes longer
+            for a in range(d):
+                for e in range(d):
+                    linear[R, a, e] = noise[a, e]
+        for a in range(d):
+            if not math.isfinite(z[b, a]):
+                return BAD_MEASUREMENT + STATUSES * b
+        if code == GIVEN:
+            v[b] = z[b]
+            linear[H, :, :c] = matrix
+        else:
+            linearise_at(code, position, columns, matrix, mean[b], h, linear[H])
+            for a in range(d):
+                v[b, a] = z[b, a] - h[a]
+            wrap(code, v[b])
+            if kind != PLAIN:
+                bt, bp = 0.0, 0.0
+                for p in range(c):
+                    for q in range(c):
+                        cov = P[b, columns[p], columns[q]]
+                        bt += linear[H, 1, p] * linear[H, 1, q] * cov
+                        bp += linear[H, 2, p] * linear[H, 2, q] * cov
+                modify(kind, h[0], h[2], v[b], noise, bt, bp, linear[R])
+        for a in range(d):
+            if not math.isfinite(v[b, a]):
+                return BAD_MEAN + STATUSES * b
+            linear[V, 0, a] = v[b, a]
+        if d == 3 and c == 3:
+            good, nis[b], log_det = correct(3, 3, P[b], columns, linear, work, S[b], new_P[b])
+        else:
+            good, nis[b], log_det = correct(d, c, P[b], columns, linear, work, S[b], new_P[b])
+        if not good:
+            return BAD_COVARIANCE + STATUSES * b
+        correct_mean(mean[b], work, v[b], new_mean[b])
+        ll[b] = -0.5 * (nis[b] + log_det + d * LOG_TURN)
     return GOOD
 
 
 @njit
 def step(
-    mean: Array, P: Array, models: Array, z: Array, seen: Array, code: int, c: int, kind: int,
-    new_mean: Array, new_P: Array, rest: Array,
-) -> int:  # fmt: skip
+    mean: Array, P: Array, motion: Array, z: Array, models: Array, new_mean: Array, new_P: Array, rest: Array
+) -> int:
     """Predict one target with a linear model and correct it, into the last three arrays, as `update` does.
 
-    models (2, 1, n, n) are F and Q. `seen` is a measurement model that reads c components in one piece, as
-    `assoc.filters.measurement.Observation` has it: an array less is a tenth of a microsecond less.
+    motion (2, 1, n, n) is F and Q.
     """
-    n, d = mean.shape[1], z.shape[1]
-    predicted, pair, none = np.empty(n), np.empty((2, n, n)), rest[:0]
-    predicted_P = pair[0]
-    predict_one(mean[0], P[0], models[0, 0], models[1, 0], none, predicted, predicted_P, pair[1])
-    matrix, v = seen[3 + c : len(seen) - d * d], rest[:d]
-    end = d + d * d
-    status, rest[end], rest[end + 1] = update_one(
-        predicted, predicted_P, z[0], code, seen[:3], seen[3 : 3 + c].view(np.int64),
-        matrix.reshape((len(matrix) // c, c)), seen[len(seen) - d * d :].reshape((d, d)), none, predicted_P[:0], kind,
-        new_mean[0], new_P[0], v, rest[d:end].reshape((d, d)),
-    )  # fmt: skip
-    return status
+    n = mean.shape[1]
+    predicted, pair = np.empty((1, n)), np.empty((2, n, n))
+    predict_one(mean[0], P[0], motion[0, 0], motion[1, 0], rest[:0], predicted[0], pair[0], pair[1])
+    return update(predicted, pair[:1], z, models, new_mean, new_P, rest)
 
 
 @njit
 def follow(
-    mean: Array, P: Array, F: Array, Q: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array,
-    R: Array, kind: int, means: Array, Ps: Array, nis: Array, ll: Array,
-) -> int:  # fmt: skip
-    """Predict and correct a batch through K steps of a linear motion, into the last four arrays.
+    mean: Array, P: Array, motion: Array, z: Array, models: Array, means: Array, Ps: Array, scores: Array
+) -> int:
+    """Predict and correct a batch through K steps of a linear motion, into the last three arrays.
 
-    F and Q are (K or 1, n, n), z (K, B, d), means and Ps (K, B, ...), nis and ll (K, B). Returns as `update`
-    does, with the target counted through the steps.
+    motion (2, K or 1, n, n) is F and Q, z (K, B, d), means and Ps (K, B, ...), scores (2, K, B) NIS and
+    log-likelihood. Returns as `update` does, with the target counted through the steps.
     """
     K, B, d = z.shape
-    n = mean.shape[1]
-    given, given_H = np.empty((1, 0)), np.empty((1, 0, 0))
-    predicted, predicted_P = np.empty((B, n)), np.empty((B, n, n))
+    predicted, predicted_P = np.empty(mean.shape), np.empty(P.shape)
     rest, nothing = np.empty(B * (d + d * d + 2)), np.empty((0, 0))
+    _, _, nis, ll = parts_of(rest, B, d)
     for k in range(K):
-        j = k if len(F) > 1 else 0
+        j = k if motion.shape[1] > 1 else 0
+        F, Q = motion[0, j : j + 1], motion[1, j : j + 1]
         if k == 0:
-            predict(mean, P, F[j : j + 1], Q[j : j + 1], nothing, predicted, predicted_P)
+            predict(mean, P, F, Q, nothing, predicted, predicted_P)
         else:
-            predict(means[k - 1], Ps[k - 1], F[j : j + 1], Q[j : j + 1], nothing, predicted, predicted_P)
-        status = update(
-            predicted, predicted_P, z[k], code, place, columns, matrix, R, given, given_H, kind,
-            means[k], Ps[k], rest,
-        )  # fmt: skip
+            predict(means[k - 1], Ps[k - 1], F, Q, nothing, predicted, predicted_P)
+        status = update(predicted, predicted_P, z[k], models, means[k], Ps[k], rest)
         if status != GOOD:
             return status + STATUSES * B * k
-        nis[k], ll[k] = rest[len(rest) - 2 * B : len(rest) - B], rest[len(rest) - B :]
+        scores[0, k], scores[1, k] = nis, ll
     return GOOD

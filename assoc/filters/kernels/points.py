@@ -17,43 +17,69 @@ from assoc.filters.kernels.gaussian import (
     LINEAR,
     LOG_TURN,
     STATUSES,
+    H,
+    R,
+    V,
+    correct,
+    correct_mean,
+    parts_of,
+    unpack,
 )
-from assoc.filters.kernels.gaussian import correct as correct_one
 from assoc.filters.kernels.linear_algebra import factor, solve_in_place
 from assoc.sensors.kernels.dispatch import measure, measure_moving, wrap
 
 
 @inner_njit
-def observe_point(x: Array, code: int, d: int, place: Array, columns: Array, matrix: Array, h: Array) -> None:
-    """Write the noise-free measurement of one state into h."""
-    if code == LINEAR:
+def observe_points(
+    code: int, position: Array, columns: Array, matrix: Array, points: Array, first: Array, h: Array
+) -> None:
+    """Write measurements of points (m, n) into h (m, d) as differences from the first, so that angles do not jump.
+
+    That of the first point is kept in `first`. Of the user's own model (GIVEN) they are the matrix.
+    """
+    if code == GIVEN:
+        h[:] = matrix
+        return
+    d = len(first)
+    for s in range(len(points)):
+        x = points[s]
+        if code == LINEAR:
+            for a in range(d):
+                total = 0.0
+                for p in range(len(columns)):
+                    total += matrix[a, p] * x[columns[p]]
+                h[s, a] = total
+        elif len(columns) > 3:
+            measure_moving(position, x, columns, h[s])
+        else:
+            height = x[columns[2]] if len(columns) > 2 else 0.0
+            measure(code, d, position, x[columns[0]], x[columns[1]], height, h[s])
         for a in range(d):
-            total = 0.0
-            for p in range(len(columns)):
-                total += matrix[a, p] * x[columns[p]]
-            h[a] = total
-    elif len(columns) > 3:
-        measure_moving(place, x, columns, h)
-    else:
-        height = x[columns[2]] if len(columns) > 2 else 0.0
-        measure(code, d, place, x[columns[0]], x[columns[1]], height, h)
+            if s == 0:
+                first[a] = h[0, a]
+            h[s, a] -= first[a]
+        wrap(code, h[s])
 
 
 @inner_njit
-def observe_from_first(
-    s: int, x: Array, code: int, d: int, place: Array, columns: Array, matrix: Array, first: Array, h: Array
-) -> None:
-    """Write the measurement of point number s into h[s] as the difference from the first, so that angles do not jump.
+def residual_of_mean(code: int, z: Array, first: Array, mu: Array, v: Array) -> bool:
+    """Write the residual of the mean measurement, first + mu, into v (d,); False if it is not finite."""
+    for a in range(len(z)):
+        v[a] = z[a] if code == GIVEN else z[a] - first[a]
+    wrap(code, v)
+    for a in range(len(z)):
+        v[a] -= mu[a]
+    wrap(code, v)
+    return all_finite(v)
 
-    That of the first point is kept in `first`.
-    """
-    observe_point(x, code, d, place, columns, matrix, h[s])
-    if s == 0:
-        for a in range(d):
-            first[a] = h[0, a]
-    for a in range(d):
-        h[s, a] -= first[a]
-    wrap(code, h[s])
+
+@inner_njit
+def all_finite(z: Array) -> bool:
+    """Whether all numbers are finite, (d,)."""
+    for a in range(len(z)):
+        if not math.isfinite(z[a]):
+            return False
+    return True
 
 
 @njit
@@ -106,45 +132,46 @@ def moments(points: Array, before: Array, wm: Array, wc: Array, Q: Array, mean: 
 
 @njit
 def unscented(
-    mean: Array, P: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
-    given: Array, given_residual: Array, scale: float, wm: Array, wc: Array, correcting: bool,
-    new_mean: Array, new_P: Array, v: Array, S: Array, nis: Array, ll: Array,
-) -> int:  # fmt: skip
-    """Unscented correction of a batch, into the last six arrays.
+    mean: Array, P: Array, z: Array, models: Array, weights: Array, new_mean: Array, new_P: Array, rest: Array
+) -> int:
+    """Unscented correction of a batch, into the last three arrays, as `assoc.filters.kernels.gaussian.update` does.
 
     The sigma points give a regression z = H x + noise of covariance R + extra; corrected with these, Joseph's form
-    keeps the covariance positive definite, and it is the unscented correction exactly. For a user's model
-    (GIVEN) the measurements of the points (B, 2n+1, d) relative to the first and the residual of the first
-    (B, d) come with the call. Without `correcting`, v receives the expected measurement, S its covariance.
+    keeps the covariance positive definite, and it is the unscented correction exactly.
+
+    Parameters
+    ----------
+    z : (B, d) or (0, d)
+        Measurements; of a user's model (GIVEN) the residuals of the first point. Empty: the expected measurements and
+        their covariances are written in the place of the innovations.
+    models : (B or 1, ...)
+        Packed measurement models; a user's has the measurements of the points (2n+1, d) relative to the first.
+    weights : (3, 2n+1)
+        Steps of the points in columns of the factor, weights of means, weights of covariances.
     """
     B, n = mean.shape
-    d, m = R.shape[1], 2 * n + 1
-    L, h, x = np.zeros((n, n)), np.zeros((m, d)), np.empty(n)
-    H, C, extra, mu = np.empty((d, n)), np.empty((d, n)), np.empty((d, d)), np.empty(d)
-    X, K, LS, W = np.empty((n, d)), np.empty((n, d)), np.empty((d, d)), np.empty((d, d))
-    G, M, first = np.empty((n, d)), np.empty((n, n)), np.zeros(d)
-    every = np.arange(n)
+    d, m = z.shape[1], 2 * n + 1
+    scale, wm, wc = weights[0, 1], weights[1], weights[2]
+    v, S, nis, ll = parts_of(rest, B, d)
+    wide = max(n, d)
+    F, h, x = np.zeros((n, n)), np.zeros((m, d)), np.empty((m, n))
+    C, mu, first = np.empty((d, n)), np.empty(d), np.zeros(d)
+    every, work, linear = np.arange(n), np.empty((6, wide, wide)), np.empty((3, d, wide))
+    slopes, extra = linear[H], linear[R]
     for b in range(B):
-        Rb = R[b if len(R) > 1 else 0]
-        if correcting:
-            for a in range(d):
-                if not math.isfinite(z[b, a]):
-                    return BAD_MEASUREMENT + STATUSES * b
-        if not factor(P[b], n, L):
+        if b == 0 or len(models) > 1:
+            code, _, position, columns, matrix, noise = unpack(models[b], d)
+        if len(z) and not all_finite(z[b]):
+            return BAD_MEASUREMENT + STATUSES * b
+        if not factor(P[b], n, F):
             return BAD_COVARIANCE + STATUSES * b
         for s in range(m):
-            if code == GIVEN:
-                for a in range(d):
-                    h[s, a] = given[b, s, a]
-                continue
-            for i in range(n):
-                x[i] = mean[b, i]
+            x[s] = mean[b]
             if s > 0:
                 k = (s - 1) % n
-                sign = scale if s <= n else -scale
                 for i in range(k, n):
-                    x[i] += sign * L[i, k]
-            observe_from_first(s, x, code, d, place, columns, matrix, first, h)
+                    x[s, i] += weights[0, s] * F[i, k]
+        observe_points(code, position, columns, matrix, x, first, h)
         for a in range(d):
             total = 0.0
             for s in range(m):
@@ -162,43 +189,31 @@ def unscented(
             for k in range(n):
                 u = scale * (wc[1 + k] * (h[1 + k, a] - mu[a]) - wc[1 + n + k] * (h[1 + n + k, a] - mu[a]))
                 for i in range(k, n):
-                    C[a, i] += u * L[i, k]
+                    C[a, i] += u * F[i, k]
             for i in range(n):
-                H[a, i] = C[a, i]
-            solve_in_place(L, n, H[a])
-        if not correcting:
+                slopes[a, i] = C[a, i]
+            solve_in_place(F, n, slopes[a])
+        if not len(z):
             for a in range(d):
                 v[b, a] = first[a] + mu[a]
                 for e in range(d):
-                    S[b, a, e] = extra[a, e] + Rb[a, e]
+                    S[b, a, e] = extra[a, e] + noise[a, e]
             continue
         for a in range(d):
             for e in range(a + 1):
-                total = extra[a, e] + Rb[a, e]
+                total = extra[a, e] + noise[a, e]
                 for i in range(n):
-                    total -= H[a, i] * C[e, i]
+                    total -= slopes[a, i] * C[e, i]
                 extra[a, e] = total
                 extra[e, a] = total
-        if code == GIVEN:
-            for a in range(d):
-                v[b, a] = given_residual[b, a] - mu[a]
-        else:
-            for a in range(d):
-                v[b, a] = z[b, a] - first[a]
-            wrap(code, v[b])
-            for a in range(d):
-                v[b, a] -= mu[a]
-            wrap(code, v[b])
-        for a in range(d):
-            if not math.isfinite(v[b, a]):
-                return BAD_MEAN + STATUSES * b
-        good, one, log_det = correct_one(
-            d, n, mean[b], P[b], every, H, extra, v[b], S[b], new_mean[b], new_P[b], X, K, LS, W, G, M
-        )
+        if not residual_of_mean(code, z[b], first, mu, v[b]):
+            return BAD_MEAN + STATUSES * b
+        linear[V, 0, :d] = v[b]
+        good, nis[b], log_det = correct(d, n, P[b], every, linear, work, S[b], new_P[b])
         if not good:
             return BAD_COVARIANCE + STATUSES * b
-        nis[b] = one
-        ll[b] = -0.5 * (one + log_det + d * LOG_TURN)
+        correct_mean(mean[b], work, v[b], new_mean[b])
+        ll[b] = -0.5 * (nis[b] + log_det + d * LOG_TURN)
     return GOOD
 
 
@@ -226,48 +241,44 @@ def move_ensemble(members: Array, F: Array, shocks: Array, moved: Array, factors
 
 
 @njit
-def ensemble_update(
-    members: Array, z: Array, code: int, place: Array, columns: Array, matrix: Array, R: Array,
-    given: Array, given_residual: Array, shocks: Array, correcting: bool,
-    out: Array, v: Array, S: Array, nis: Array, ll: Array,
-) -> int:  # fmt: skip
-    """Correction of ensembles with perturbed measurements, into the last five arrays.
+def ensemble_update(members: Array, z: Array, models: Array, shocks: Array, out: Array, rest: Array) -> int:
+    """Correction of ensembles with perturbed measurements, into the last two arrays; `rest` as in `unscented`.
 
-    members (B, N, n), shocks (B, N, d) standard normal. Equations 12 and 13 of the UAV paper, for any
-    measurement model: the gain is that of sample covariances. For a user's model the measurements of the
-    members relative to the first, (B, N, d), and the residual of the first, (B, d), come with the call. Without
-    `correcting`, v receives the expected measurement and S its covariance.
+    Equations 12 and 13 of the UAV paper, for any measurement model: the gain is that of sample covariances.
+
+    Parameters
+    ----------
+    members : (B, N, n)
+    z : (B, d) or (0, d)
+        As in `unscented`.
+    models : (B or 1, ...)
+        Packed measurement models; a user's has the measurements of the members (N, d) relative to the first.
+    shocks : (B, N, d)
+        Standard normal.
     """
     B, N, n = members.shape
-    d = R.shape[1]
+    d = z.shape[1]
+    v, S, nis, ll = parts_of(rest, B, d)
     h, mu, mean = np.empty((N, d)), np.empty(d), np.empty(n)
     C, L, LR, w = np.empty((n, d)), np.zeros((d, d)), np.zeros((d, d)), np.empty(d)
     first = np.zeros(d)
     for b in range(B):
-        Rb = R[b if len(R) > 1 else 0]
-        if correcting:
-            for a in range(d):
-                if not math.isfinite(z[b, a]):
-                    return BAD_MEASUREMENT + STATUSES * b
-        if not factor(Rb, d, LR):
+        if b == 0 or len(models) > 1:
+            code, _, position, columns, matrix, noise = unpack(models[b], d)
+        if len(z) and not all_finite(z[b]):
+            return BAD_MEASUREMENT + STATUSES * b
+        if not factor(noise, d, LR):
             return BAD_COVARIANCE + STATUSES * b
         mu[:] = 0.0
         mean[:] = 0.0
+        observe_points(code, position, columns, matrix, members[b], first, h)
         for s in range(N):
-            if code == GIVEN:
-                for a in range(d):
-                    h[s, a] = given[b, s, a]
-            else:
-                observe_from_first(s, members[b, s], code, d, place, columns, matrix, first, h)
             for a in range(d):
                 mu[a] += h[s, a] / N
             for i in range(n):
                 mean[i] += members[b, s, i] / N
-        for a in range(d):
-            for e in range(d):
-                S[b, a, e] = 0.0
-            for i in range(n):
-                C[i, a] = 0.0
+        S[b] = 0.0
+        C[:] = 0.0
         for s in range(N):
             for a in range(d):
                 u = (h[s, a] - mu[a]) / (N - 1)
@@ -277,26 +288,19 @@ def ensemble_update(
                     C[i, a] += u * (members[b, s, i] - mean[i])
         for a in range(d):
             for e in range(a + 1):
-                S[b, a, e] += Rb[a, e]
+                S[b, a, e] += noise[a, e]
                 S[b, e, a] = S[b, a, e]
-        if not correcting:
+        if not len(z):
             for a in range(d):
                 v[b, a] = first[a] + mu[a]
             continue
         if not factor(S[b], d, L):
             return BAD_COVARIANCE + STATUSES * b
-        # the residual of the mean
-        for a in range(d):
-            v[b, a] = given_residual[b, a] if code == GIVEN else z[b, a] - first[a]
-        wrap(code, v[b])
-        for a in range(d):
-            v[b, a] -= mu[a]
-        wrap(code, v[b])
+        if not residual_of_mean(code, z[b], first, mu, v[b]):
+            return BAD_MEAN + STATUSES * b
         square = log_det = 0.0
         for a in range(d):
             total = v[b, a]
-            if not math.isfinite(total):
-                return BAD_MEAN + STATUSES * b
             for e in range(a):
                 total -= L[a, e] * w[e]
             w[a] = total / L[a, a]
