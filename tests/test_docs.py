@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from dataclasses import fields
 from importlib import import_module
@@ -55,6 +56,15 @@ def test_paths_on_the_pages_exist(page):
     paths = re.findall(r"(?<![\w/.-])(?:assoc|experiments|tests)/[\w/.]*\w/?", text)
     for path in paths:
         assert (ROOT / path).exists(), f"{page}: {path} does not exist"
+
+
+def test_kernels_take_at_most_eight_arguments():
+    wide = []
+    for path in (ROOT / "assoc").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and any("njit" in ast.unparse(d) for d in node.decorator_list):
+                wide += [f"{path}: {node.name}"] * (len(node.args.args) > 8)
+    assert wide == []
 
 
 def test_paths_of_the_architecture_exist():

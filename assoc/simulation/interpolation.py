@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._types import Array
+from assoc.recordings.flights.reports import Reports
 from assoc.scene.geodesy import east_north_up
-from assoc.simulation.cleaning import Reports
 
 _SECOND = 1.0
 _STRANGE = 60.0

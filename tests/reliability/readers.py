@@ -110,7 +110,7 @@ def _use_problem(path: Path) -> None:
 
 
 def _use_tracks(path: Path) -> None:
-    from assoc.simulation.flight_reports import read_flight_reports
+    from assoc.recordings.flights.reports import read_flight_reports
 
     read_flight_reports(str(path), {})
 

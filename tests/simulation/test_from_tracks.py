@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError, LimitExceededError
+from assoc.recordings.flights.reports import read_flight_reports
 from assoc.scene.geodesy import earth_centered, east_north_up
 from assoc.simulation import simulate
-from assoc.simulation.flight_reports import read_flight_reports
 
 A, B = 6378137.0, 6356752.314245
 """WGS-84 semi-axes, metres."""
@@ -170,6 +170,6 @@ def test_speeds_in_knots(tmp_path):
 def test_any_text_but_none_is_an_identity(tmp_path):
     rows = [f"{t},{name},47.{t},8,3000" for name in ("nan", "null", "NA", "", " ", "a") for t in (0, 10)]
     (tmp_path / "t.csv").write_text("\n".join(["time,id,lat,lon,altitude", *rows]))
-    reports = read_flight_reports(str(tmp_path / "t.csv"), {})
-    assert sorted(reports.names.values()) == ["NA", "a", "nan", "null"]
-    assert reports.notes["rows left out, without identity"] == 4
+    _, names, notes = read_flight_reports(str(tmp_path / "t.csv"), {})
+    assert sorted(names.values()) == ["NA", "a", "nan", "null"]
+    assert notes["rows left out, without identity"] == 4

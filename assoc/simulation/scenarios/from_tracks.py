@@ -16,10 +16,10 @@ import numpy as np
 from assoc._parameters import Parameters
 from assoc._types import Array
 from assoc.errors import LimitExceededError
+from assoc.recordings.flights.cleaning import clean
+from assoc.recordings.flights.reports import ALTITUDE_UNITS, COLUMNS, SPEED_UNITS, Reports, read_flight_reports
 from assoc.scene.geodesy import east_north_up
 from assoc.scene.scene import Scene
-from assoc.simulation.cleaning import Reports, clean
-from assoc.simulation.flight_reports import ALTITUDE_UNITS, COLUMNS, SPEED_UNITS, FlightReports, read_flight_reports
 from assoc.simulation.flights import STEP
 from assoc.simulation.interpolation import along, frame_velocities, resample
 from assoc.simulation.memory import MOST, require_scene_memory
@@ -101,8 +101,8 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     """Simulate the scene; see `assoc.simulation.simulate`."""
     p = parameters
     named = {meaning: getattr(p, f"{meaning}_column") for meaning in COLUMNS}
-    recording = read_flight_reports(p.file, named, p.altitude_unit, p.speed_unit)
-    flown, found = _flown(recording, p.clean)
+    recording, names, notes = read_flight_reports(p.file, named, p.altitude_unit, p.speed_unit)
+    flown, cleaned = clean(recording) if p.clean else (recording, {})
     origin = (_middle(flown.latitude), _middle(flown.longitude), 0.0)
     reports = east_north_up(flown.latitude, flown.longitude, flown.height, origin)
     speeds = frame_velocities(flown, reports, origin)
@@ -137,19 +137,8 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
         scene = observe_in_turns(sensors, turns, start, times, paths, rng, region=region, name=name)
     else:
         scene = observe(sensors, times, ids, positions, rng, region=region, name=name, velocities=velocities)
-    truth = replace(scene.truth, names=recording.names) if scene.truth is not None else None
-    return replace(scene, truth=truth, origin=origin, notes={**recording.notes, **found})
-
-
-def _flown(recording: FlightReports, cleaned: bool) -> tuple[Reports, dict[str, int]]:
-    """What the reports tell of flights, and what had to be cleaned, with counts."""
-    of_file = Reports(
-        recording.time, recording.target, recording.latitude, recording.longitude, recording.height, recording.velocity
-    )
-    if not cleaned:
-        return of_file, {}
-    reports, found = clean(of_file, recording.updated)
-    return reports, found.notes()
+    truth = replace(scene.truth, names=names) if scene.truth is not None else None
+    return replace(scene, truth=truth, origin=origin, notes={**notes, **cleaned})
 
 
 def _paths(recording: Reports, reports: Array, speeds: Array, max_gap: float) -> list[Path]:
@@ -173,7 +162,7 @@ def _middle(angles: Array) -> float:
     return reference + float(away.min() + away.max()) / 2
 
 
-def _epochs(parameters: FromTracksParameters, recording: FlightReports) -> Array:
+def _epochs(parameters: FromTracksParameters, recording: Reports) -> Array:
     start, end = float(recording.time.min()), float(recording.time.max())
     available = math.floor((end - start) / parameters.interval + 1e-9) + 1
     count = available if parameters.scans is None else min(parameters.scans, available)

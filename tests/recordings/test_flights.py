@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assoc.recordings.flights.cleaning import ALTITUDES, JUMPS, REPEATED, clean
+from assoc.recordings.flights.reports import Reports
 from assoc.scene.geodesy import east_north_up
 from assoc.simulation import simulate
-from assoc.simulation.cleaning import Reports, clean
 from assoc.simulation.interpolation import frame_velocities, resample
 
 ORIGIN = (0.8, 0.1, 0.0)
@@ -20,57 +21,50 @@ def flight(target=0, count=30, start=0.0, height=9000.0, climb=0.0):
     """Northeast at some 230 m/s, a report every 10 s."""
     time = start + 10.0 * np.arange(count)
     away = 2.5e-5 * (time - start)
-    velocity = np.broadcast_to([np.nan, np.nan, np.nan], (count, 3))
-    return Reports(
-        time, np.full(count, target), 0.8 + away, 0.1 + away, height + climb * (time - start), np.array(velocity)
-    )
+    heights, unknown = height + climb * (time - start), np.full(count, np.nan)
+    return Reports(time, np.full(count, target), 0.8 + away, 0.1 + away, heights, np.full((count, 3), np.nan), unknown)
 
 
 def joined(*parts):
     return Reports(*(np.concatenate([getattr(one, name) for one in parts]) for name in vars(parts[0])))
 
 
-def unknown(reports):
-    return np.full(len(reports), np.nan)
-
-
 def test_clean_reports_stay():
     reports = joined(flight(), flight(1, climb=20.0), flight(3, 2))
-    kept, found = clean(reports, unknown(reports))
-    assert (found.repeated, found.places, found.altitudes) == (0, 0, 0) and found.notes() == {}
+    kept, found = clean(reports)
+    assert found == {}
     for name in vars(reports):
         np.testing.assert_array_equal(getattr(kept, name), getattr(reports, name))
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_positions_repeated_after_the_last_one_heard(told):
+@pytest.mark.parametrize("known", [True, False])
+def test_positions_repeated_after_the_last_one_received(known):
     """An aircraft vanishes after 20 reports; the network goes on with the last one for 10 more."""
     whole = flight()
     stale = np.minimum(np.arange(30), 19)
     rows = whole.rows(stale)
-    seen = replace(rows, time=whole.time)
-    updated = whole.time[stale] if told else unknown(seen)
-    kept, found = clean(seen, updated)
-    assert found.repeated == 10 and len(kept) == 20 and list(found.notes().values()) == [10]
+    seen = replace(rows, time=whole.time, updated=whole.time[stale] if known else whole.updated)
+    kept, found = clean(seen)
+    assert found == {REPEATED: 10} and len(kept) == 20
     np.testing.assert_array_equal(kept.time, whole.time[:20])
 
 
-def test_positions_have_the_time_when_they_were_heard():
+def test_positions_have_the_time_when_they_were_received():
     reports = flight()
-    kept, _ = clean(reports, reports.time - 3.0)
+    kept, _ = clean(replace(reports, updated=reports.time - 3.0))
     np.testing.assert_allclose(kept.time, reports.time - 3.0)
-    # a time after the row's own is none
-    kept, _ = clean(reports, reports.time + 5.0)
+    # a time after the row's own does not count
+    kept, _ = clean(replace(reports, updated=reports.time + 5.0))
     np.testing.assert_array_equal(kept.time, reports.time)
 
 
 def test_what_stands_still_may_repeat_its_place():
     reports = flight().rows(np.zeros(30, dtype=int))
     parked = replace(reports, time=10.0 * np.arange(30))
-    kept, found = clean(parked, unknown(parked))
-    assert found.repeated == 0 and len(kept) == 30
-    told = replace(parked, velocity=np.broadcast_to([200.0, 0.0, 0.0], (30, 3)))
-    assert clean(told, unknown(told))[1].repeated == 29
+    kept, found = clean(parked)
+    assert not found and len(kept) == 30
+    flying = replace(parked, velocity=np.broadcast_to([200.0, 0.0, 0.0], (30, 3)))
+    assert clean(flying)[1] == {REPEATED: 29}
 
 
 def test_altitudes_are_mended_and_climbs_are_not():
@@ -78,8 +72,8 @@ def test_altitudes_are_mended_and_climbs_are_not():
     heights = plain.height.copy()
     wrong = [0, 5, 6, 29, 30, 44]
     heights[wrong] = [0.0, 0.0, -300.0, 25_000.0, 0.0, 12_800.0]
-    kept, found = clean(replace(plain, height=heights), unknown(plain))
-    assert found.altitudes == 6
+    kept, found = clean(replace(plain, height=heights))
+    assert found == {ALTITUDES: 6}
     inner = [5, 6, 44]
     np.testing.assert_allclose(kept.height[inner], plain.height[inner], atol=1.0)
     # at the ends there is nothing to draw a line to: the next height
@@ -92,14 +86,14 @@ def test_places_far_off_are_left_out():
     plain = flight()
     latitude = plain.latitude.copy()
     latitude[12] += 0.02
-    kept, found = clean(replace(plain, latitude=latitude), unknown(plain))
-    assert found.places == 1 and 12 * 10.0 not in kept.time and len(kept) == 29
+    kept, found = clean(replace(plain, latitude=latitude))
+    assert found == {JUMPS: 1} and 12 * 10.0 not in kept.time and len(kept) == 29
 
 
 def test_few_reports():
     for count in (1, 2, 3):
         reports = flight(count=count)
-        assert len(clean(reports, unknown(reports))[0]) == count
+        assert len(clean(reports)[0]) == count
 
 
 def turning(times):
@@ -111,8 +105,7 @@ def turning(times):
 
 
 def reports_at(times):
-    nothing = np.zeros(len(times))
-    return Reports(times, np.zeros(len(times), dtype=int), nothing, nothing, nothing, np.full((len(times), 3), np.nan))
+    return replace(flight(count=len(times)), time=times)
 
 
 def errors(velocities):
@@ -155,7 +148,8 @@ def test_gaps_are_kept():
 def test_velocities_in_the_frame():
     """East, north, up far from the origin, against differences of places a second apart along a great circle."""
     lat, lon = np.array([0.8, 0.83, 0.78]), np.array([0.1, 0.16, 0.05])
-    reports = Reports(np.zeros(3), np.arange(3), lat, lon, np.full(3, 9e3), np.tile([120.0, 180.0, -7.0], (3, 1)))
+    velocity = np.tile([120.0, 180.0, -7.0], (3, 1))
+    reports = replace(flight(count=3), target=np.arange(3), latitude=lat, longitude=lon, velocity=velocity)
     places = east_north_up(lat, lon, reports.height, ORIGIN)
     found = frame_velocities(reports, places, ORIGIN)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.linalg.norm([120.0, 180.0, -7.0]), rtol=1e-4)

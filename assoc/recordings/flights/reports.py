@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,18 +26,18 @@ COLUMNS = {
     "altitude": ("altitude", "geoaltitude", "baroaltitude"),
     "name": ("callsign", "call_sign", "flight"),
 }
-"""Where no column is named, the first of these that the file has is taken; a name it need not have."""
+"""Usual columns by meaning: the first that the file has is taken; the name is optional."""
 
 MOTION = {"updated": "lastposupdate", "speed": "velocity", "heading": "heading", "climb": "vertrate"}
-"""Columns of OpenSky's that are used where they are: when the position was heard (s), m/s, degrees, m/s."""
+"""Columns of OpenSky that are used if present: time of the position (s), m/s, degrees, m/s."""
 
 ALTITUDE_UNITS = {"m": 1.0, "ft": 0.3048}
 
 SPEED_UNITS = {"m/s": (1.0, 1.0), "kt": (1852.0 / 3600.0, 0.3048 / 60.0)}
-"""Of the speed over ground, and of the climb that is told beside it: where speeds are in knots, feet per minute."""
+"""Factors of the ground speed and of the climb rate, which comes in feet per minute where speeds are in knots."""
 
 HIGH = 18_000.0
-"""Metres that aircraft seldom fly at: where a tenth of all reports lies above, feet were taken for metres."""
+"""Metres. Aircraft seldom fly higher: if a tenth of all reports does, feet were probably taken for metres."""
 
 _MISSING = ["", "nan", "NaN", "-nan", "-NaN", "NA", "<NA>", "#N/A", "N/A", "n/a", "null", "NULL", "None"]
 
@@ -45,12 +45,20 @@ _LIMITS = {"latitude": 90.0, "longitude": 360.0, "altitude": 1e6, "time": 1e12}
 
 
 @dataclass(frozen=True, eq=False)
-class FlightReports:
-    """Reports of a file: time (s), number of the target, place (rad, rad, m), sorted by target and time.
+class Reports:
+    """Reports of targets, sorted by target and time, n of them.
 
-    `updated` (n,) tells when each position was heard, s, and `velocity` (n, 3) how the target flew east, north and up,
-    m/s; both are NaN where the file does not say. `names` tells what the targets are called, by their numbers; `notes`
-    which rows were left out, and how many.
+    Attributes
+    ----------
+    time : array (n,)
+        Seconds.
+    target : int array (n,)
+    latitude, longitude, height : arrays (n,)
+        Radians, metres.
+    velocity : array (n, 3)
+        East, north, up at the target's position, m/s; NaN where unknown.
+    updated : array (n,)
+        When each position was received, seconds; NaN where unknown.
     """
 
     time: Array
@@ -58,16 +66,27 @@ class FlightReports:
     latitude: Array
     longitude: Array
     height: Array
-    updated: Array
     velocity: Array
-    names: Mapping[int, str] = field(default_factory=dict)
-    notes: Mapping[str, int] = field(default_factory=dict)
+    updated: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def rows(self, keep: Array) -> Reports:
+        """Return the reports that an index array or mask selects."""
+        return Reports(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
+
+    def first_at_each_time(self) -> Array:
+        """Whether each report, sorted, is the first of its target at its time, bool (n,)."""
+        first = np.ones(len(self), dtype=np.bool_)
+        first[1:] = (np.diff(self.time) > 0) | (np.diff(self.target) != 0)
+        return first
 
 
 def read_flight_reports(
     path: str, named: Mapping[str, str | None], altitude_unit: str = "m", speed_unit: str = "m/s"
-) -> FlightReports:
-    """Read a file; rows without a time, an identity or a place are left out and counted.
+) -> tuple[Reports, dict[int, str], dict[str, int]]:
+    """Read a file; rows without time, identity or position are left out and counted.
 
     Parameters
     ----------
@@ -80,17 +99,25 @@ def read_flight_reports(
     speed_unit : str
         One of `SPEED_UNITS`: "m/s", or "kt" for speeds in knots and climbs in feet per minute.
 
+    Returns
+    -------
+    reports : Reports
+    names : dict of int to str
+        Names of the targets by number.
+    notes : dict of str to int
+        Which rows were left out, and how many.
+
     Raises
     ------
     InvalidInputError
-        The file or a column is missing, or holds what is not a number; the message begins with the file.
+        The file or a column is missing, or a value is not a number; the message begins with the file.
     MissingExtraError
         A Parquet file, and pyarrow is not installed.
 
     Warns
     -----
     AssocWarning
-        Altitudes that aircraft do not fly at, as of feet that are read as metres.
+        Altitudes too high for aircraft, as when feet are read as metres.
     """
     table, chosen = _table(path, named)
     columns = {"time": _times(path, chosen["time"], table[chosen["time"]])}
@@ -102,29 +129,30 @@ def read_flight_reports(
     high = ~np.isnan(columns["altitude"])
     known = known_id & placed & high
     if not known.any():
-        raise InvalidInputError(f"{path}: no row has a time, an identity and a place")
+        raise InvalidInputError(f"{path}: no row has a time, an identity and a position")
     for meaning, limit in _LIMITS.items():
         wrong = known & (np.abs(columns[meaning]) > limit)
         if wrong.any():
             row = int(np.argmax(wrong))
             raise InvalidInputError(
-                f"{_place(path, row, chosen[meaning])}: "
+                f"{_cell(path, row, chosen[meaning])}: "
                 f"expected at most {limit:g} in size, got {columns[meaning][row]:g}"
             )
-    # known ones alone: beside a missing one pandas cuts texts to their first letter
+    # without missing ones: beside these pandas cuts texts to their first letter
     ids, target = np.unique(identity[known].astype(str).to_numpy(dtype=str), return_inverse=True)
     time, lat, lon, height = (columns[meaning][known] for meaning in ("time", "latitude", "longitude", "altitude"))
     height = height * ALTITUDE_UNITS[altitude_unit]
     if len(height) >= 10 and float(np.quantile(height, 0.9)) > HIGH:
         warn(
-            f"{path}: a tenth of all reports lies above {np.quantile(height, 0.9):.0f} m, where hardly an aircraft "
-            "flies: altitudes in feet? (altitude_unit='ft', --altitude-unit ft)"
+            f"{path}: a tenth of all reports lies above {np.quantile(height, 0.9):.0f} m, higher than aircraft usually "
+            "fly: altitudes in feet? (altitude_unit='ft', --altitude-unit ft)"
         )
-    order = np.lexsort((time, target))
-    # of two reports at one instant the first stays
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(time[order]) > 0) | (np.diff(target[order]) != 0)
-    order = order[first]
+    updated, velocity = _motion(table, chosen)
+    over_ground, climbing = SPEED_UNITS[speed_unit]
+    velocity = velocity * [over_ground, over_ground, climbing]
+    every = Reports(time, target, np.radians(lat), np.radians(lon), height, velocity[known], updated[known])
+    every = every.rows(np.lexsort((time, target)))
+    first = every.first_at_each_time()
     notes = {
         "rows in the file": len(known),
         "rows left out, without time, latitude or longitude": int((~placed).sum()),
@@ -132,21 +160,8 @@ def read_flight_reports(
         "rows left out, without altitude": int((placed & known_id & ~high).sum()),
         "rows left out, second report of an aircraft at one instant": int((~first).sum()),
     }
-    updated, velocity = _motion(table, chosen)
-    over_ground, climbing = SPEED_UNITS[speed_unit]
-    velocity = velocity * [over_ground, over_ground, climbing]
     calls = table[chosen["name"]][known] if "name" in chosen else None
-    return FlightReports(
-        time[order],
-        target[order],
-        np.radians(lat[order]),
-        np.radians(lon[order]),
-        height[order],
-        updated[known][order],
-        velocity[known][order],
-        _names(ids, target, calls),
-        {what: count for what, count in notes.items() if count},
-    )
+    return every.rows(first), _names(ids, target, calls), {what: count for what, count in notes.items() if count}
 
 
 def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, dict[str, str]]:
@@ -161,7 +176,7 @@ def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, di
             chosen = choose_columns(path, [str(name) for name in table.columns], named)
         else:
             chosen = choose_columns(path, list(pd.read_csv(path, nrows=0).columns), named)
-            # nan and null are numbers that are missing, but names as good as others
+            # nan and null are missing numbers, but valid names
             texts: Any = {chosen[meaning]: str for meaning in ("id", "name") if meaning in chosen}
             missing = {column: [""] if column in texts else _MISSING for column in chosen.values()}
             table = pd.read_csv(
@@ -194,7 +209,7 @@ def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]
     for meaning, usual in COLUMNS.items():
         wanted = named.get(meaning)
         candidates = usual if wanted is None else (wanted,)
-        found = next((one for one in candidates if one in header), None)
+        found = next((name for name in candidates if name in header), None)
         if found is None and (meaning != "name" or wanted is not None):
             have = ", ".join(str(column)[:30] for column in header[:12])
             raise InvalidInputError(f"{path}: no column {' or '.join(candidates)} for the {meaning}; it has: {have}")
@@ -209,7 +224,7 @@ def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]
 
 
 def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Array]:
-    """When positions were heard, (n,), and velocities east, north, up, (n, 3); NaN where nothing sound is said."""
+    """When positions were received, (n,), and velocities east, north, up, (n, 3); NaN where unknown."""
     import pandas as pd
 
     def column(meaning: str) -> Array:
@@ -219,16 +234,16 @@ def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Arra
         return np.where(np.isfinite(values), values, np.nan)
 
     speed, heading = column("speed"), np.radians(column("heading"))
-    # level flight where no climb is told
+    # without a climb rate flight is taken as level
     climb = column("climb") if "climb" in chosen else np.zeros(len(table))
     return column("updated"), np.stack([speed * np.sin(heading), speed * np.cos(heading), climb], axis=1)
 
 
-def _place(path: str, row: int, column: str) -> str:
+def _cell(path: str, row: int, column: str) -> str:
     if Path(path).suffix.lower() in (".parquet", ".pq"):
         return f"{path}: row {row}, column {column!r}"
     with open(path, "rb") as file:
-        # lines without anything are no rows
+        # empty lines are not rows
         filled = (number for number, line in enumerate(file, start=1) if line.strip())
         line = next(islice(filled, row + 1, None), row + 2)
     return f"{path}: line {line}, column {column!r}"
@@ -241,12 +256,12 @@ def _numbers(path: str, column: str, text: pd.Series) -> Array:
     wrong = np.isinf(values) | (np.isnan(values) & text.notna().to_numpy())
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InvalidInputError(f"{_place(path, row, column)}: expected a number, got {text.iloc[row]!r}")
+        raise InvalidInputError(f"{_cell(path, row, column)}: expected a number, got {text.iloc[row]!r}")
     return values
 
 
 def _times(path: str, column: str, text: pd.Series) -> Array:
-    """Seconds as they are, dates (ISO 8601, UTC unless they say otherwise) as seconds since 1970-01-01 UTC."""
+    """Seconds as they are; dates (ISO 8601, UTC by default) as seconds since 1970-01-01 UTC."""
     import pandas as pd
 
     present = text.notna().to_numpy()
@@ -264,14 +279,14 @@ def _times(path: str, column: str, text: pd.Series) -> Array:
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InvalidInputError(
-            f"{_place(path, row, column)}: expected seconds or a date (ISO 8601), got {str(text.iloc[row])[:60]!r}"
+            f"{_cell(path, row, column)}: expected seconds or a date (ISO 8601), got {str(text.iloc[row])[:60]!r}"
         )
     seconds = (moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
     return np.asarray(seconds.to_numpy(dtype=np.float64))
 
 
 def _names(ids: Array, target: Array, calls: pd.Series | None) -> dict[int, str]:
-    """Call signs where there are any, the most frequent of each aircraft, else its identity."""
+    """The most frequent call sign of each aircraft, or its identity if there is none."""
     names = {number: str(name) for number, name in enumerate(ids.tolist())}
     if calls is not None:
         import pandas as pd

@@ -1,0 +1,1 @@
+"""Reports of aircraft from files, and their cleaning."""
