@@ -17,7 +17,7 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.filters.kernels.gates import pairs
-from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, PLAIN, STATUSES
+from assoc.filters.kernels.gaussian import BAD_COVARIANCE, BAD_MEASUREMENT, GOOD, LOG_TURN, PLAIN, STATUSES
 from assoc.filters.kernels.linear_algebra import all_factors
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
@@ -25,7 +25,7 @@ from assoc.filters.state import Gaussian, finite
 
 
 class State(Protocol):
-    """What every state of a filter offers: means (B, n), covariances (B, n, n), selection of targets."""
+    """What every state of a filter offers."""
 
     @property
     def mean(self) -> Array:
@@ -59,7 +59,7 @@ class Update(Generic[S]):
     """Of the measurement under the prediction, (B,)."""
 
     def __getattr__(self, name: str) -> Array:
-        """What `update_of` was given in one piece, taken apart when first asked for."""
+        """Take apart what `update_of` was given in one piece, on first use."""
         parts = self.__dict__
         if "rest" not in parts or name not in ("innovation", "covariance", "nis", "log_likelihood"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
@@ -75,9 +75,9 @@ class Update(Generic[S]):
 
 
 def update_of(state: S, rest: Array, measured: int) -> Update[S]:
-    """Make an update of what the kernels write: for `measured` quantities innovations and all that follows.
+    """Make an update of `rest`, which kernels write for `measured` quantities.
 
-    For a single target four arrays would take as long to make as the correction itself; few are asked for.
+    For a single target making its four arrays would take as long as the correction; few of them are used.
     """
     made: Update[S] = _new(Update)
     parts = made.__dict__
@@ -86,7 +86,7 @@ def update_of(state: S, rest: Array, measured: int) -> Update[S]:
 
 
 class Expected(NamedTuple):
-    """The measurements that a state leads one to expect."""
+    """Expected measurements of a state."""
 
     mean: Array
     """(B, d)."""
@@ -132,7 +132,7 @@ class Filter(ABC, Generic[S]):
         """Return the state dt seconds later."""
 
     def predict_each(self, state: S, dt: Array) -> S:
-        """Return each state its own dt seconds later; `assoc.filters.base.predict_each` is the door to it.
+        """Return each state its own dt seconds later; callers use `assoc.filters.base.predict_each`.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Filter(ABC, Generic[S]):
         """
 
     def step(self, state: S, dt: float, measured: Array, sensor: Measurement) -> Update[S]:
-        """`predict` and `update` in one call, the quickest way where nothing is asked of the prediction."""
+        """`predict` and `update` in one call: the quickest way if the prediction itself is not needed."""
         return self.update(self.predict(state, dt), measured, sensor)
 
     @abstractmethod
@@ -251,13 +251,8 @@ class Filter(ABC, Generic[S]):
 
     @staticmethod
     def _compare_given(o: Observation, h: Array, covariance: Array, z: Array) -> tuple[Array, Array]:
-        """Compare with a user's model, whose residual may be his own."""
-        v = np.stack([o.model.residual(z, np.broadcast_to(one, z.shape)) for one in h])
-        factor = factors(covariance)
-        white = np.linalg.solve(factor, v.transpose(0, 2, 1))
-        square = (white**2).sum(axis=1)
-        log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
-        return -0.5 * (square + log_det[:, None] + o.dim * np.log(2 * np.pi)), square
+        """`compare` with a user's model and its residuals."""
+        return scores(np.stack([o.model.residual(z, np.broadcast_to(row, z.shape)) for row in h]), covariance)
 
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
@@ -295,7 +290,7 @@ def measured_array(measured: object, batch: int | None, dim: int, what: str = "m
 
 
 def complain(status: int, where: str = "") -> NoReturn:
-    """Turn what a kernel found into an error."""
+    """Raise the error of a kernel's status."""
     row, status = divmod(status, STATUSES)
     if status == BAD_MEASUREMENT:
         raise InvalidInputError(f"measured must be finite, row {row} is not{where}")
@@ -304,12 +299,15 @@ def complain(status: int, where: str = "") -> NoReturn:
     raise InvalidInputError(f"state: mean of target {row} gives no finite measurement{where}")
 
 
-def factors(covariance: Array) -> Array:
-    """Cholesky factors of covariances (B, d, d); refuses those that are not positive definite."""
-    bad, found = all_factors(np.ascontiguousarray(covariance))
+def scores(residuals: Array, covariance: Array) -> tuple[Array, Array]:
+    """Log-likelihoods and squared Mahalanobis distances, each (B, M), of residuals (B, M, d)."""
+    bad, factor = all_factors(np.ascontiguousarray(covariance))
     if bad >= 0:
         complain(BAD_COVARIANCE + STATUSES * bad)
-    return found
+    white = np.linalg.solve(factor, residuals.transpose(0, 2, 1))
+    square = (white**2).sum(axis=1)
+    log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
+    return -0.5 * (square + log_det[:, None] + residuals.shape[2] * LOG_TURN), square
 
 
 def given_points(o: Observation, points: Array, z: Array) -> tuple[Array, Array, Array]:

@@ -1,18 +1,18 @@
-"""Batches of targets joined, moved on by different times, and turned into plain arrays and back.
+"""Batches of targets selected, joined, and turned into plain arrays and back.
 
-They work for the state of any filter: what a state holds are arrays whose first axis is the target.
+They work for the state of any filter: a dataclass of arrays whose first axis is the target.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from assoc._types import Array
-from assoc.filters.state import Gaussian, gaussian
+from assoc.filters.state import Gaussian
 
 
 def arrays_of(state: Any) -> dict[str, Array]:
@@ -20,7 +20,7 @@ def arrays_of(state: Any) -> dict[str, Array]:
     found = {}
     for field in fields(state):
         value = getattr(state, field.name)
-        # what is alike for all targets may be stored once
+        # values common to all targets may be stored once
         if len(value) != len(state):
             value = np.broadcast_to(value, (len(state), *value.shape[1:]))
         found[field.name] = value
@@ -35,20 +35,35 @@ def state_from(kind: type, arrays: Mapping[str, Array]) -> Any:
     return made
 
 
+class Batch:
+    """Length, selection and text of a state."""
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+
+    def __getitem__(self, rows: Any) -> Self:
+        """Return the targets that an index array, mask or slice selects."""
+        selected: Self = state_from(type(self), {name: value[rows] for name, value in arrays_of(self).items()})
+        return selected
+
+    def __repr__(self) -> str:
+        shape = getattr(self, fields(self)[0].name).shape  # type: ignore[arg-type]
+        return f"{type(self).__name__}({' x '.join(map(str, shape))})"
+
+
 def concatenate(states: Sequence[Any]) -> Any:
     """Return one batch with the targets of several.
 
     Parameters
     ----------
     states : sequence of states of one filter
-        At least one. Histories that one of them does not have yet are filled with zeros.
+        At least one. Histories that some do not have yet are filled with zeros.
     """
     present = [state for state in states if len(state)] or list(states[:1])
     if len(present) == 1:
         return present[0]
     if isinstance(present[0], Gaussian):
-        means = np.concatenate([state.mean for state in present])
-        return gaussian(means, np.concatenate([state.covariance for state in present]))
+        return Gaussian.concatenate(present)
     parts = [arrays_of(state) for state in present]
     joined = {}
     for name in parts[0]:

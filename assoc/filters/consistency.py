@@ -1,4 +1,4 @@
-"""Whether a filter's covariances tell the truth: NEES and NIS with their chi-square bounds."""
+"""Whether a filter's covariances fit its errors: NEES and NIS with their chi-square bounds."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def nees(state: State, truth: Array) -> Array:
         raise InvalidInputError(f"truth must have shape {state.mean.shape}, got {truth.shape}")
     error = truth - state.mean
     size = np.sqrt(np.maximum(np.einsum("bii->bi", state.covariance), 1e-300))
-    # in units of the standard deviations rounding is small against all that tells of a state
+    # in units of standard deviations rounding errors are small
     unit, error = state.covariance / size[:, :, None] / size[:, None, :], error / size
     flat = np.linalg.matrix_rank(unit, hermitian=True) < unit.shape[1]
     if flat.any():

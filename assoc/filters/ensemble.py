@@ -22,6 +22,7 @@ from assoc.filters.base import (
     measured_array,
     update_of,
 )
+from assoc.filters.batches import Batch
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.points import ensemble_update, move_ensemble
 from assoc.filters.measurement import Measurement, Observation
@@ -33,7 +34,7 @@ _NOTHING3 = np.zeros((0, 0, 0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble:
+class Ensemble(Batch):
     """Ensembles of N members for each of B targets, (B, N, n)."""
 
     members: Array
@@ -56,16 +57,6 @@ class Ensemble:
         deviation = self.members - self.mean[:, None]
         covariance: Array = deviation.transpose(0, 2, 1) @ deviation / (self.members.shape[1] - 1)
         return covariance
-
-    def __len__(self) -> int:
-        return len(self.members)
-
-    def __getitem__(self, rows: Any) -> Ensemble:
-        """Return the targets that an index array, mask or slice selects."""
-        return _ensemble(np.ascontiguousarray(self.members[rows]))
-
-    def __repr__(self) -> str:
-        return f"Ensemble({' x '.join(map(str, self.members.shape))})"
 
 
 def _ensemble(members: Array) -> Ensemble:
@@ -107,7 +98,7 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         return _ensemble(state.mean[:, None] + shocks @ factors.transpose(0, 2, 1))
 
     def predict(self, state: Ensemble, dt: float) -> Ensemble:
-        """Return the ensembles dt seconds later, each member with noise of its own."""
+        """Return the ensembles dt seconds later, with noise for each member."""
         members, motion = self._checked(state), self.motion
         B, N, n = members.shape
         positive(dt, "dt", zero=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import expm, logm
@@ -19,6 +18,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update, check_dimension
+from assoc.filters.batches import Batch
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement
 from assoc.filters.state import Gaussian, finite, gaussian
@@ -26,7 +26,7 @@ from assoc.filters.unscented import UnscentedKalmanFilter
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mixture:
+class Mixture(Batch):
     """Gaussian mixtures, one component for each of m models: (B, m, n), (B, m, n, n), weights (B, m)."""
 
     means: Array
@@ -46,23 +46,13 @@ class Mixture:
         covariance: Array = np.einsum("bm,bmij->bij", self.weights, self.covariances)
         return covariance + np.einsum("bm,bmi,bmj->bij", self.weights, spread, spread)
 
-    def __len__(self) -> int:
-        return len(self.means)
-
-    def __getitem__(self, rows: Any) -> Mixture:
-        """Return the targets that an index array, mask or slice selects."""
-        return Mixture(self.means[rows], self.covariances[rows], self.weights[rows])
-
-    def __repr__(self) -> str:
-        return f"Mixture({' x '.join(map(str, self.means.shape))})"
-
     def component(self, j: int) -> Gaussian:
         """Return the Gaussians of one model."""
         return gaussian(np.ascontiguousarray(self.means[:, j]), np.ascontiguousarray(self.covariances[:, j]))
 
 
-# eigenvectors of the rates with a condition number below this give transitions to ten digits
-_WELL_APART = 1e4
+# eigenvectors of the rates with a smaller condition number give transitions to ten digits
+_LARGEST_CONDITION = 1e4
 # time steps whose transitions are remembered
 _MOST_STEPS = 64
 
@@ -79,7 +69,7 @@ def transition_rates(transition: Array, interval: float) -> Array:
     Raises
     ------
     InvalidInputError
-        There is no such chain: a mode would be left and come back to faster than at random.
+        No chain in continuous time has these probabilities.
     """
     # away from a negative or zero eigenvalue the logarithm is real
     values = np.linalg.eigvals(transition)
@@ -110,7 +100,7 @@ def transition_from_sojourns(seconds: Sequence[float], interval: float = 1.0) ->
     -------
     array (m, m)
     """
-    leave = 1.0 / np.array([positive(one, "seconds") for one in seconds])
+    leave = 1.0 / np.array([positive(sojourn, "seconds") for sojourn in seconds])
     m = len(leave)
     if m < 2:
         raise InvalidInputError(f"seconds: expected at least 2 modes, got {m}")
@@ -127,9 +117,9 @@ class InteractingMultipleModel(Filter[Mixture]):
     filters : sequence of filters with Gaussian states
         Their motion models share one state; see `assoc.filters.Padded`.
     transition : array_like (m, m)
-        Probability that a target in mode i is in mode j `interval` seconds later; rows sum to 1. It must be one that
-        a continuous-time Markov chain can have; with two modes that asks for a diagonal that sums to more than 1.
-        `transition_from_sojourns` makes it of mean times.
+        Probability that a target in mode i is in mode j `interval` seconds later; rows sum to 1. A Markov chain in
+        continuous time must have them: with two modes the diagonal sums to more than 1. `transition_from_sojourns`
+        makes them of mean times.
     weights : array_like (m,), optional
         Probabilities of the modes at the start; without it the stationary ones of `transition`.
     interval : float
@@ -155,7 +145,7 @@ class InteractingMultipleModel(Filter[Mixture]):
     ) -> None:
         if len(filters) < 2:
             raise InvalidInputError(f"filters must be at least 2, got {len(filters)}")
-        dims = [one.motion.dim for one in filters]
+        dims = [model.motion.dim for model in filters]
         if len(set(dims)) > 1:
             raise InvalidInputError(f"filters must share one state, got dimensions {dims}")
         super().__init__(filters[0].motion)
@@ -204,7 +194,11 @@ class InteractingMultipleModel(Filter[Mixture]):
         """`transition_over` of each of k time steps, (k, m, m)."""
         if self._eigen is None:
             values, vectors = np.linalg.eig(self.rates)
-            self._eigen = values, vectors, np.linalg.inv(vectors) if np.linalg.cond(vectors) < _WELL_APART else None
+            self._eigen = (
+                values,
+                vectors,
+                np.linalg.inv(vectors) if np.linalg.cond(vectors) < _LARGEST_CONDITION else None,
+            )
         values, vectors, inverse = self._eigen
         if inverse is None:
             return np.stack([self.transition_over(step) for step in dt.tolist()])
@@ -212,59 +206,36 @@ class InteractingMultipleModel(Filter[Mixture]):
 
     def predict(self, state: Mixture, dt: float) -> Mixture:
         """Mix the models and predict each; see `Filter.predict`."""
-        return self._predict(state, dt, False)[0]
+        mixed = _mixed(state, self.transition_over(dt))
+        moved = [model.predict(mixed.component(j), dt) for j, model in enumerate(self.filters)]
+        return _mixture(moved, mixed.weights)
 
     def predict_each(self, state: Mixture, dt: Array) -> Mixture:
         """Return each state its own dt seconds later; see `Filter.predict_each`."""
-        transition = self._transitions(dt)
-        weights = (state.weights[:, None] @ transition)[:, 0]
-        means, P = _mixed(state, weights, transition)
-        new_means, new_P = np.empty_like(means), np.empty_like(P)
-        for j, one in enumerate(self.filters):
-            mixed = gaussian(np.ascontiguousarray(means[:, j]), np.ascontiguousarray(P[:, j]))
-            moved = one.predict_each(mixed, dt)
-            new_means[:, j], new_P[:, j] = moved.mean, moved.covariance
-        return Mixture(new_means, new_P, weights)
+        mixed = _mixed(state, self._transitions(dt))
+        moved = [model.predict_each(mixed.component(j), dt) for j, model in enumerate(self.filters)]
+        return _mixture(moved, mixed.weights)
 
     def move(self, state: Mixture, dt: float) -> tuple[Mixture, Array]:
         """`predict`, and the covariance of the mixtures before and after it, (B, n, n)."""
-        return self._predict(state, dt, True)
-
-    def _predict(self, state: Mixture, dt: float, crossing: bool) -> tuple[Mixture, Array]:
-        transition = self.transition_over(dt)
-        weights = state.weights @ transition
-        means, P = _mixed(state, weights, transition)
-        B, _, n = means.shape
-        new_means, new_P = np.empty_like(means), np.empty_like(P)
-        cross = np.zeros((B, n, n))
-        whole = state.mean
-        for j, one in enumerate(self.filters):
-            mixed = gaussian(np.ascontiguousarray(means[:, j]), np.ascontiguousarray(P[:, j]))
-            if crossing:
-                moved, between = one.move(mixed, dt)
-                cross += weights[:, j, None, None] * (
-                    between + (means[:, j] - whole)[:, :, None] * moved.mean[:, None, :]
-                )
-            else:
-                moved = one.predict(mixed, dt)
-            new_means[:, j], new_P[:, j] = moved.mean, moved.covariance
-        # sum of w (m - whole) moved' needs no centring of moved: the first factor sums to zero
-        return Mixture(new_means, new_P, weights), cross
+        mixed = _mixed(state, self.transition_over(dt))
+        moved = [model.move(mixed.component(j), dt) for j, model in enumerate(self.filters)]
+        cross = np.zeros((len(state), self.motion.dim, self.motion.dim))
+        for j, (after, between) in enumerate(moved):
+            # the factors (means - mean) sum to zero over the models: `after` need not be centred
+            away = (mixed.means[:, j] - state.mean)[:, :, None]
+            cross += mixed.weights[:, j, None, None] * (between + away * after.mean[:, None, :])
+        return _mixture([after for after, _ in moved], mixed.weights), cross
 
     def update(self, state: Mixture, measured: Array, sensor: Measurement) -> Update[Mixture]:
         """Correct each model and its probability; see `Filter.update`."""
-        m = len(self.filters)
-        done = [one.update(state.component(j), measured, sensor) for j, one in enumerate(self.filters)]
+        done = [model.update(state.component(j), measured, sensor) for j, model in enumerate(self.filters)]
         with np.errstate(divide="ignore"):
             joint = np.stack([d.log_likelihood for d in done], axis=1) + np.log(state.weights)
         top = joint.max(axis=1, keepdims=True)
         scaled = np.exp(joint - top)
         total = scaled.sum(axis=1, keepdims=True)
-        corrected = Mixture(
-            np.stack([d.state.mean for d in done], axis=1),
-            np.stack([d.state.covariance for d in done], axis=1),
-            scaled / total,
-        )
+        corrected = _mixture([d.state for d in done], scaled / total)
         # innovation of the mixture, in deviations from the first model's, which are small angles
         v = np.stack([d.innovation for d in done], axis=1)
         o = self.observe(sensor)
@@ -278,12 +249,12 @@ class InteractingMultipleModel(Filter[Mixture]):
         S = np.einsum("bm,bmij->bij", state.weights, np.stack([d.covariance for d in done], axis=1))
         S += np.einsum("bm,bmi,bmj->bij", state.weights, away, away)
         nis = np.einsum("bi,bi->b", mean, np.linalg.solve(S, mean[..., None])[..., 0])
-        assert m == v.shape[1]
         return Update(corrected, mean, S, nis, (top + np.log(total))[:, 0])
 
     def expected(self, state: Mixture, sensor: Measurement) -> Expected:
         """Return the expected measurements and covariances of the mixtures; see `Filter.expected`."""
-        h, S = self._each(state, sensor)
+        each = [model.expected(state.component(j), sensor) for j, model in enumerate(self.filters)]
+        h, S = np.stack([e.mean for e in each], axis=1), np.stack([e.covariance for e in each], axis=1)
         base = h[:, :1]
         away = h - base
         if hasattr(sensor, "angular"):
@@ -295,21 +266,11 @@ class InteractingMultipleModel(Filter[Mixture]):
         covariance += np.einsum("bm,bmi,bmj->bij", state.weights, spread, spread)
         return Expected(base[:, 0] + mean, covariance)
 
-    def _each(self, state: Mixture, sensor: Measurement) -> tuple[Array, Array]:
-        all_expected = [one.expected(state.component(j), sensor) for j, one in enumerate(self.filters)]
-        return (
-            np.stack([e.mean for e in all_expected], axis=1),
-            np.stack([e.covariance for e in all_expected], axis=1),
-        )
-
     def log_likelihood(self, state: Mixture, measurements: Array, sensor: Measurement) -> Array:
         """Log-likelihood under the mixture of the models' predictions, (B, M)."""
-        each = np.stack(
-            [one.log_likelihood(state.component(j), measurements, sensor) for j, one in enumerate(self.filters)],
-            axis=1,
-        )
+        each = [model.log_likelihood(state.component(j), measurements, sensor) for j, model in enumerate(self.filters)]
         with np.errstate(divide="ignore"):
-            joint = each + np.log(state.weights)[:, :, None]
+            joint = np.stack(each, axis=1) + np.log(state.weights)[:, :, None]
         result: Array = np.logaddexp.reduce(joint, axis=1)
         return result
 
@@ -318,19 +279,24 @@ class InteractingMultipleModel(Filter[Mixture]):
         return self.log_likelihood(state, measurements, sensor), super().compare(state, measurements, sensor)[1]
 
 
-def _mixed(state: Mixture, weights: Array, transition: Array) -> tuple[Array, Array]:
-    """Means and covariances that each model starts from, given the new weights and transitions (m, m) or (B, m, m)."""
+def _mixture(parts: Sequence[Gaussian], weights: Array) -> Mixture:
+    means, covariances = [part.mean for part in parts], [part.covariance for part in parts]
+    return Mixture(np.stack(means, axis=1), np.stack(covariances, axis=1), weights)
+
+
+def _mixed(state: Mixture, transition: Array) -> Mixture:
+    """What each model starts from, and the new weights, given transitions (m, m) or (B, m, m)."""
+    weights = (state.weights[:, None] @ transition)[:, 0] if transition.ndim == 3 else state.weights @ transition
     # share of model i in what model j starts from
     share = state.weights[:, :, None] * transition / np.maximum(weights, 1e-300)[:, None, :]
     dead = weights < 1e-300
     if dead.any():
-        # a model that nothing speaks for goes on from where it is
+        # a model of weight zero goes on from its own state
         share = np.where(dead[:, None, :], np.eye(weights.shape[1]), share)
     means = share.transpose(0, 2, 1) @ state.means
     away = state.means[:, :, None] - means[:, None]
     # sum over i of share_ij (P_i + away away')
     B, m, n = means.shape
     P = (share.transpose(0, 2, 1) @ state.covariances.reshape(B, m, n * n)).reshape(B, m, n, n)
-    weighted = (share[..., None] * away).transpose(0, 2, 3, 1)
-    P += weighted @ away.transpose(0, 2, 1, 3)
-    return means, P
+    P += (share[..., None] * away).transpose(0, 2, 3, 1) @ away.transpose(0, 2, 1, 3)
+    return Mixture(means, P, weights)

@@ -1,4 +1,4 @@
-"""What Kalman's filter and those that linearise have in common."""
+"""The base of Kalman's filter and those that linearise."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ _PLAIN_MODELS = LinearMotion.jacobian, LinearMotion.noise
 
 
 class GaussianFilter(Filter[Gaussian]):
-    """What Kalman's filter and those that linearise have in common."""
+    """The base of Kalman's filter and those that linearise."""
 
     def __init__(self, motion: Motion) -> None:
         super().__init__(motion)
-        # both matrices with one look-up, unless a child class has its own idea of them
+        # both matrices with one look-up, unless a child class overrides them
         kind = type(motion)
         self._linear: LinearMotion | None = None
         self._plan: tuple[Any, ...] = (None, None)
@@ -74,7 +74,7 @@ class GaussianFilter(Filter[Gaussian]):
             return super().predict_each(state, dt)
         steps, which = np.unique(dt, return_inverse=True)
         F, Q = linear.matrices_of_each(steps)
-        # noise that is drawn for each step, however short, is none where there is no step
+        # some models add noise at every step, however short: none where there is no step
         Q[steps == 0.0] = 0.0
         F, Q = F[which], Q[which]
         mean, P = _empty(state.mean.shape), _empty(state.covariance.shape)
@@ -101,7 +101,7 @@ class GaussianFilter(Filter[Gaussian]):
         return update_of(gaussian(mean, P), rest, d)
 
     def _make_plan(self, sensor: Measurement, dt: float) -> tuple[Any, ...]:
-        """What `step` needs to know of a sensor and a time step; the last plan is remembered."""
+        """Arguments of the kernel for a sensor and a time step; the last plan is remembered."""
         o, n, d = self.observe(sensor), self.motion.dim, self.observe(sensor).dim
         motion = None if self._linear is None or o.code < 0 else self._linear.models(dt)[2]
         plan = self._plan = (sensor, dt, o.packed, motion, d, n)

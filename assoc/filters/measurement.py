@@ -1,4 +1,4 @@
-"""What filters see of a measurement: sensors of `assoc.sensors`, matrices, or a user's own function."""
+"""Measurement models of filters: sensors of `assoc.sensors`, matrices, or a user's function."""
 
 from __future__ import annotations
 
@@ -134,29 +134,29 @@ def pack(code: int, kind: int, position: Array, columns: Array, matrix: Array, c
 
 
 class _SensorAsFunction(FunctionMeasurement):
-    """A sensor of the user's own class, which has no compiled twin."""
+    """A sensor of a user's class, which has no compiled model."""
 
     def __init__(self, sensor: Sensor, position: Array, dim: int) -> None:
         self.dim, self.covariance = sensor.dim, np.array(sensor.covariance)
         self.sensor, self.position, self.states = sensor, position, dim
 
-    def _places(self, states: Array) -> tuple[Array, ...]:
+    def _positions(self, states: Array) -> tuple[Array, ...]:
         """Positions and, if the sensor measures a velocity, velocities, each (m, 3)."""
         if not self.sensor.measures_velocity:
-            places = np.zeros((len(states), 3))
-            places[:, : len(self.position)] = states[:, self.position]
-            return (places,)
+            positions = np.zeros((len(states), 3))
+            positions[:, : len(self.position)] = states[:, self.position]
+            return (positions,)
         both = np.zeros((len(states), 2, 3))
         axes = len(self.position) // 2
         both[:, :, :axes] = states[:, self.position].reshape(-1, 2, axes)
         return both[:, 0], both[:, 1]
 
     def measure(self, states: Array) -> Array:
-        return finite(self.sensor.measure(*self._places(states)), "the sensor's measure", 2)
+        return finite(self.sensor.measure(*self._positions(states)), "the sensor's measure", 2)
 
     def jacobian(self, states: Array) -> Array:
         H = np.zeros((len(states), self.dim, self.states))
-        slopes = self.sensor.jacobian(*self._places(states))
+        slopes = self.sensor.jacobian(*self._positions(states))
         if self.sensor.measures_velocity:
             axes = len(self.position) // 2
             slopes = slopes.reshape(len(states), self.dim, 2, 3)[..., :axes].reshape(len(states), self.dim, -1)
@@ -171,7 +171,7 @@ _NO_MODEL: Any = None
 
 
 def _velocity_columns(motion: Motion) -> Array:
-    """Where the velocities stand in a state: after the positions, in their order."""
+    """Columns of the velocities in a state: after the positions, in their order."""
     position = np.array(motion.position, dtype=np.int64)
     columns = position + len(position)
     if len(position) < 2 or columns.max() >= motion.dim or np.isin(columns, position).any():

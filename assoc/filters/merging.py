@@ -15,14 +15,14 @@ from assoc.filters.state import Gaussian, gaussian
 def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
     """Match the moments of weighted mixtures.
 
-    Of states that are mixtures of models, models are merged each by itself: they stay what they are.
+    Mixtures of models stay such: each model is merged by itself.
 
     Parameters
     ----------
     states : Gaussian or Mixture
         K of them.
     target : int array (K,)
-        Whose they are, from 0; every target has one at least.
+        Target of each state, from 0; every target has at least one.
     weights : array (K,)
         0 or more; those of one target sum to 1.
     count : int
@@ -47,7 +47,7 @@ def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
             f"filter: states of the kind {type(states).__name__} cannot be merged; use a Kalman filter, extended or "
             "unscented, or interacting multiple models"
         )
-    # by target, so that sums are those of stretches
+    # sorted by target, for sums over stretches
     order = np.argsort(target, kind="stable")
     states, target, weights = states[order], target[order], weights[order]
     begin = np.searchsorted(target, np.arange(count))
@@ -56,7 +56,7 @@ def merged(states: Any, target: Array, weights: Array, count: int) -> Any:
     modes = states.weights.shape[1]
     each = weights[:, None] * states.weights
     total = _sums(each, begin)
-    # a model that nothing speaks for is merged all the same
+    # models of weight zero are merged as well
     share = np.where(total[target] > 0.0, each / np.maximum(total[target], 1e-300), weights[:, None])
     parts = [_matched(states.means[:, j], states.covariances[:, j], target, share[:, j], begin) for j in range(modes)]
     means, covariances = (np.stack(part, axis=1) for part in zip(*parts, strict=True))

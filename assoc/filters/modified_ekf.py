@@ -6,8 +6,8 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import factors
-from assoc.filters.kernels.gaussian import LOG_TURN, MODIFIED, SIMPLIFIED
+from assoc.filters.base import scores
+from assoc.filters.kernels.gaussian import MODIFIED, SIMPLIFIED
 from assoc.filters.linearised import GaussianFilter
 from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
@@ -72,8 +72,4 @@ class ModifiedEKF(GaussianFilter):
             v[..., 0] -= 0.5 * r * (np.cos(e) ** 2 * (t**2 - st) + p**2 - sp)
             v[..., 1] -= np.tan(e) * t * p
             v[..., 2] += 0.5 * np.sin(e) * np.cos(e) * (t**2 - st)
-        factor = factors(covariance)
-        white = np.linalg.solve(factor, v.transpose(0, 2, 1))
-        square = (white**2).sum(axis=1)
-        log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
-        return -0.5 * (square + log_det[:, None] + 3 * LOG_TURN), square
+        return scores(v, covariance)

@@ -1,4 +1,4 @@
-"""The fixed-lag smoother: what the last measurements say of some steps ago, for any filter."""
+"""The fixed-lag smoother, for any filter."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from assoc.filters.state import Gaussian, gaussian
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Step:
-    """One step of the past: what was believed after it, and how it went on."""
+    """One step of the past and the prediction that followed."""
 
     mean: Array
     covariance: Array

@@ -1,4 +1,4 @@
-"""What a filter believes of its targets: a batch of Gaussians."""
+"""A batch of Gaussians, and checks of arrays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from assoc.filters.kernels.linear_algebra import all_factors
 
 
 def finite(value: object, what: str, *dimensions: int) -> Array:
-    """Return a float64 C-ordered array of one of these numbers of axes; `what` is named if it is not one."""
+    """Return a finite float64 C-ordered array of one of these numbers of axes; errors name it `what`."""
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -92,9 +92,9 @@ class Gaussian:
 
 
 def gaussian(mean: Array, covariance: Array) -> Gaussian:
-    """Make a Gaussian of arrays that a kernel has just made, without checking them again."""
+    """Make a Gaussian of a kernel's results, without checking them again."""
     made = object.__new__(Gaussian)
-    # a frozen dataclass keeps its fields in the instance's own dictionary
+    # a frozen dataclass refuses assignments, its dictionary does not
     made.__dict__["mean"] = mean
     made.__dict__["covariance"] = covariance
     return made

@@ -66,12 +66,12 @@ def test_refusals():
     good = FuzzyVariable({"a": (0.0, 1.0, 2.0, 3.0)})
     with pytest.raises(InvalidInputError, match="corners in order"):
         FuzzyVariable({"a": (0.0, 2.0, 1.0, 3.0)})
-    with pytest.raises(InvalidInputError, match="names no pair"):
+    with pytest.raises(InvalidInputError, match="expected a pair"):
         FuzzyRules(good, good, [("a", "b")])
     with pytest.raises(InvalidInputError, match="inputs must be finite"):
         FuzzyRules(good, good, [("a", "a")])(np.array([np.nan]))
     gap = FuzzyVariable({"a": (0.0, 0.0, 1.0, 1.0), "b": (2.0, 2.0, 3.0, 3.0)})
-    with pytest.raises(InvalidInputError, match="no rule speaks of 1.5"):
+    with pytest.raises(InvalidInputError, match="no rule covers 1.5"):
         FuzzyRules(gap, good, [("a", "a"), ("b", "a")])(np.array([1.5]))
     with pytest.raises(InvalidInputError, match="scale must not be negative"):
         bad = FuzzyVariable({"a": (-1.0, 0.0, 1.0, 2.0)})

@@ -12,6 +12,7 @@ from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.base import Expected, Filter, Update
+from assoc.filters.batches import Batch
 from assoc.filters.fuzzy.inference import FuzzyRules, FuzzyVariable
 from assoc.filters.kalman import ExtendedKalmanFilter
 from assoc.filters.measurement import Measurement
@@ -20,8 +21,8 @@ from assoc.filters.state import Gaussian, gaussian
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Adaptive:
-    """Gaussians with what the adaptation remembers.
+class Adaptive(Batch):
+    """Gaussians and the state of the adaptation.
 
     Attributes
     ----------
@@ -46,25 +47,6 @@ class Adaptive:
     turns: Array
     process_scale: Array
 
-    def __len__(self) -> int:
-        return len(self.mean)
-
-    def __getitem__(self, rows: Any) -> Adaptive:
-        """Return the targets that an index array, mask or slice selects."""
-        noise = self.process_noise
-        return Adaptive(
-            np.ascontiguousarray(self.mean[rows]),
-            np.ascontiguousarray(self.covariance[rows]),
-            self.without_noise[rows],
-            noise[rows] if len(noise) > 1 else noise,
-            self.innovations[rows],
-            self.turns[rows],
-            self.process_scale[rows],
-        )
-
-    def __repr__(self) -> str:
-        return f"Adaptive({self.mean.shape[0]} x {self.mean.shape[1]})"
-
     @property
     def gaussian(self) -> Gaussian:
         """Means and covariances alone."""
@@ -76,7 +58,7 @@ Watched = Literal["innovations", "turn", "turn rate"]
 
 @dataclass(frozen=True)
 class Alarm:
-    """Something that is watched over a window of measurements, and what is inferred from it.
+    """A quantity watched over a window of measurements, and the rules that it is the input of.
 
     Parameters
     ----------
@@ -89,9 +71,9 @@ class Alarm:
     watches : "innovations", "turn" or "turn rate"
         The rules' input. "innovations": ``|sum of the last W innovations|^2`` / W in units of their standard
         deviations, averaged over the components. "turn": the same of what the innovations say of the last
-        component of the state, a turn rate, K v / sqrt(K S K') with its row of the gain: along that direction
-        alone in which a turn moves the target. "turn rate": the square of the estimate itself in units
-        of its standard deviation, of one measurement (W = 1): in a steady turn there is nothing else to see.
+        component of the state, a turn rate, K v / sqrt(K S K') with its row of the gain: only along the direction
+        in which a turn moves the target. "turn rate": the squared estimate itself in units of its variance, of one
+        measurement (W = 1): in a steady turn the innovations show nothing.
     """
 
     window: int
@@ -140,8 +122,8 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         Infer the variance with which the last component of the state, a turn rate, is believed to be 0: it is
         corrected with a measurement of 0 of that variance, so that in straight flight one model forgets its turns.
     others : sequence of Alarm
-        More windows, with rules of their own; of all that is inferred the largest counts. A short window sees
-        a hard manoeuvre at once, a long one a gentle one at all.
+        More windows, with their own rules; the largest inferred value counts. A short window shows a hard manoeuvre
+        at once, only a long one a gentle manoeuvre.
 
     References
     ----------
@@ -165,10 +147,10 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         super().__init__(motion)
         several = (process,) if isinstance(process, FuzzyRules) else tuple(process or ())
         self.alarms = (Alarm(window, several, calm), *others)
-        if any(len(one.process) != len(several) or (one.calm is None) != (calm is None) for one in others):
+        if any(len(other.process) != len(several) or (other.calm is None) != (calm is None) for other in others):
             raise InvalidInputError(f"others: each must have {len(several)} rules, and calm where the first has")
-        named = [("process", rules) for one in self.alarms for rules in one.process]
-        for name, rules in (*named, *(("calm", one.calm) for one in self.alarms), ("measurement", measurement)):
+        named = [("process", rules) for alarm in self.alarms for rules in alarm.process]
+        for name, rules in (*named, *(("calm", alarm.calm) for alarm in self.alarms), ("measurement", measurement)):
             if rules is not None and not logarithmic and rules.output.corners[:, 0].min() < 0:
                 raise InvalidInputError(f"{name}: a scale must not be negative")
         self.groups = np.zeros(motion.dim, np.int64) if groups is None else np.array(groups, np.int64)
@@ -178,7 +160,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         self.process, self.measurement = several, measurement
         self.components = None if components is None else tuple(components)
         self.logarithmic, self.immediate = logarithmic, immediate
-        self.window = max(one.window for one in self.alarms)
+        self.window = max(alarm.window for alarm in self.alarms)
         self._ekf, self._bare = ExtendedKalmanFilter(motion), ExtendedKalmanFilter(_NoiseFree(motion))
 
     @classmethod
@@ -194,10 +176,9 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
             variances; "others", a list of more "window", "inputs" and what each "watches".
         """
         outputs = data["outputs"] if isinstance(data["outputs"][0], list) else [data["outputs"]]
-        every = [data, *data.get("others", ())]
         alarms = []
-        for one in every:
-            inputs = one["inputs"]
+        for window in (data, *data.get("others", ())):
+            inputs = window["inputs"]
             levels = [f"level {i}" for i in range(1, len(inputs) + 1)]
             sets = FuzzyVariable.from_centres(levels, inputs, 1.0)
             rules = [
@@ -210,7 +191,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
                 for centres in (*outputs, *([data["calm"]] if "calm" in data else []))
             ]
             calm = rules.pop() if "calm" in data else None
-            alarms.append(Alarm(int(one["window"]), rules, calm, one.get("watches", "innovations")))
+            alarms.append(Alarm(int(window["window"]), rules, calm, window.get("watches", "innovations")))
         return cls(
             motion,
             alarms[0].process,
@@ -261,7 +242,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         fresh = first.innovation / np.sqrt(variances)
         past = state.innovations
         if past.shape[2] != o.dim:
-            # the first measurement, or a sensor with other components: nothing to add it to
+            # the first measurement, or a sensor with other components
             past = np.zeros((len(fresh), self.window, o.dim))
         recent = np.concatenate([past[:, 1:], fresh[:, None]], axis=1)
         turns = np.concatenate([state.turns[:, 1:], _turn(state, first.state)[:, None]], axis=1)
@@ -276,7 +257,7 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         mean, covariance = done.state.mean, done.state.covariance
         if calm is not None:
             mean, covariance = _calmed(mean, covariance, calm)
-        # another measurement of the same time corrects what this one left: there is no noise between them
+        # a second measurement of the same time: no process noise lies between them
         still = np.zeros((1, *covariance.shape[1:]))
         corrected = Adaptive(mean, covariance, covariance, still, recent, turns, q)
         return Update(corrected, done.innovation, done.covariance, done.nis, done.log_likelihood)
@@ -292,10 +273,10 @@ class FuzzyAdaptiveEKF(Filter[Adaptive]):
         q = calm = first = None
         for alarm in self.alarms:
             level = self._level(alarm, recent, turns, present)
-            one = np.ones((len(level), self.motion.dim))
+            scale = np.ones((len(level), self.motion.dim))
             for group, rules in enumerate(alarm.process):
-                one[:, self.groups == group] = self._scale(rules, level)[:, None]
-            q = one if q is None else np.maximum(q, one)
+                scale[:, self.groups == group] = self._scale(rules, level)[:, None]
+            q = scale if q is None else np.maximum(q, scale)
             first = level if first is None else first
             if alarm.calm is not None:
                 variance = self._scale(alarm.calm, level)
@@ -347,12 +328,12 @@ def _calmed(mean: Array, P: Array, variance: Array) -> tuple[Array, Array]:
 
 
 def _turn(before: Adaptive, after: Gaussian) -> Array:
-    """Correction of the last component in units of its standard deviation, (B,); 0 where nothing is said of it."""
+    """Correction of the last component in units of its standard deviation, (B,); 0 where it was not corrected."""
     # K S K' is what a correction takes from the variance
     gained = before.covariance[:, -1, -1] - after.covariance[:, -1, -1]
-    told = gained > 1e-12 * before.covariance[:, -1, -1]
+    corrected = gained > 1e-12 * before.covariance[:, -1, -1]
     change = after.mean[:, -1] - before.mean[:, -1]
-    turn: Array = np.where(told, change / np.sqrt(np.where(told, gained, 1.0)), 0.0)
+    turn: Array = np.where(corrected, change / np.sqrt(np.where(corrected, gained, 1.0)), 0.0)
     return turn
 
 

@@ -23,8 +23,8 @@ def infer(
 
     sets (I, 4) are the trapezoids of the input, outputs (O, U) the output sets over the universe (U,),
     rules (K, 2) pairs of an input and an output set. Between points of the universe the combined set is
-    taken as a straight line. Inputs below `low` or above `high` are taken there. Returns the number of the first
-    input that is not finite or of which no rule speaks, or -1.
+    taken as a straight line. Inputs are clipped to [low, high]. Returns the number of the first input that is not
+    finite or that no rule covers, or -1.
     """
     degree = np.empty(len(outputs))
     for b in range(len(x)):
@@ -137,7 +137,7 @@ class FuzzyRules:
             raise InvalidInputError("rules must not be empty")
         for rule in self.rules:
             if len(rule) != 2 or rule[0] not in self.input.sets or rule[1] not in self.output.sets:
-                raise InvalidInputError(f"rules: {rule!r} names no pair of an input and an output set")
+                raise InvalidInputError(f"rules: expected a pair of an input and an output set, got {rule!r}")
         if isinstance(self.points, bool) or not isinstance(self.points, int) or self.points < 2:
             raise InvalidInputError(f"points must be a whole number of at least 2, got {self.points!r}")
 
@@ -162,7 +162,7 @@ class FuzzyRules:
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
-        """Where inputs beyond the outermost sets are taken."""
+        """Inputs are clipped to this interval."""
         corners = self.input.corners
         return float(corners[:, 1].min()), float(corners[:, 2].max())
 
@@ -174,12 +174,12 @@ class FuzzyRules:
     def __call__(self, inputs: Array) -> Array:
         """Infer the output for each input, (B,).
 
-        Inputs beyond the outermost sets are taken at their ends.
+        Inputs beyond the outermost sets are clipped to their ends.
 
         Raises
         ------
         InvalidInputError
-            An input that is not finite, or one that no rule speaks of.
+            An input is not finite, or no rule covers it.
         """
         x = inputs
         if type(x) is not np.ndarray or x.dtype != np.float64 or x.ndim != 1 or not x.flags.c_contiguous:
@@ -189,5 +189,5 @@ class FuzzyRules:
         bad = infer(x, *self._ends, self.input.corners, self.universe, memberships, rules, out)
         if bad >= 0:
             finite(x, "inputs", 1)
-            raise InvalidInputError(f"inputs: no rule speaks of {np.clip(x[bad], *self._ends):g}")
+            raise InvalidInputError(f"inputs: no rule covers {np.clip(x[bad], *self._ends):g}")
         return out

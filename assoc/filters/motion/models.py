@@ -17,7 +17,7 @@ from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.turn import turn
-from assoc.filters.state import finite
+from assoc.filters.state import finite, positive_definite
 
 _NO_STATES, _NO_SLOPES = np.zeros((0, 7)), np.zeros((0, 7, 7))
 
@@ -30,7 +30,7 @@ class Motion(ABC):
     dim : int
         Components of the state, n.
     position : tuple of int
-        Where x, y (and z) stand in it; without z sensors see the height 0.
+        Indices of x, y (and z) in it; without z the height is 0.
     """
 
     dim: int
@@ -93,9 +93,9 @@ class LinearMotion(Motion):
             positive(dt, "dt", zero=True)
             F = finite(self._transition(dt), "transition", 2)
             Q = finite(self._noise(dt), "noise", 2)
-            for name, one in (("transition", F), ("noise", Q)):
-                if one.shape != (self.dim, self.dim):
-                    raise InvalidInputError(f"{name} must have shape {(self.dim, self.dim)}, got {one.shape}")
+            for name, matrix in (("transition", F), ("noise", Q)):
+                if matrix.shape != (self.dim, self.dim):
+                    raise InvalidInputError(f"{name} must have shape {(self.dim, self.dim)}, got {matrix.shape}")
             if len(self._known) > 64:
                 self._known.clear()
             both = np.stack((F[None], Q[None]))
@@ -104,8 +104,8 @@ class LinearMotion(Motion):
 
     def matrices_of_each(self, dt: Array) -> tuple[Array, Array]:
         """F and Q of each of k time steps, both (k, n, n)."""
-        models = [self.matrices(step) for step in dt.tolist()]
-        return np.concatenate([one[0] for one in models]), np.concatenate([one[1] for one in models])
+        F, Q = np.concatenate([self.models(step)[2] for step in dt.tolist()], axis=1)
+        return F, Q
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""
@@ -185,7 +185,7 @@ class ConstantVelocity(LinearMotion):
         """F and Q of each of k time steps, both (k, n, n); the polynomials are taken of all steps at once."""
         order, axes = self.order, len(self.position)
         F, Q = np.zeros((2, len(dt), (order + 1) * axes, (order + 1) * axes))
-        # what the polynomials multiply the powers of the time step with
+        # coefficients of the powers of the time step
         unit_F, unit_Q = polynomial(order, 1.0), polynomial_noise(order, 1.0, self.sigma, self.kind)
         for i in range(order + 1):
             for j in range(order + 1):
@@ -286,6 +286,43 @@ class Padded(LinearMotion):
             return Q
 
         super().__init__(transition, noise, m, model.position)
+
+
+class ForwardDifference(Motion):
+    """A motion model that moves by one forward difference a step: x' = x + dt f(x) + w, w ~ N(0, covariance).
+
+    Parameters
+    ----------
+    covariance : array_like (n, n)
+        Process noise of one step.
+    dim : int
+    position : tuple of int
+        As in `Motion`.
+    """
+
+    def __init__(self, covariance: Array, dim: int, position: tuple[int, ...]) -> None:
+        self.dim, self.position = dim, position
+        self.covariance = positive_definite(covariance, "covariance", (1, dim, dim))
+
+    @abstractmethod
+    def rates(self, states: Array) -> Array:
+        """Time derivatives f of states (m, n), (m, n)."""
+
+    @abstractmethod
+    def slopes(self, states: Array) -> Array:
+        """Derivatives of `rates` at states (m, n): (m, n, n)."""
+
+    def propagate(self, states: Array, dt: float) -> Array:
+        """Move states (m, n) on by dt seconds, without noise."""
+        return np.asarray(states + dt * self.rates(states))
+
+    def jacobian(self, states: Array, dt: float) -> Array:
+        """Derivatives of `propagate` at states (m, n): (m, n, n)."""
+        return np.asarray(np.eye(self.dim) + dt * self.slopes(states))
+
+    def noise(self, states: Array, dt: float) -> Array:
+        """Process noise covariance of a step, (1, n, n)."""
+        return self.covariance
 
 
 class FunctionMotion(Motion):

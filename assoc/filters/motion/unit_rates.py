@@ -6,15 +6,14 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.motion.models import Motion
-from assoc.filters.state import positive_definite
+from assoc.filters.motion.models import ForwardDifference
 
 
-class UnitRates(Motion):
+class UnitRates(ForwardDifference):
     """A target whose range (m), azimuth and elevation (rad) each grow by 1 a second, [x, y, z, vx, vy, vz].
 
     Positions move by the first derivatives of x = r cos(a) cos(e), ..., velocities by the second; the velocities of
-    the state have no part in it. So a sensor that measures positions tells nothing of these velocities.
+    the state have no part in it, so that measurements of positions do not determine them.
 
     Parameters
     ----------
@@ -29,8 +28,7 @@ class UnitRates(Motion):
     """
 
     def __init__(self, covariance: Array) -> None:
-        self.dim, self.position = 6, (0, 1, 2)
-        self.covariance = positive_definite(covariance, "covariance", (1, 6, 6))
+        super().__init__(covariance, 6, (0, 1, 2))
 
     def rates(self, states: Array) -> Array:
         """Time derivatives of states (m, 6), equations 4.7 to 4.12."""
@@ -47,18 +45,12 @@ class UnitRates(Motion):
             axis=1,
         )
 
-    def propagate(self, states: Array, dt: float) -> Array:
-        """Move states (m, 6) on by one forward difference, equation 4.14."""
-        moved: Array = states + dt * self.rates(states)
-        return moved
-
-    def jacobian(self, states: Array, dt: float) -> Array:
-        """Derivatives of `propagate` at states (m, 6): (m, 6, 6)."""
+    def slopes(self, states: Array) -> Array:
+        """Derivatives of `rates` at states (m, 6): (m, 6, 6)."""
         x, y, z, r, s = _parts(states)
         zero, one = np.zeros_like(x), np.ones_like(x)
-        place = (x, y, z)
         # derivatives of 1/r and 1/s by x, y, z
-        dr = [-p / r**3 for p in place]
+        dr = [-p / r**3 for p in (x, y, z)]
         ds = [-x / s**3, -y / s**3, zero]
         J = np.zeros((len(states), 6, 6))
         for i in range(3):
@@ -72,17 +64,12 @@ class UnitRates(Motion):
             J[:, 3, i] = 2 * (-dy / r - y * dr[i] - dx * z / (r * s) - x * by_rs - dx + dy * z / s + y * by_s)
             J[:, 4, i] = 2 * (dx / r + x * dr[i] - dy * z / (r * s) - y * by_rs - dy - dx * z / s - x * by_s)
             J[:, 5, i] = 2 * (both / r + s * dr[i]) - dz
-        jacobian: Array = np.eye(6) + dt * J
-        return jacobian
-
-    def noise(self, states: Array, dt: float) -> Array:
-        """Process noise covariance of a step, (1, 6, 6)."""
-        return self.covariance
+        return J
 
 
 def _parts(states: Array) -> tuple[Array, ...]:
     x, y, z = states[:, :3].T
     s = np.hypot(x, y)
     if not s.all():
-        raise InvalidInputError("states must not stand right above the radar (x = y = 0)")
+        raise InvalidInputError("states must not be right above the radar (x = y = 0)")
     return x, y, z, np.hypot(s, z), s

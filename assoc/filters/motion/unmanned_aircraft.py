@@ -10,8 +10,8 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.motion.models import Motion
-from assoc.filters.state import finite, positive_definite
+from assoc.filters.motion.models import ForwardDifference
+from assoc.filters.state import finite
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Aerodynamics:
                 raise InvalidInputError(f"{name} must have {count} coefficients")
 
 
-class UnmannedAircraft(Motion):
+class UnmannedAircraft(ForwardDifference):
     """The paper's aircraft as a motion model, [climb angle (rad), speed (m/s), x (m), h (m)].
 
     Parameters
@@ -65,18 +65,13 @@ class UnmannedAircraft(Motion):
     """
 
     def __init__(
-        self,
-        thrust: float,
-        attack: float,
-        covariance: Array,
-        aerodynamics: Aerodynamics | None = None,
+        self, thrust: float, attack: float, covariance: Array, aerodynamics: Aerodynamics | None = None
     ) -> None:
-        self.dim, self.position = 4, (2, 3)
+        super().__init__(covariance, 4, (2, 3))
         self.thrust = positive(thrust, "thrust", zero=True)
         if not math.isfinite(attack):
             raise InvalidInputError(f"attack must be a finite number, got {attack!r}")
         self.attack = float(attack)
-        self.covariance = positive_definite(covariance, "covariance", (1, 4, 4))
         self.aerodynamics = aerodynamics if aerodynamics is not None else Aerodynamics()
 
     def rates(self, states: Array) -> Array:
@@ -96,13 +91,8 @@ class UnmannedAircraft(Motion):
             axis=1,
         )
 
-    def propagate(self, states: Array, dt: float) -> Array:
-        """Move states (m, 4) on by one forward difference, equation 19."""
-        moved: Array = states + dt * self.rates(states)
-        return moved
-
-    def jacobian(self, states: Array, dt: float) -> Array:
-        """Derivatives of `propagate` at states (m, 4): (m, 4, 4)."""
+    def slopes(self, states: Array) -> Array:
+        """Derivatives of `rates` at states (m, 4): (m, 4, 4)."""
         k, a = self.aerodynamics, self.attack
         climb, v, _, h = states.T
         rho, slope = np.polyval(k.density, h), np.polyval(np.polyder(np.array(k.density)), h)
@@ -123,9 +113,4 @@ class UnmannedAircraft(Motion):
         J[:, 1, 3] = slope * unit * ahead / k.mass
         J[:, 2, 0], J[:, 2, 1] = -v * np.sin(climb), np.cos(climb)
         J[:, 3, 0], J[:, 3, 1] = v * np.cos(climb), np.sin(climb)
-        jacobian: Array = np.eye(4) + dt * J
-        return jacobian
-
-    def noise(self, states: Array, dt: float) -> Array:
-        """Process noise covariance, (1, 4, 4)."""
-        return self.covariance
+        return J
