@@ -1,4 +1,4 @@
-"""A turning antenna: when it looks at an aircraft, and what the radar says then."""
+"""A turning antenna: when it points at an aircraft, and what the radar measures then."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from assoc._types import Array
 
 
-def looks(times: Array, positions: Array, rotation: float) -> Array:
+def dwells(times: Array, positions: Array, rotation: float) -> Array:
     """Times (L,), seconds, at which an antenna at the origin points at a moving aircraft.
 
     The antenna points north at time 0 and turns clockwise.
@@ -24,7 +24,7 @@ def looks(times: Array, positions: Array, rotation: float) -> Array:
         Seconds for a turn.
     """
     bearing = np.unwrap(np.arctan2(positions[:, 0], positions[:, 1]))
-    # turns that the antenna is ahead of the aircraft: a look is where this is a whole number
+    # turns that the antenna is ahead of the aircraft: a dwell is where this is a whole number
     ahead = times / rotation - bearing / (2 * math.pi)
     # right above the radar an aircraft can be quicker than the antenna, for an instant
     ahead = np.maximum.accumulate(ahead)

@@ -64,8 +64,8 @@ class Flight:
         if self.climb:
             bound = np.minimum if self.climb > 0 else np.maximum
             height = bound(height, self.level)
-        places = np.column_stack([self.position + moved, height])
-        return times, places, np.column_stack([flat, np.gradient(height, STEP)])
+        positions = np.column_stack([self.position + moved, height])
+        return times, positions, np.column_stack([flat, np.gradient(height, STEP)])
 
 
 def random_flight(rng: np.random.Generator, nearest: float, farthest: float, duration: float) -> Flight:
@@ -75,7 +75,7 @@ def random_flight(rng: np.random.Generator, nearest: float, farthest: float, dur
     of them climb or descend at 5 to 10 m/s from one level to another.
     """
     distance = math.sqrt(rng.uniform(nearest**2, farthest**2))
-    place = rng.uniform(-math.pi, math.pi)
+    azimuth = rng.uniform(-math.pi, math.pi)
     turns = []
     for _ in range(int(rng.choice([0, 0, 1, 2]))):
         rate = math.radians(rng.uniform(0.5, 1.5)) * rng.choice([-1.0, 1.0])
@@ -84,7 +84,7 @@ def random_flight(rng: np.random.Generator, nearest: float, farthest: float, dur
     height, level = 304.8 * rng.integers(15, 40, 2)
     climb = rng.uniform(5.0, 10.0) * np.sign(level - height) * rng.integers(0, 2)
     return Flight(
-        position=distance * np.array([math.cos(place), math.sin(place)]),
+        position=distance * np.array([math.cos(azimuth), math.sin(azimuth)]),
         heading=rng.uniform(-math.pi, math.pi),
         speed=rng.uniform(180.0, 260.0),
         height=float(height),

@@ -1,4 +1,4 @@
-"""Where targets are between their reports: cubic curves that agree with places, and with velocities where known."""
+"""Positions of targets between their reports, on cubic curves through positions and known velocities."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _SECOND = 1.0
 _STRANGE = 60.0
 
 
-def frame_velocities(reports: Reports, places: Array, origin: tuple[float, float, float]) -> Array:
+def frame_velocities(reports: Reports, points: Array, origin: tuple[float, float, float]) -> Array:
     """Velocities in a scene's frame from those east, north and up at each target, (n, 3), m/s; NaN where not known.
 
     Parameters
     ----------
     reports : Reports
-    places : array (n, 3)
+    positions : array (n, 3)
         Where they are in the frame, metres.
     origin : tuple of latitude, longitude, height
         Where the frame's plane touches the ellipsoid.
@@ -29,26 +29,26 @@ def frame_velocities(reports: Reports, places: Array, origin: tuple[float, float
     east, north, up = (_SECOND * reports.velocity[known]).T
     # a second later, by the radii of curvature that the frame's own formula gives
     tiny = 1e-6
-    metres_north = np.linalg.norm(east_north_up(lat + tiny, lon, height, origin) - places[known], axis=1) / tiny
-    metres_east = np.linalg.norm(east_north_up(lat, lon + tiny, height, origin) - places[known], axis=1) / tiny
+    metres_north = np.linalg.norm(east_north_up(lat + tiny, lon, height, origin) - points[known], axis=1) / tiny
+    metres_east = np.linalg.norm(east_north_up(lat, lon + tiny, height, origin) - points[known], axis=1) / tiny
     later = east_north_up(lat + north / metres_north, lon + east / np.maximum(metres_east, 1.0), height + up, origin)
-    velocity[known] = (later - places[known]) / _SECOND
+    velocity[known] = (later - points[known]) / _SECOND
     return velocity
 
 
 def resample(
-    reports: Reports, places: Array, times: Array, max_gap: float, velocities: Array | None = None
+    reports: Reports, points: Array, times: Array, max_gap: float, velocities: Array | None = None
 ) -> tuple[list[Array], list[Array]]:
     """Positions of the targets at given times, on curves through neighbouring reports.
 
-    Between two reports a target is on the cubic curve that has their places and velocities (Hermite's). A velocity that
-    is not known, or does not fit the places, is that of the parabola through the reports beside it; where these too are
+    Between two reports a target follows the cubic (Hermite) curve of their positions and velocities. A velocity that is
+    unknown, or does not fit the positions, is that of the parabola through the neighbouring reports; where these are
     missing, or the curve would leave the straight line by more than a fourth of its length, the target flies straight.
 
     Parameters
     ----------
     reports : Reports
-    places : array (n, 3)
+    positions : array (n, 3)
         Where they are in the scene's frame, metres.
     times : array (K,)
         Seconds.
@@ -65,39 +65,39 @@ def resample(
     positions: list[list[Array]] = [[] for _ in times]
     bounds = np.flatnonzero(np.diff(reports.target)) + 1
     for rows in np.split(np.arange(len(reports)), bounds):
-        own, target = reports.time[rows], int(reports.target[rows[0]])
+        stamps, target = reports.time[rows], int(reports.target[rows[0]])
         flown = None if velocities is None else velocities[rows]
-        after = np.clip(np.searchsorted(own, times), 0, len(own) - 1)
-        before = np.where(own[after] == times, after, np.maximum(after - 1, 0))
-        gap = own[after] - own[before]
-        present = np.flatnonzero((times >= own[0]) & (times <= own[-1]) & (gap <= max_gap))
-        found = along(own, places[rows], times[present], max_gap, flown)
-        for k, place in zip(present.tolist(), found, strict=True):
+        after = np.clip(np.searchsorted(stamps, times), 0, len(stamps) - 1)
+        before = np.where(stamps[after] == times, after, np.maximum(after - 1, 0))
+        gap = stamps[after] - stamps[before]
+        present = np.flatnonzero((times >= stamps[0]) & (times <= stamps[-1]) & (gap <= max_gap))
+        found = along(stamps, points[rows], times[present], max_gap, flown)
+        for k, point in zip(present.tolist(), found, strict=True):
             ids[k].append(target)
-            positions[k].append(place)
+            positions[k].append(point)
     return (
-        [np.array(one, dtype=np.int64) for one in ids],
-        [np.array(one, dtype=np.float64).reshape(-1, 3) for one in positions],
+        [np.array(targets, dtype=np.int64) for targets in ids],
+        [np.array(found, dtype=np.float64).reshape(-1, 3) for found in positions],
     )
 
 
-def along(own: Array, places: Array, times: Array, max_gap: float, velocities: Array | None = None) -> Array:
-    """Positions of one target at times (k,) within its own; see `resample`."""
-    slopes = _slopes(own, places, max_gap, velocities)
-    j = np.clip(np.searchsorted(own, times), 0, len(own) - 1)
-    i = np.where(own[j] == times, j, np.maximum(j - 1, 0))
-    gap = own[j] - own[i]
-    share = np.divide(times - own[i], gap, out=np.zeros(len(times)), where=gap > 0)
-    return _on_curve(places[i], places[j], slopes[i], slopes[j], gap, share)
+def along(stamps: Array, points: Array, times: Array, max_gap: float, velocities: Array | None = None) -> Array:
+    """Positions of one target at times (k,) within its reports' stamps; see `resample`."""
+    slopes = _slopes(stamps, points, max_gap, velocities)
+    j = np.clip(np.searchsorted(stamps, times), 0, len(stamps) - 1)
+    i = np.where(stamps[j] == times, j, np.maximum(j - 1, 0))
+    gap = stamps[j] - stamps[i]
+    share = np.divide(times - stamps[i], gap, out=np.zeros(len(times)), where=gap > 0)
+    return _on_curve(points[i], points[j], slopes[i], slopes[j], gap, share)
 
 
-def _slopes(time: Array, place: Array, max_gap: float, told: Array | None) -> Array:
+def _slopes(time: Array, point: Array, max_gap: float, given: Array | None) -> Array:
     """Velocities at the reports of one target, (n, 3)."""
     count = len(time)
     if count < 2:
         return np.zeros((count, 3))
     step = np.diff(time)
-    rate = np.diff(place, axis=0) / step[:, None]
+    rate = np.diff(point, axis=0) / step[:, None]
     near = step <= max_gap
     slope = np.zeros((count, 3))
     slope[:-1], slope[-1] = rate, rate[-1]
@@ -106,9 +106,9 @@ def _slopes(time: Array, place: Array, max_gap: float, told: Array | None) -> Ar
     share = (step[:-1] / (step[:-1] + step[1:]))[inner, None]
     # the parabola through three reports: the nearer rate counts more
     slope[1:-1][inner] = (1.0 - share) * rate[:-1][inner] + share * rate[1:][inner]
-    if told is not None:
-        fits = ~np.isnan(told).any(axis=1) & (np.linalg.norm(np.nan_to_num(told) - slope, axis=1) < _STRANGE)
-        slope[fits] = told[fits]
+    if given is not None:
+        fits = ~np.isnan(given).any(axis=1) & (np.linalg.norm(np.nan_to_num(given) - slope, axis=1) < _STRANGE)
+        slope[fits] = given[fits]
     return slope
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from assoc._system import memory
 
 # bytes, measured (tests/reliability/test_memory.py): of the arrays of a sensor in a scan however few it reports, of a
-# measurement with its source, of a target in a scan with its place and its path, and of a sensor
+# measurement with its source, of a target in a scan with its position and its path, and of a sensor
 _REPORT, _MEASUREMENT, _PLACE, _SENSOR = 1_000, 90, 150, 2_000
 # scans, sensors or targets that a scenario takes at the most
 MOST = 10_000_000

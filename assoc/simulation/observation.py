@@ -31,7 +31,7 @@ def observe(
 
     A target in a sensor's field of view is detected with probability P_d and measured with Gaussian noise.
     The number of false alarms is Poisson; they are uniform over the field of view in measurement space,
-    which is the clutter density r / V of the costs. The order within a scan is random and tells nothing.
+    which is the clutter density r / V of the costs. The order within a scan is random.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def observe(
     if velocities is None and any(sensor.measures_velocity for sensor in sensors):
         velocities = velocities_from(times, target_ids, positions)
     moving = velocities if velocities is not None else [np.zeros((len(ids), 3)) for ids in target_ids]
-    for ids, places, speeds in zip(target_ids, positions, moving, strict=True):
-        scan = [_report(sensor, np.asarray(ids), np.asarray(places), np.asarray(speeds), rng) for sensor in sensors]
+    for ids, points, speeds in zip(target_ids, positions, moving, strict=True):
+        scan = [_report(sensor, np.asarray(ids), np.asarray(points), np.asarray(speeds), rng) for sensor in sensors]
         measurements.append([values for values, _ in scan])
         sources.append([source for _, source in scan])
     truth = Truth(target_ids, positions, sources)
@@ -109,7 +109,7 @@ def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequen
     if not len(scan):
         return [np.zeros((0, 3)) for _ in times]
     target = np.concatenate([np.asarray(ids) for ids in target_ids])
-    place = np.concatenate([np.reshape(one, (-1, 3)) for one in positions])
+    point = np.concatenate([np.reshape(part, (-1, 3)) for part in positions])
     when = np.asarray(times, dtype=np.float64)[scan]
     order = np.lexsort((scan, target))
     # of a target's rows, side by side in time, the neighbours; the row itself where there is none
@@ -121,8 +121,8 @@ def velocities_from(times: Array, target_ids: Sequence[Array], positions: Sequen
     before, after = order.copy(), order.copy()
     before[1:][back], after[:-1][on] = order[:-1][back], order[1:][on]
     apart = when[after] - when[before]
-    rate = (place[after] - place[before]) / np.where(apart > 0, apart, 1.0)[:, None]
-    velocity = np.zeros_like(place)
+    rate = (point[after] - point[before]) / np.where(apart > 0, apart, 1.0)[:, None]
+    velocity = np.zeros_like(point)
     velocity[order] = np.where(apart[:, None] > 0, rate, 0.0)
     return np.split(velocity, np.cumsum([len(ids) for ids in target_ids])[:-1])
 
@@ -131,8 +131,8 @@ def _report(
     sensor: Sensor, ids: Array, positions: Array, velocities: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Measurements (n, d) of one sensor in one scan, and the source (n,) of each."""
-    places = positions.reshape(-1, 3)
-    exact = sensor.measure(places, velocities.reshape(-1, 3)) if sensor.measures_velocity else sensor.measure(places)
+    points = positions.reshape(-1, 3)
+    exact = sensor.measure(points, velocities.reshape(-1, 3)) if sensor.measures_velocity else sensor.measure(points)
     detected = (rng.random(len(ids)) < sensor.detection_probability) & sensor.in_view(exact)
     factor = np.linalg.cholesky(sensor.covariance)
     hits = exact[detected] + rng.standard_normal((int(detected.sum()), sensor.dim)) @ factor.T

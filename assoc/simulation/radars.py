@@ -1,4 +1,4 @@
-"""Where simulated sensors stand and what they see: fields of view that just cover a region."""
+"""Positions of simulated sensors, and fields of view that just cover a region."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MARGIN = 5.0
 
 
 def on_circle(center: Array, radius: float, count: int, height: float = 0.0) -> Array:
-    """Places (count, 3), metres, at equal angles on a horizontal circle, the first north (+y) of it."""
+    """Positions (count, 3), metres, at equal angles on a horizontal circle, the first north (+y)."""
     angle = math.pi / 2 + 2 * math.pi * np.arange(count) / count
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     return np.stack([x, y, np.full(count, height)], axis=1) + 0.0
@@ -27,17 +27,17 @@ def azimuth_interval(position: Array, region: Array) -> tuple[float, float]:
     Parameters
     ----------
     position : array (3,)
-        Place of the sensor, metres.
+        Of the sensor, metres.
     region : array (3, 2)
         Lower and upper bounds of x, y, z, metres.
     """
     low, high = region[:2, 0], region[:2, 1]
-    place = position[:2]
-    if ((low < place) & (place < high)).all():
+    here = position[:2]
+    if ((low < here) & (here < high)).all():
         return -math.pi, math.pi
-    corners = np.array([[x, y] for x in region[0] for y in region[1]]) - place
+    corners = np.array([[x, y] for x in region[0] for y in region[1]]) - here
     corners = corners[(corners != 0).any(axis=1)]
-    middle = (low + high) / 2 - place
+    middle = (low + high) / 2 - here
     if not len(corners) or not middle.any():
         return -math.pi, math.pi
     center = math.atan2(middle[1], middle[0])
@@ -47,7 +47,7 @@ def azimuth_interval(position: Array, region: Array) -> tuple[float, float]:
 
 
 def range_interval(position: Array, region: Array) -> tuple[float, float]:
-    """Smallest and largest distance (m) from a place to a box."""
+    """Smallest and largest distance (m) from a position to a box."""
     nearest = np.clip(position, region[:, 0], region[:, 1])
     farthest = np.maximum(np.abs(region[:, 0] - position), np.abs(region[:, 1] - position))
     return float(np.linalg.norm(nearest - position)), float(np.linalg.norm(farthest))
@@ -93,7 +93,7 @@ def radar_over(
     region : array (3, 2)
         Lower and upper bounds of x, y, z, metres.
     position : array (3,)
-        Place of the radar, metres.
+        Of the radar, metres.
     range_noise, angle_noise : float
         Standard deviations in metres, and in radians for azimuth and elevation alike.
     detection_probability, false_alarm_rate, name
@@ -120,3 +120,8 @@ def radar_over(
         field_of_view=np.array(view),
         name=name,
     )
+
+
+def radars_over(region: Array, positions: Array, **values: float) -> list[Sensor]:
+    """Make a radar at each position (n, 3), numbered from 1; `values` are those of `radar_over`."""
+    return [radar_over(region, position, name=f"radar {n}", **values) for n, position in enumerate(positions, start=1)]

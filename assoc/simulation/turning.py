@@ -1,4 +1,4 @@
-"""Radars whose antennas turn, each at its own pace: every plot has the time at which the antenna passed the target."""
+"""Radars with turning antennas: every plot has the time at which the antenna passed the target."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from assoc.scene.own_times import looked_at
 from assoc.scene.scene import Scene
 from assoc.scene.truth import Truth
 from assoc.sensors.base import Sensor, wrap_angle
-from assoc.simulation.antenna import looks
+from assoc.simulation.antenna import dwells
 
 FULL_TURN = 2.0 * math.pi
 
@@ -33,7 +33,7 @@ class Path(NamedTuple):
     def at(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities at times (n,) within the path's."""
         columns = np.concatenate([self.positions, self.velocities], axis=1).T
-        found = np.column_stack([np.interp(times, self.times, one) for one in columns])
+        found = np.column_stack([np.interp(times, self.times, column) for column in columns])
         return found[:, :3], found[:, 3:]
 
 
@@ -46,7 +46,7 @@ def parse_turns(text: str, radars: int | None = None) -> list[float]:
         Not numbers above 0, or not as many as there are radars.
     """
     try:
-        turns = [float(one) for one in text.split(",")]
+        turns = [float(part) for part in text.split(",")]
     except ValueError:
         turns = []
     if not turns or not all(0.0 < turn < math.inf for turn in turns):
@@ -71,7 +71,7 @@ def observe_in_turns(
 
     Antennas turn clockwise from a random azimuth. When one passes a target in the field of view, it is detected with
     probability P_d and measured with Gaussian noise; false alarms are those of `assoc.simulation.observation.observe`
-    in each turn, at the time at which the antenna points at them. A scan holds what was measured since the one before.
+    in each turn, at the time at which the antenna points at them. A scan holds the measurements since the one before.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def observe_in_turns(
     Returns
     -------
     Scene
-        With the times of measurements, the sectors that were looked at, and the truth at the end of each scan.
+        With the times of measurements, the sectors scanned, and the truth at the end of each scan.
 
     Raises
     ------
@@ -134,10 +134,10 @@ def _hits(
     sensor: Sensor, turn: float, ahead: float, path: Path, edges: Array, rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
     """Times, measurements and sources of the detections of one target."""
-    when = looks(path.times + ahead, path.positions - sensor.position, turn) - ahead
+    when = dwells(path.times + ahead, path.positions - sensor.position, turn) - ahead
     when = when[(when > edges[0]) & (when <= edges[-1])]
-    places, velocities = path.at(when)
-    exact = sensor.measure(places, velocities) if sensor.measures_velocity else sensor.measure(places)
+    positions, velocities = path.at(when)
+    exact = sensor.measure(positions, velocities) if sensor.measures_velocity else sensor.measure(positions)
     seen = (rng.random(len(when)) < sensor.detection_probability) & sensor.in_view(exact)
     noise = rng.standard_normal((int(seen.sum()), sensor.dim)) @ np.linalg.cholesky(sensor.covariance).T
     return when[seen], exact[seen] + noise, np.full(int(seen.sum()), path.target)

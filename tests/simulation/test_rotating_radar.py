@@ -10,7 +10,7 @@ import pytest
 from assoc.errors import InvalidInputError
 from assoc.recordings import GARBLED_CODES, clustering_time_window, estimate_rotation, radar_of
 from assoc.simulation import names, recording_names, simulate, simulate_recording
-from assoc.simulation.antenna import looks
+from assoc.simulation.antenna import dwells
 from assoc.simulation.flights import Flight, Turn
 
 NMI = 1852.0
@@ -132,7 +132,7 @@ def test_a_turn_and_a_climb():
 def test_looks_at_an_aircraft_that_passes_overhead():
     times = np.arange(0.0, 200.0, 0.25)
     places = np.column_stack([np.zeros(800), 200.0 * (times - 100.1), np.full(800, 9000.0)])
-    when = looks(times, places, 10.0)
+    when = dwells(times, places, 10.0)
     assert 19 <= len(when) <= 21
     # south of the radar it is seen half a turn later than north of it
     assert when[0] == pytest.approx(5.0, abs=1e-6)

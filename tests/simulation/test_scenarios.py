@@ -8,7 +8,7 @@ import pytest
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import names, parameters, simulate
-from assoc.simulation.scenarios.bearing_only import BearingOnlyParameters, places
+from assoc.simulation.scenarios.bearing_only import BearingOnlyParameters, sensor_positions
 
 
 def same(a, b) -> bool:
@@ -79,7 +79,7 @@ def test_nobody_leaves_the_crowds_region(sensor):
 
 
 def test_bearing_only_has_the_stated_geometry():
-    np.testing.assert_allclose(places(BearingOnlyParameters()) / 1000, [[0, 0, 0], [50, -10, 0], [100, 0, 0]])
+    np.testing.assert_allclose(sensor_positions(BearingOnlyParameters()) / 1000, [[0, 0, 0], [50, -10, 0], [100, 0, 0]])
     scene = simulate("bearing-only", sensors=5, targets=12, scans=20, interval=30.0)
     assert len(scene.sensors) == 5 and {s.kind for s in scene.sensors} == {"bearing"}
     for k in range(20):

@@ -200,7 +200,7 @@ def _tighten(route: list[_Touch], radius: float, circles: Array, reach: float) -
 
 
 def _least(cost: Callable[[float], float], middle: float, reach: float) -> float:
-    """Least of a function near a point: a coarse look, then golden sections; infinite values are allowed."""
+    """Least of a function near a point: a coarse grid, then golden sections; infinite values are allowed."""
     grid = middle + reach * np.linspace(-1, 1, 17)
     values = [cost(float(a)) for a in grid]
     k = int(np.argmin(values))

@@ -1,4 +1,4 @@
-"""Dubins paths: the shortest paths between two places with headings that a vehicle with a turning radius has.
+"""Dubins paths: the shortest paths between two positions with headings that a vehicle with a turning radius has.
 
 Six words of three pieces, L and R for turns and S for straight: LSL RSR LSR RSL RLR LRL. Headings are radians
 from +x towards +y, lengths metres.
@@ -24,7 +24,7 @@ _SAMPLE = 500
 
 @dataclass(frozen=True)
 class Pose:
-    """A place in the plane (m) and a heading (rad from +x towards +y)."""
+    """A position in the plane (m) and a heading (rad from +x towards +y)."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""Named scenarios, one a file; ``simulate`` is their front door."""
+"""Named scenarios, one a file; ``simulate`` runs one."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ def simulate(name: str, seed: int | None = 0, **values: Any) -> Scene:
     name : str
         One of ``names()``.
     seed : int or None, default 0
-        Seed of the one random generator: the same seed gives the same scene; None: a random one, which its name tells.
+        Seed of the random generator: the same seed gives the same scene; None: a random seed, found in its name.
     **values
         Parameters of the scenario (``parameters(name)``).
 
     Returns
     -------
     Scene
-        With truth; its name tells the scenario, the seed and what differs from the defaults.
+        With truth; named after the scenario, the seed and what differs from the defaults.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _simulate(name: str, seed: int | None, values: dict[str, Any]) -> Any:
 
 
 def _title(name: str, seed: int, chosen: Parameters) -> str:
-    """What the scene is called: the scenario, the seed, and the parameters that are not the defaults."""
+    """Name of the scene: the scenario, the seed, and the parameters that are not the defaults."""
     parts = [f"seed {seed}"]
     for field in fields(cast(Any, chosen)):
         value = getattr(chosen, field.name)

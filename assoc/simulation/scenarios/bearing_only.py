@@ -1,8 +1,8 @@
-"""Bearing-only sensors over a field of targets: lines of sight that cross where nobody is (ghosts)."""
+"""Bearing-only sensors over a field of targets: lines of sight that cross where no target is (ghosts)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,31 +12,28 @@ from assoc.scene.scene import Scene
 from assoc.sensors.bearing import BearingSensor
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
+from assoc.simulation.option import option
 from assoc.simulation.radars import azimuth_interval, padded_azimuth
 from assoc.simulation.scenarios.crowd import horizontal_velocities
 
 HEIGHT = 10_000.0
-"""Targets fly up to here (m); a bearing says nothing about it."""
+"""Targets fly up to here (m); bearings do not depend on it."""
 
 
 @dataclass(frozen=True)
 class BearingOnlyParameters(Parameters):
     """Parameters of the bearing-only scene."""
 
-    targets: int = field(default=20, metadata={"help": "number of targets"})
-    sensors: int = field(default=3, metadata={"help": "number of sensors, 2 or more"})
-    scans: int = field(default=10, metadata={"help": "number of scans"})
-    interval: float = field(default=10.0, metadata={"help": "seconds from scan to scan"})
-    width: float = field(default=100_000.0, metadata={"help": "side of the square field, metres"})
-    depth: float = field(
-        default=10_000.0, metadata={"help": "how far every second sensor stands behind the edge, metres"}
-    )
-    speed: float = field(
-        default=200.0, metadata={"help": "largest horizontal speed, m/s; speeds are uniform from half of it"}
-    )
-    noise: float = field(default=0.005, metadata={"help": "standard deviation of a bearing, radians"})
-    detection_probability: float = field(default=0.95, metadata={"help": "P_d of each sensor"})
-    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per sensor and scan"})
+    targets: int = option(20, "number of targets")
+    sensors: int = option(3, "number of sensors, 2 or more")
+    scans: int = option(10, "number of scans")
+    interval: float = option(10.0, "seconds from scan to scan")
+    width: float = option(100_000.0, "side of the square field, metres")
+    depth: float = option(10_000.0, "how far every second sensor stands behind the edge, metres")
+    speed: float = option(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
+    noise: float = option(0.005, "standard deviation of a bearing, radians")
+    detection_probability: float = option(0.95, "P_d of each sensor")
+    false_alarms: float = option(1.0, "mean false alarms per sensor and scan")
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", most=MOST)
@@ -46,8 +43,8 @@ class BearingOnlyParameters(Parameters):
         self._probability("detection_probability")
 
 
-def places(parameters: BearingOnlyParameters) -> Array:
-    """Places of the sensors (n, 3), metres: along the southern edge, every second one set back.
+def sensor_positions(parameters: BearingOnlyParameters) -> Array:
+    """Positions of the sensors (n, 3), metres: along the southern edge, every second one set back.
 
     With the default parameters they are (0, 0), (50, -10) and (100, 0) km.
     """
@@ -65,18 +62,18 @@ def simulate(parameters: BearingOnlyParameters, rng: np.random.Generator, name: 
     velocity = horizontal_velocities(p.targets, p.speed, rng)
     times = p.interval * np.arange(p.scans)
     paths = [start + t * velocity for t in times]
-    # who has left the field is gone: the fields of view end with it
+    # targets that have left the field are gone: the fields of view end there
     inside = [((path >= region[:, 0]) & (path <= region[:, 1])).all(axis=1) for path in paths]
     sensors = [
         BearingSensor(
-            position=place,
+            position=position,
             noise=np.array([p.noise]),
             detection_probability=p.detection_probability,
             false_alarm_rate=p.false_alarms,
-            field_of_view=np.array([padded_azimuth(azimuth_interval(place, region), p.noise)]),
+            field_of_view=np.array([padded_azimuth(azimuth_interval(position, region), p.noise)]),
             name=f"bearing sensor {number}",
         )
-        for number, place in enumerate(places(p), start=1)
+        for number, position in enumerate(sensor_positions(p), start=1)
     ]
     ids = [np.flatnonzero(here) for here in inside]
     present = [path[here] for path, here in zip(paths, inside, strict=True)]

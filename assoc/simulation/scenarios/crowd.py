@@ -1,8 +1,8 @@
-"""A crowd: many targets at random places in a box, seen by position sensors or radars around it."""
+"""A crowd: many targets at random positions in a box, seen by position sensors or radars around it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -15,7 +15,8 @@ from assoc.sensors.base import Sensor
 from assoc.sensors.position import PositionSensor
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.radars import MARGIN, on_circle, radar_over
+from assoc.simulation.option import option
+from assoc.simulation.radars import MARGIN, on_circle, radars_over
 
 REFERENCE_TARGETS = 100
 """With constant density the box is as given for this many targets."""
@@ -25,34 +26,21 @@ REFERENCE_TARGETS = 100
 class CrowdParameters(Parameters):
     """Parameters of the crowd."""
 
-    targets: int = field(default=100, metadata={"help": "number of targets"})
-    scans: int = field(default=1, metadata={"help": "number of scans"})
-    interval: float = field(default=1.0, metadata={"help": "seconds from scan to scan"})
-    sensors: int = field(default=3, metadata={"help": "number of sensors"})
-    sensor: Literal["position", "radar"] = field(
-        default="position",
-        metadata={"help": "x, y, z at once, or radars (range, azimuth, elevation) around the box"},
+    targets: int = option(100, "number of targets")
+    scans: int = option(1, "number of scans")
+    interval: float = option(1.0, "seconds from scan to scan")
+    sensors: int = option(3, "number of sensors")
+    sensor: Literal["position", "radar"] = option(
+        "position", "x, y, z at once, or radars (range, azimuth, elevation) around the box"
     )
-    width: float = field(default=5_000.0, metadata={"help": "side of the square box, metres"})
-    height: float = field(default=2_000.0, metadata={"help": "height of the box, metres"})
-    constant_density: bool = field(
-        default=False,
-        metadata={"help": f"grow the ground area with the targets; as given for {REFERENCE_TARGETS}"},
-    )
-    speed: float = field(
-        default=200.0, metadata={"help": "largest horizontal speed, m/s; speeds are uniform from half of it"}
-    )
-    noise: float = field(
-        default=100.0,
-        metadata={"help": "standard deviation of a position (radar: of range, and across at the box), metres"},
-    )
-    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each sensor"})
-    false_alarms_per_target: float = field(
-        default=0.1, metadata={"help": "mean false alarms per sensor and scan, for each target"}
-    )
-    range_rate_noise: float = field(
-        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: radars measure none"}
-    )
+    width: float = option(5_000.0, "side of the square box, metres")
+    height: float = option(2_000.0, "height of the box, metres")
+    constant_density: bool = option(False, f"grow the ground area with the targets; as given for {REFERENCE_TARGETS}")
+    speed: float = option(200.0, "largest horizontal speed, m/s; speeds are uniform from half of it")
+    noise: float = option(100.0, "standard deviation of a position (radar: of range, and across at the box), metres")
+    detection_probability: float = option(0.9, "P_d of each sensor")
+    false_alarms_per_target: float = option(0.1, "mean false alarms per sensor and scan, for each target")
+    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("targets", "scans", "sensors", most=MOST)
@@ -76,7 +64,7 @@ def simulate(parameters: CrowdParameters, rng: np.random.Generator, name: str) -
     velocity = horizontal_velocities(p.targets, p.speed, rng)
     times = p.interval * np.arange(p.scans)
     paths = [start + t * velocity for t in times]
-    # nobody leaves the region, however long the scene lasts
+    # no target leaves the region, however long the scene lasts
     region = box + p.speed * times[-1] * np.array([[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0]])
     ids = [np.arange(p.targets)] * p.scans
     return observe(
@@ -88,33 +76,29 @@ def _sensors(p: CrowdParameters, region: Array) -> list[Sensor]:
     rate = p.false_alarms_per_target * p.targets
     center = region.mean(axis=1)
     distance = float(np.hypot(*(region[:2, 1] - region[:2, 0])))
-    places = on_circle(center, distance, p.sensors)
+    positions = on_circle(center, distance, p.sensors)
     if p.sensor == "radar":
-        return [
-            radar_over(
-                region,
-                place,
-                range_noise=p.noise,
-                angle_noise=p.noise / distance,
-                detection_probability=p.detection_probability,
-                false_alarm_rate=rate,
-                name=f"radar {number}",
-                range_rate_noise=p.range_rate_noise,
-                fastest=p.speed,
-            )
-            for number, place in enumerate(places, start=1)
-        ]
+        return radars_over(
+            region,
+            positions,
+            range_noise=p.noise,
+            angle_noise=p.noise / distance,
+            detection_probability=p.detection_probability,
+            false_alarm_rate=rate,
+            range_rate_noise=p.range_rate_noise,
+            fastest=p.speed,
+        )
     view = region + MARGIN * p.noise * np.array([-1.0, 1.0])
     return [
         PositionSensor(
-            position=place,
+            position=position,
             noise=np.full(3, p.noise),
             detection_probability=p.detection_probability,
             false_alarm_rate=rate,
             field_of_view=view,
             name=f"sensor {number}",
         )
-        for number, place in enumerate(places, start=1)
+        for number, position in enumerate(positions, start=1)
     ]
 
 

@@ -7,7 +7,7 @@ the other, around circular zones; starts, goals and headings are random. At its 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from assoc.simulation.dubins.obstacles import around
 from assoc.simulation.dubins.paths import Path, Pose
 from assoc.simulation.memory import require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.option import option
+from assoc.simulation.radars import on_circle, radars_over
 
 _TRIES = 200
 
@@ -28,26 +29,20 @@ _TRIES = 200
 class DubinsParameters(Parameters):
     """Parameters of the Dubins scene."""
 
-    targets: int = field(default=4, metadata={"help": "number of aircraft"})
-    interval: float = field(default=1.0, metadata={"help": "seconds from scan to scan"})
-    speed: float = field(default=20.0, metadata={"help": "speed of the aircraft, m/s"})
-    turning_radius: float = field(default=100.0, metadata={"help": "turning radius, metres"})
-    obstacles: int = field(default=5, metadata={"help": "number of circular no-fly zones"})
-    obstacle_radius: float = field(
-        default=120.0, metadata={"help": "largest radius of a zone, metres; radii are uniform from a third of it"}
-    )
-    margin: float = field(default=20.0, metadata={"help": "distance to keep from the zones, metres"})
-    width: float = field(default=2_000.0, metadata={"help": "side of the square region, metres"})
-    height: float = field(default=300.0, metadata={"help": "largest height; heights are uniform from a third of it"})
-    radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
-    noise: float = field(
-        default=5.0, metadata={"help": "standard deviation of range, and across at the region's middle, metres"}
-    )
-    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
-    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
-    range_rate_noise: float = field(
-        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
-    )
+    targets: int = option(4, "number of aircraft")
+    interval: float = option(1.0, "seconds from scan to scan")
+    speed: float = option(20.0, "speed of the aircraft, m/s")
+    turning_radius: float = option(100.0, "turning radius, metres")
+    obstacles: int = option(5, "number of circular no-fly zones")
+    obstacle_radius: float = option(120.0, "largest radius of a zone, metres; radii are uniform from a third of it")
+    margin: float = option(20.0, "distance to keep from the zones, metres")
+    width: float = option(2_000.0, "side of the square region, metres")
+    height: float = option(300.0, "largest height; heights are uniform from a third of it")
+    radars: int = option(3, "number of radars (range, azimuth, elevation)")
+    noise: float = option(5.0, "standard deviation of range, and across at the region's middle, metres")
+    detection_probability: float = option(0.9, "P_d of each radar")
+    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
+    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("targets", "radars", most=10_000)
@@ -74,31 +69,27 @@ def simulate(parameters: DubinsParameters, rng: np.random.Generator, name: str) 
     tracks = [path.sample(p.speed, p.interval)[1] for path in flights]
     scans = max(len(track) for track in tracks)
     times = p.interval * np.arange(scans)
-    ids, places = [], []
+    ids, positions = [], []
     for k in range(scans):
         # the last sample of a path falls between scans and is not flown on the beat
         flying = [i for i, path in enumerate(flights) if times[k] * p.speed <= path.length]
         ids.append(np.array(flying, dtype=np.int64))
         here = [[*tracks[i][k][:2], heights[i]] for i in flying]
-        places.append(np.array(here, dtype=np.float64).reshape(-1, 3))
+        positions.append(np.array(here, dtype=np.float64).reshape(-1, 3))
     beyond = 4 * p.turning_radius
     region = np.array([[-beyond, p.width + beyond], [-beyond, p.width + beyond], [0.0, 1.5 * p.height]])
     distance = 1.2 * p.width
-    sensors = [
-        radar_over(
-            region,
-            place,
-            range_noise=p.noise,
-            angle_noise=p.noise / distance,
-            detection_probability=p.detection_probability,
-            false_alarm_rate=p.false_alarms,
-            name=f"radar {number}",
-            range_rate_noise=p.range_rate_noise,
-            fastest=p.speed,
-        )
-        for number, place in enumerate(on_circle(region.mean(axis=1), distance, p.radars), start=1)
-    ]
-    return observe(sensors, times, ids, places, rng, region=region, name=name)
+    sensors = radars_over(
+        region,
+        on_circle(region.mean(axis=1), distance, p.radars),
+        range_noise=p.noise,
+        angle_noise=p.noise / distance,
+        detection_probability=p.detection_probability,
+        false_alarm_rate=p.false_alarms,
+        range_rate_noise=p.range_rate_noise,
+        fastest=p.speed,
+    )
+    return observe(sensors, times, ids, positions, rng, region=region, name=name)
 
 
 def no_fly_zones(p: DubinsParameters, rng: np.random.Generator) -> Array:

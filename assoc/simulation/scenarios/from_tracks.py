@@ -24,7 +24,8 @@ from assoc.simulation.flights import STEP
 from assoc.simulation.interpolation import along, frame_velocities, resample
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe, velocities_from
-from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.option import option
+from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 from assoc.simulation.turning import Path, observe_in_turns, parse_turns
 
@@ -34,7 +35,7 @@ MAX_SCANS = 1_000_000
 
 def _column(meaning: str, unit: str) -> Any:
     names = ", ".join(COLUMNS[meaning])
-    return field(default=None, metadata={"help": f"column of the {meaning}{unit} (else the first of: {names})"})
+    return option(None, f"column of the {meaning}{unit} (else the first of: {names})")
 
 
 @dataclass(frozen=True)
@@ -50,39 +51,24 @@ class FromTracksParameters(Parameters):
     longitude_column: str | None = _column("longitude", ", degrees")
     altitude_column: str | None = _column("altitude", "")
     name_column: str | None = _column("name", ", as call signs, if there is one")
-    altitude_unit: Literal["m", "ft"] = field(default="m", metadata={"help": "unit of the altitudes"})
-    speed_unit: Literal["m/s", "kt"] = field(
-        default="m/s", metadata={"help": "unit of velocity and vertrate; with kt the latter is in feet per minute"}
+    altitude_unit: Literal["m", "ft"] = option("m", "unit of the altitudes")
+    speed_unit: Literal["m/s", "kt"] = option(
+        "m/s", "unit of velocity and vertrate; with kt the latter is in feet per minute"
     )
-    interval: float = field(default=10.0, metadata={"help": "seconds from scan to scan (positions are interpolated)"})
-    max_gap: float = field(
-        default=60.0, metadata={"help": "no target where its reports are further apart than this, seconds"}
+    interval: float = option(10.0, "seconds from scan to scan (positions are interpolated)")
+    max_gap: float = option(60.0, "no target where its reports are further apart than this, seconds")
+    clean: bool = option(True, "leave out repeated positions, mend altitudes that cannot be right")
+    scans: int | None = option(None, "number of scans (without: the whole recording)")
+    radars: int = option(3, "number of radars (range, azimuth, elevation)")
+    turns: str | None = option(
+        None,
+        "seconds for a turn of each radar, with commas: each plot then has its own time (without: all measure at once)",
     )
-    clean: bool = field(
-        default=True, metadata={"help": "leave out repeated positions, mend altitudes that cannot be right"}
-    )
-    scans: int | None = field(default=None, metadata={"help": "number of scans (without: the whole recording)"})
-    radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
-    turns: str | None = field(
-        default=None,
-        metadata={
-            "help": "seconds for a turn of each radar, with commas: each plot then has its own time "
-            "(without: all radars look at once)"
-        },
-    )
-    spread: float = field(
-        default=0.25,
-        metadata={"help": "distance of the radars from the middle, as a share of the traffic's diagonal"},
-    )
-    noise: float = field(
-        default=50.0,
-        metadata={"help": "standard deviation of range, and across the line of sight at 50 km, metres"},
-    )
-    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
-    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
-    range_rate_noise: float = field(
-        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
-    )
+    spread: float = option(0.25, "distance of the radars from the middle, as a share of the traffic's diagonal")
+    noise: float = option(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = option(0.9, "P_d of each radar")
+    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
+    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("radars", most=MOST)
@@ -111,26 +97,22 @@ def simulate(parameters: FromTracksParameters, rng: np.random.Generator, name: s
     require_scene_memory(len(times), p.radars, targets, p.false_alarms, "scans radars targets false_alarms")
     ids, positions = resample(flown, reports, times, p.max_gap, speeds)
     velocities = velocities_from(times, ids, positions)
-    fastest = max(float(np.linalg.norm(one, axis=1).max(initial=0.0)) for one in velocities)
+    fastest = max(float(np.linalg.norm(velocity, axis=1).max(initial=0.0)) for velocity in velocities)
     region = around(reports, 0.01)
     diagonal = float(np.hypot(*(region[:2, 1] - region[:2, 0])))
-    places = on_circle(np.zeros(3), p.spread * diagonal, p.radars)
+    sites = on_circle(np.zeros(3), p.spread * diagonal, p.radars)
     # the ground falls away from the tangent plane: 1 km at 113 km
-    places[:, 2] = np.sqrt(np.maximum(EARTH_RADIUS**2 - (places[:, :2] ** 2).sum(axis=1), 0.0)) - EARTH_RADIUS
-    sensors = [
-        radar_over(
-            region,
-            place,
-            range_noise=p.noise,
-            angle_noise=p.noise / REFERENCE_RANGE,
-            detection_probability=p.detection_probability,
-            false_alarm_rate=p.false_alarms,
-            name=f"radar {number}",
-            range_rate_noise=p.range_rate_noise,
-            fastest=fastest,
-        )
-        for number, place in enumerate(places, start=1)
-    ]
+    sites[:, 2] = np.sqrt(np.maximum(EARTH_RADIUS**2 - (sites[:, :2] ** 2).sum(axis=1), 0.0)) - EARTH_RADIUS
+    sensors = radars_over(
+        region,
+        sites,
+        range_noise=p.noise,
+        angle_noise=p.noise / REFERENCE_RANGE,
+        detection_probability=p.detection_probability,
+        false_alarm_rate=p.false_alarms,
+        range_rate_noise=p.range_rate_noise,
+        fastest=fastest,
+    )
     if p.turns is not None:
         turns, start = parse_turns(p.turns, p.radars), float(times[0]) - p.interval
         paths = _paths(flown, reports, speeds, p.max_gap)
@@ -146,11 +128,11 @@ def _paths(recording: Reports, reports: Array, speeds: Array, max_gap: float) ->
     new = (np.diff(recording.target) != 0) | (np.diff(recording.time) > max_gap)
     paths = []
     for rows in np.split(np.arange(len(recording.time)), np.flatnonzero(new) + 1):
-        own, places = recording.time[rows], reports[rows]
-        count = max(math.ceil((own[-1] - own[0]) / STEP), 1)
+        stamps, points = recording.time[rows], reports[rows]
+        count = max(math.ceil((stamps[-1] - stamps[0]) / STEP), 1)
         if len(rows) > 1:
-            times = np.linspace(own[0], own[-1], count + 1)
-            fine = along(own, places, times, max_gap, speeds[rows])
+            times = np.linspace(stamps[0], stamps[-1], count + 1)
+            fine = along(stamps, points, times, max_gap, speeds[rows])
             paths.append(Path(int(recording.target[rows[0]]), times, fine, np.gradient(fine, times, axis=0)))
     return paths
 

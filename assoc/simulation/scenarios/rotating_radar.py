@@ -9,7 +9,7 @@ not public.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -21,8 +21,9 @@ from assoc.errors import InvalidInputError
 from assoc.recordings.altitude import GARBLED_CODES, garbled_altitudes
 from assoc.recordings.columns import FLIGHT_LEVEL, NAUTICAL_MILE
 from assoc.recordings.recording import UNDECODED, Recording
-from assoc.simulation.antenna import bearings_in_steps, in_steps, looks, slant_range_and_bearing
+from assoc.simulation.antenna import bearings_in_steps, dwells, in_steps, slant_range_and_bearing
 from assoc.simulation.flights import STEP, Flight, random_flight
+from assoc.simulation.option import option
 
 if TYPE_CHECKING:
     from assoc.metrics.trajectories import Trajectories
@@ -40,25 +41,20 @@ PARALLEL_SEPARATION = 5.0
 class RotatingRadarParameters(Parameters):
     """Parameters of the rotating radar."""
 
-    traffic: Traffic = field(
-        default="random", metadata={"help": "many aircraft at random, or a pair: crossing, parallel, head-on"}
-    )
-    aircraft: int | None = field(default=None, metadata={"help": "number of aircraft of random traffic (default: 14)"})
-    duration: float = field(default=1130.0, metadata={"help": "seconds"})
-    rotation: float = field(default=9.5, metadata={"help": "seconds for a turn of the antenna"})
-    detection_probability: float = field(default=0.78, metadata={"help": "P_d of a look"})
-    false_plots: float = field(default=2.5, metadata={"help": "mean false plots in a rotation"})
-    identity_loss: float = field(default=0.05, metadata={"help": "share of plots whose Mode 3 is lost (0)"})
-    garbled: float = field(default=0.1, metadata={"help": "share of altitudes that are garbled"})
-    reach: float = field(default=255.0, metadata={"help": "farthest range, nautical miles"})
-    range_step: float = field(default=1.0, metadata={"help": "step of ranges, nautical miles (0: exact)"})
-    bearing_step: float = field(default=BEARING_STEP, metadata={"help": "step of bearings, degrees (0: exact)"})
-    time_step: float = field(
-        default=0.0, metadata={"help": "stamps are cut to multiples of this, seconds (0: exact; the paper's are 1)"}
-    )
-    separation: float | None = field(
-        default=None,
-        metadata={"help": "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"},
+    traffic: Traffic = option("random", "many aircraft at random, or a pair: crossing, parallel, head-on")
+    aircraft: int | None = option(None, "number of aircraft of random traffic (default: 14)")
+    duration: float = option(1130.0, "seconds")
+    rotation: float = option(9.5, "seconds for a turn of the antenna")
+    detection_probability: float = option(0.78, "P_d of a dwell")
+    false_plots: float = option(2.5, "mean false plots in a rotation")
+    identity_loss: float = option(0.05, "share of plots whose Mode 3 is lost (0)")
+    garbled: float = option(0.1, "share of altitudes that are garbled")
+    reach: float = option(255.0, "farthest range, nautical miles")
+    range_step: float = option(1.0, "step of ranges, nautical miles (0: exact)")
+    bearing_step: float = option(BEARING_STEP, "step of bearings, degrees (0: exact)")
+    time_step: float = option(0.0, "stamps are cut to multiples of this, seconds (0: exact; the paper's are 1)")
+    separation: float | None = option(
+        None, "distance of a pair at its closest, nautical miles (default: 5 if parallel, else 0)"
     )
 
     def __post_init__(self) -> None:
@@ -93,7 +89,7 @@ class RotatingRadarParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPlots:
-    """A recording and what really was there.
+    """A recording and its truth.
 
     Attributes
     ----------
@@ -127,12 +123,12 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
     codes = rng.choice(np.arange(1, 4096), len(flights), replace=False)
     seen = [_seen(p, flight) for flight in flights]
     source = np.repeat(np.arange(len(flights)), [len(times) for times, _, _ in seen])
-    time, place, velocity = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    time, position, velocity = (np.concatenate(parts) for parts in zip(*seen, strict=True))
     order = np.lexsort((source, time))
-    source, time, place, velocity = source[order], time[order], place[order], velocity[order]
+    source, time, position, velocity = source[order], time[order], position[order], velocity[order]
     hit = rng.random(len(time)) < p.detection_probability
-    distance, bearing = slant_range_and_bearing(place[hit])
-    level = np.round(place[hit, 2] / FLIGHT_LEVEL)
+    distance, bearing = slant_range_and_bearing(position[hit])
+    level = np.round(position[hit, 2] / FLIGHT_LEVEL)
     identity = np.where(rng.random(hit.sum()) < p.identity_loss, UNDECODED, codes[source[hit]])
     wrong = rng.random(hit.sum()) < p.garbled
     level[wrong] = rng.choice(GARBLED_CODES, int(wrong.sum()))
@@ -160,18 +156,20 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
         sources=sources,
         name=name,
     )
-    return SimulatedPlots(recording, Trajectories(time, source, place), velocity)
+    return SimulatedPlots(recording, Trajectories(time, source, position), velocity)
 
 
 def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Array]:
-    """Times of the looks at an aircraft within reach, its positions and velocities then."""
-    times, places, velocities = flight.path(p.duration)
-    when = looks(times, places, p.rotation)
+    """Times at which the antenna points at an aircraft within reach, its positions and velocities then."""
+    times, positions, velocities = flight.path(p.duration)
+    when = dwells(times, positions, p.rotation)
     when = when[when <= p.duration]
-    place, velocity = (np.column_stack([np.interp(when, times, axis) for axis in x.T]) for x in (places, velocities))
+    position, velocity = (
+        np.column_stack([np.interp(when, times, axis) for axis in x.T]) for x in (positions, velocities)
+    )
     step = p.range_step * NAUTICAL_MILE
-    inside = in_steps(np.linalg.norm(place, axis=1), step) <= p.reach * NAUTICAL_MILE
-    return when[inside], place[inside], velocity[inside]
+    inside = in_steps(np.linalg.norm(position, axis=1), step) <= p.reach * NAUTICAL_MILE
+    return when[inside], position[inside], velocity[inside]
 
 
 def _random_traffic(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
@@ -182,10 +180,10 @@ def _random_traffic(p: RotatingRadarParameters, rng: np.random.Generator) -> lis
 def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
     """Two aircraft that are closest to each other half-way through the recording."""
     middle = NAUTICAL_MILE * rng.uniform(0.25, 0.55) * p.reach
-    place = rng.uniform(-math.pi, math.pi)
-    meeting = middle * np.array([math.cos(place), math.sin(place)])
-    # more across the line of sight than along it, so that nobody flies over the radar
-    heading = place + math.pi / 2 * rng.choice([-1.0, 1.0]) + math.radians(rng.uniform(-60.0, 60.0))
+    azimuth = rng.uniform(-math.pi, math.pi)
+    meeting = middle * np.array([math.cos(azimuth), math.sin(azimuth)])
+    # more across the line of sight than along it, so that no aircraft flies over the radar
+    heading = azimuth + math.pi / 2 * rng.choice([-1.0, 1.0]) + math.radians(rng.uniform(-60.0, 60.0))
     speeds = rng.uniform(200.0, 260.0, 2)
     apart = PARALLEL_SEPARATION if p.traffic == "parallel" else 0.0
     apart = NAUTICAL_MILE * (apart if p.separation is None else p.separation)

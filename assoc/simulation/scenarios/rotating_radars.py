@@ -1,8 +1,8 @@
-"""Airliners under several turning radars, each with its own pace: every plot has a time of its own."""
+"""Airliners under several turning radars, each with its own pace: every plot has its own time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from assoc._parameters import Parameters
 from assoc.scene.scene import Scene
 from assoc.simulation.flights import random_flight
 from assoc.simulation.memory import MOST, require_scene_memory
-from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.option import option
+from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.scenarios.three_radar import REFERENCE_RANGE, around
 from assoc.simulation.turning import Path, observe_in_turns, parse_turns
 
@@ -19,18 +20,15 @@ from assoc.simulation.turning import Path, observe_in_turns, parse_turns
 class RotatingRadarsParameters(Parameters):
     """Parameters of the rotating radars."""
 
-    turns: str = field(default="4,5,5.5", metadata={"help": "seconds for a turn of each radar, with commas"})
-    aircraft: int = field(default=30, metadata={"help": "number of aircraft"})
-    duration: float = field(default=240.0, metadata={"help": "seconds"})
-    interval: float = field(default=2.0, metadata={"help": "seconds from scan to scan, at most the shortest turn"})
-    reach: float = field(default=60_000.0, metadata={"help": "aircraft begin within this distance, metres"})
-    radar_distance: float = field(default=40_000.0, metadata={"help": "metres from the middle to each radar"})
-    noise: float = field(
-        default=80.0,
-        metadata={"help": "standard deviation of range, and across the line of sight at 50 km, metres"},
-    )
-    detection_probability: float = field(default=0.9, metadata={"help": "P_d of a look"})
-    false_alarms: float = field(default=10.0, metadata={"help": "mean false alarms per radar and turn"})
+    turns: str = option("4,5,5.5", "seconds for a turn of each radar, with commas")
+    aircraft: int = option(30, "number of aircraft")
+    duration: float = option(240.0, "seconds")
+    interval: float = option(2.0, "seconds from scan to scan, at most the shortest turn")
+    reach: float = option(60_000.0, "aircraft begin within this distance, metres")
+    radar_distance: float = option(40_000.0, "metres from the middle to each radar")
+    noise: float = option(80.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = option(0.9, "P_d of a dwell")
+    false_alarms: float = option(10.0, "mean false alarms per radar and turn")
 
     def __post_init__(self) -> None:
         parse_turns(self.turns)
@@ -49,18 +47,14 @@ def simulate(parameters: RotatingRadarsParameters, rng: np.random.Generator, nam
     flights = [random_flight(rng, 0.0, p.reach, p.duration) for _ in range(p.aircraft)]
     paths = [Path(target, *flight.path(float(times[-1]))) for target, flight in enumerate(flights)]
     region = around(np.concatenate([path.positions for path in paths]), 0.05)
-    sensors = [
-        radar_over(
-            region,
-            place,
-            range_noise=p.noise,
-            angle_noise=p.noise / REFERENCE_RANGE,
-            detection_probability=p.detection_probability,
-            false_alarm_rate=p.false_alarms,
-            name=f"radar {number}",
-        )  # fmt: skip
-        for number, place in enumerate(on_circle(np.zeros(3), p.radar_distance, len(turns)), start=1)
-    ]
+    sensors = radars_over(
+        region,
+        on_circle(np.zeros(3), p.radar_distance, len(turns)),
+        range_noise=p.noise,
+        angle_noise=p.noise / REFERENCE_RANGE,
+        detection_probability=p.detection_probability,
+        false_alarm_rate=p.false_alarms,
+    )
     return observe_in_turns(sensors, turns, 0.0, times, paths, rng, region=region, name=name)
 
 

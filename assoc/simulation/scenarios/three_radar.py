@@ -1,7 +1,7 @@
 """Three targets, three radars, a hundred scans: the scene of the ant colony paper.
 
 The trajectories, P_d, the false alarm rate and the number of scans are the paper's. It gives neither noise
-nor region nor the places of the radars. Chosen here: the region is the bounding box of the three trajectories
+nor region nor the positions of the radars. Chosen here: the region is the bounding box of the three trajectories
 and 10 % more on each side; the radars stand on the ground, at equal angles around its middle, far enough out
 to see every target from a different side and never to have one straight above. The paper's scene lasts 100 s. In a
 longer one the targets end then, and three others fly the same ways: the radars stay where they are, and the targets
@@ -10,7 +10,7 @@ near them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from assoc._types import Array
 from assoc.scene.scene import Scene
 from assoc.simulation.memory import MOST, require_scene_memory
 from assoc.simulation.observation import observe
-from assoc.simulation.radars import on_circle, radar_over
+from assoc.simulation.option import option
+from assoc.simulation.radars import on_circle, radars_over
 from assoc.simulation.trajectories import Manoeuvre, Trajectory
 
 TRAJECTORIES = (
@@ -41,24 +42,15 @@ TRAJECTORIES = (
 class ThreeRadarParameters(Parameters):
     """Parameters of the three-radar scene."""
 
-    scans: int = field(default=100, metadata={"help": "number of scans"})
-    interval: float = field(default=1.0, metadata={"help": "seconds from scan to scan"})
-    radars: int = field(default=3, metadata={"help": "number of radars (range, azimuth, elevation)"})
-    radar_distance: float = field(
-        default=60_000.0, metadata={"help": "metres from the middle of the region to each radar"}
-    )
-    noise: float = field(
-        default=50.0,
-        metadata={"help": "standard deviation of range, and across the line of sight at 50 km, metres"},
-    )
-    detection_probability: float = field(default=0.9, metadata={"help": "P_d of each radar"})
-    false_alarms: float = field(default=1.0, metadata={"help": "mean false alarms per radar and scan"})
-    margin: float = field(
-        default=0.1, metadata={"help": "how far the region reaches past the trajectories, as a share of them"}
-    )
-    range_rate_noise: float = field(
-        default=0.0, metadata={"help": "standard deviation of range rates, m/s; 0: the radars measure none"}
-    )
+    scans: int = option(100, "number of scans")
+    interval: float = option(1.0, "seconds from scan to scan")
+    radars: int = option(3, "number of radars (range, azimuth, elevation)")
+    radar_distance: float = option(60_000.0, "metres from the middle of the region to each radar")
+    noise: float = option(50.0, "standard deviation of range, and across the line of sight at 50 km, metres")
+    detection_probability: float = option(0.9, "P_d of each radar")
+    false_alarms: float = option(1.0, "mean false alarms per radar and scan")
+    margin: float = option(0.1, "how far the region reaches past the trajectories, as a share of them")
+    range_rate_noise: float = option(0.0, "standard deviation of range rates, m/s; 0: the radars measure none")
 
     def __post_init__(self) -> None:
         self._whole("scans", "radars", most=MOST)
@@ -85,22 +77,18 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
     speeds = np.stack([trajectory.velocities(since) for trajectory in TRAJECTORIES], axis=1)
     fastest = float(np.linalg.norm(speeds, axis=2).max())
     region = around(paths if not wave[-1] else _whole_paths(), parameters.margin)
-    places = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
-    sensors = [
-        radar_over(
-            region,
-            place,
-            range_noise=parameters.noise,
-            angle_noise=parameters.noise / REFERENCE_RANGE,
-            detection_probability=parameters.detection_probability,
-            false_alarm_rate=parameters.false_alarms,
-            name=f"radar {number}",
-            range_rate_noise=parameters.range_rate_noise,
-            fastest=fastest,
-        )
-        for number, place in enumerate(places, start=1)
-    ]
-    ids = [np.arange(len(TRAJECTORIES)) + len(TRAJECTORIES) * one for one in wave.tolist()]
+    positions = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
+    sensors = radars_over(
+        region,
+        positions,
+        range_noise=parameters.noise,
+        angle_noise=parameters.noise / REFERENCE_RANGE,
+        detection_probability=parameters.detection_probability,
+        false_alarm_rate=parameters.false_alarms,
+        range_rate_noise=parameters.range_rate_noise,
+        fastest=fastest,
+    )
+    ids = [np.arange(len(TRAJECTORIES)) + len(TRAJECTORIES) * number for number in wave.tolist()]
     return observe(sensors, times, ids, list(paths), rng, region=region, name=name, velocities=list(speeds))
 
 
