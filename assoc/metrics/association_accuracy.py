@@ -8,12 +8,12 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.metrics.trajectories import columns_of_rows
 
 
 @dataclass(frozen=True)
 class AssociationAccuracy:
-    """Shares from 0 to 1, NaN where there is nothing to divide by.
+    """Shares from 0 to 1, NaN for 0 / 0.
 
     Attributes
     ----------
@@ -50,12 +50,9 @@ def association_accuracy(sources: Array, labels: Array, instants: Array | None =
     instants : array_like of int (n,), optional
         The scan of each measurement: only pairs within a scan count. Without it all pairs count.
     """
-    source, label = np.asarray(sources), np.asarray(labels)
-    instant = np.zeros(source.shape, dtype=np.int64) if instants is None else np.asarray(instants)
-    if source.ndim != 1 or label.shape != source.shape or instant.shape != source.shape:
-        raise InvalidInputError(
-            f"sources, labels and instants must have one shape (n,), got {source.shape}, {label.shape}, {instant.shape}"
-        )
+    if instants is None:
+        instants = np.zeros(np.shape(sources), dtype=np.int64)
+    source, label, instant = columns_of_rows(sources=sources, labels=labels, instants=instants)
     real, grouped = source >= 0, label >= 0
     both = real & grouped
     together = _pairs(instant, label, source, chosen=both)

@@ -9,8 +9,8 @@ import numpy as np
 from assoc._system.door import door
 from assoc._text.shown import Shown
 from assoc._types import Array
-from assoc.errors import InvalidInputError
 from assoc.metrics.plot_identity import identity_after_each
+from assoc.metrics.trajectories import columns_of_rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,7 +24,7 @@ class CtMtIt(Shown):
     windows : int array (K,)
         The windows, ascending.
     per_window : array (K, 3)
-        CT, MT, IT of each; NaN where there is nothing to divide by.
+        CT, MT, IT of each; NaN for 0 / 0.
     """
 
     ct: float
@@ -43,9 +43,8 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
 
     CT: aircraft plots given to a confirmed track whose identity is that aircraft / aircraft plots. MT: aircraft
     plots in a confirmed track that also took that aircraft's previous plot / aircraft plots. IT: plots that were
-    given to a track, but not to a confirmed one of their own identity / plots given to a track. A track's identity
-    is the aircraft of most of its last 6 plots, this one included; false plots have no vote, of equals the most
-    recent counts.
+    given to a track, but not to a confirmed one of the same identity / plots given to a track. For a track's identity
+    see `identity_after_each`.
 
     Parameters
     ----------
@@ -62,11 +61,7 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
     -------
     CtMtIt
     """
-    columns = [np.asarray(value) for value in (windows, sources, tracks, confirmed)]
-    if any(column.shape != (len(columns[0]),) for column in columns):
-        shapes = ", ".join(str(column.shape) for column in columns)
-        raise InvalidInputError(f"windows, sources, tracks and confirmed must have one shape (n,), got {shapes}")
-    window, source, track, sure = columns
+    window, source, track, sure = columns_of_rows(windows=windows, sources=sources, tracks=tracks, confirmed=confirmed)
     correct = sure.astype(bool) & (source >= 0) & (identity_after_each(source, track) == source)
     previous: dict[int, int] = {}
     kept = np.zeros(len(window), dtype=bool)
@@ -81,14 +76,8 @@ def ct_mt_it(windows: Array, sources: Array, tracks: Array, confirmed: Array) ->
         return np.bincount(index, weights=chosen, minlength=len(names))
 
     with np.errstate(invalid="ignore"):
-        rates = np.stack(
-            [
-                count(correct) / count(real),
-                count(kept) / count(real),
-                count(given & ~correct) / count(given),
-            ],
-            axis=1,
-        )
+        wrong = count(given & ~correct) / count(given)
+        rates = np.stack([count(correct) / count(real), count(kept) / count(real), wrong], axis=1)
     ct, mt, it = (100.0 * _mean(rate) for rate in rates.T)
     return CtMtIt(ct, mt, it, names, 100.0 * rates)
 

@@ -74,7 +74,7 @@ def _gospa(between: Array, cutoff: float, order: float) -> Gospa:
         unit = float(np.float64(cutoff) ** order)
     return Gospa(
         float(cutoff * (localisation + missed + false) ** (1.0 / order)),
-        # what is none stays none, even if the unit is beyond all floats
+        # 0, even if the unit is infinite
         unit * localisation if localisation else 0.0,
         unit * missed if missed else 0.0,
         unit * false if false else 0.0,
@@ -86,7 +86,7 @@ def _gospa(between: Array, cutoff: float, order: float) -> Gospa:
 def gospa_over_time(
     truth: Trajectories, tracks: Trajectories, cutoff: float, order: float = 2.0
 ) -> tuple[Array, list[Gospa]]:
-    """GOSPA at every instant that the truth or the tracks know; see `gospa`.
+    """GOSPA at every instant of the truth or the tracks; see `gospa`.
 
     Returns
     -------
@@ -98,16 +98,16 @@ def gospa_over_time(
     check_cutoff(cutoff, order)
     times, values = [], []
     for time, rows, columns in epochs(truth, tracks):
-        one = _gospa(distances(truth.positions[rows], tracks.positions[columns]), cutoff, order)
-        pairs = np.stack([truth.ids[rows][one.pairs[:, 0]], tracks.ids[columns][one.pairs[:, 1]]], axis=1)
+        value = _gospa(distances(truth.positions[rows], tracks.positions[columns]), cutoff, order)
+        pairs = np.stack([truth.ids[rows][value.pairs[:, 0]], tracks.ids[columns][value.pairs[:, 1]]], axis=1)
         times.append(time)
-        values.append(one._replace(pairs=pairs))
+        values.append(value._replace(pairs=pairs))
     return np.array(times), values
 
 
 @door
 def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
-    """Mean over time of GOSPA and of its parts, all in one convention: ``mean(x ** order) ** (1 / order)``, metres.
+    """Mean over time of GOSPA and of its parts, each ``mean(x ** order) ** (1 / order)``, metres.
 
     With order 2 these are root mean squares. The parts add up to the whole as they do at one instant:
     ``distance ** order == localisation ** order + missed ** order + false ** order``.
@@ -125,7 +125,6 @@ def mean_gospa(values: Sequence[Gospa], order: float = 2.0) -> dict[str, float]:
     check_cutoff(1.0, order)
     if len(values) == 0:
         return {"distance": 0.0, "localisation": 0.0, "missed": 0.0, "false": 0.0}
-    parts = {
-        name: float(np.mean([getattr(one, name) for one in values])) for name in ("localisation", "missed", "false")
-    }
+    names = ("localisation", "missed", "false")
+    parts = {name: float(np.mean([getattr(value, name) for value in values])) for name in names}
     return {name: value ** (1.0 / order) for name, value in {"distance": sum(parts.values()), **parts}.items()}

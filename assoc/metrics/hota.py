@@ -1,4 +1,4 @@
-"""HOTA: detection and association of tracks in equal parts, over all thresholds of nearness."""
+"""HOTA: detection and association of tracks in equal parts, over all thresholds of similarity."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ def hota(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Hota:
     """Higher order tracking accuracy.
 
     A target and a track d metres apart have the similarity 1 - d / cutoff, at least 0. At each instant they are paired
-    so that the sum of similarity times how well the two identities go together at all is largest; for each threshold
-    the pairs of at least this similarity count.
+    so that the sum of similarity times the overall agreement of the two identities is largest; for each threshold the
+    pairs of at least this similarity count.
 
     Parameters
     ----------
     truth, tracks : Trajectories
     cutoff : float
-        Metres: a track this far away has nothing to do with a target.
+        Metres: a track this far away does not match a target.
 
     References
     ----------
@@ -77,8 +77,8 @@ def hota(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Hota:
         if not (s > 0).any():
             continue
         key = g[:, None] * width + t
-        place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-        score = np.where(keys[place] == key, fit[place], 0.0) * s
+        index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        score = np.where(keys[index] == key, fit[index], 0.0) * s
         i, j = linear_sum_assignment(score, maximize=True)
         paired.append(key[i, j])
         near.append(s[i, j])
@@ -104,5 +104,5 @@ def _summed(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     """Sums of the values by key, keys ascending."""
     if not parts:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
-    keys, place = np.unique(np.concatenate([key for key, _ in parts]), return_inverse=True)
-    return keys, np.bincount(place, np.concatenate([value for _, value in parts]), len(keys))
+    keys, index = np.unique(np.concatenate([key for key, _ in parts]), return_inverse=True)
+    return keys, np.bincount(index, np.concatenate([value for _, value in parts]), len(keys))

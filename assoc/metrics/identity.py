@@ -11,9 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from assoc._system.door import door
 from assoc._types import Array
-from assoc.errors import InvalidInputError
 from assoc.metrics.ospa import check_cutoff, distances
-from assoc.metrics.trajectories import Trajectories, epochs
+from assoc.metrics.trajectories import Trajectories, columns_of_rows, epochs
 
 
 @dataclass(frozen=True)
@@ -23,9 +22,9 @@ class Identity:
     Attributes
     ----------
     switches : int
-        How often a target went over to another track than it had last (also after a gap).
+        How often a target got another track than its last (also after a gap).
     fragmentations : int
-        How often a target that had been tracked was found again after it had been lost.
+        How often a lost target was tracked again.
     matches, missed, false : int
         Instants of targets with a track, of targets without, of tracks without a target.
     mota : float
@@ -125,7 +124,7 @@ def _pair(between: Array, cutoff: float, last: list[int | None], tracks: list[in
         for i, track in enumerate(last)
         if track is not None and track in column and between[i, column[track]] <= cutoff
     ]
-    # two targets may have had one track last, one after the other: the nearer of them keeps it
+    # two targets may share their last track, one after the other: the nearer keeps it
     pairs.sort(key=lambda pair: between[pair])
     kept: dict[int, int] = {}
     for i, j in pairs:
@@ -148,16 +147,16 @@ def _idf1(together: dict[tuple[int, int], int], targets: int, tracks: int) -> fl
     pairs = np.array(list(together), dtype=np.int64)
     rows, columns = (np.unique(side, return_inverse=True)[1] for side in pairs.T)
     times = np.array(list(together.values()), dtype=np.float64)
-    # over weeks there are many identities, each of which met only few others: one matrix of all would be too large
+    # each of many identities met only few others: one matrix of all would be too large
     nodes = int(rows.max()) + 1 + int(columns.max()) + 1
     graph = coo_array((np.ones(len(times), np.int8), (rows, int(rows.max()) + 1 + columns)), shape=(nodes, nodes))
     label = connected_components(graph, directed=False)[1][rows]
     order = np.argsort(label, kind="stable")
     agreed = 0.0
     for group in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
-        own = [np.unique(side[group], return_inverse=True) for side in (rows, columns)]
-        count = np.zeros((len(own[0][0]), len(own[1][0])))
-        count[own[0][1], own[1][1]] = times[group]
+        (targets_here, i), (tracks_here, j) = (np.unique(side[group], return_inverse=True) for side in (rows, columns))
+        count = np.zeros((len(targets_here), len(tracks_here)))
+        count[i, j] = times[group]
         agreed += float(count[linear_sum_assignment(-count)].sum())
     return 2.0 * agreed / (targets + tracks)
 
@@ -173,9 +172,7 @@ def label_switches(sources: Array, labels: Array) -> int:
     labels : array_like of int (n,)
         The track that took it, negative if none did: a gap is no switch, another track after it is one.
     """
-    source, label = np.asarray(sources), np.asarray(labels)
-    if source.shape != label.shape or source.ndim != 1:
-        raise InvalidInputError(f"sources and labels must both have shape (n,), got {source.shape}, {label.shape}")
+    source, label = columns_of_rows(sources=sources, labels=labels)
     known = (source >= 0) & (label >= 0)
     source, label = source[known], label[known]
     order = np.argsort(source, kind="stable")

@@ -74,7 +74,7 @@ def ospa_of_distances(between: Array, cutoff: float, order: float) -> Ospa:
 def ospa_over_time(
     truth: Trajectories, tracks: Trajectories, cutoff: float, order: float = 1.0
 ) -> tuple[Array, list[Ospa]]:
-    """OSPA at every instant that the truth or the tracks know; see `ospa`.
+    """OSPA at every instant of the truth or the tracks; see `ospa`.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def distances(x: Array, y: Array) -> Array:
 
 
 def point_sets(truth: Array, estimates: Array) -> tuple[Array, Array]:
-    """Two sets of points as arrays (m, d) and (n, d), or a line that says what is wrong."""
+    """Two sets of points as checked arrays (m, d) and (n, d)."""
     sets = []
     for name, points in (("truth", truth), ("estimates", estimates)):
         try:

@@ -37,12 +37,12 @@ def ospa2(
     base_order : float, default 1
         q of the mean over time.
     window : int or None, default 10
-        Instants that count, up to and with the one at which the value stands; None: all so far.
+        Instants that count, up to and including that of the value; None: all so far.
 
     Returns
     -------
     times : array (K,)
-        Every instant that the truth or the tracks know, seconds.
+        Every instant of the truth or the tracks, seconds.
     values : list of Ospa
 
     References

@@ -1,4 +1,4 @@
-"""Whose plots a track has taken lately, and how often an aircraft's identity goes over to another track."""
+"""The identity of a track from its last plots, and how often an aircraft changes its track."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from assoc._system.door import door
 from assoc._types import Array
-from assoc.errors import InvalidInputError
+from assoc.metrics.trajectories import columns_of_rows
 
 MEMORY = 6
 """A track's identity is the majority of its last plots, of this many."""
@@ -18,8 +18,8 @@ MEMORY = 6
 def identity_after_each(sources: Array, tracks: Array) -> Array:
     """Identity of the track that took each plot, after it took it.
 
-    The identity is the aircraft of most of the track's last 6 plots; false plots have no vote, of equals the most
-    recent counts.
+    The identity is the aircraft of most of the track's last 6 plots, of equals the most recent; false plots do not
+    count.
 
     Parameters
     ----------
@@ -33,9 +33,7 @@ def identity_after_each(sources: Array, tracks: Array) -> Array:
     int64 array (n,)
         The aircraft; -1 where no track took the plot, or its track has false plots only.
     """
-    source, track = np.asarray(sources), np.asarray(tracks)
-    if source.ndim != 1 or source.shape != track.shape:
-        raise InvalidInputError(f"sources and tracks must both have shape (n,), got {source.shape}, {track.shape}")
+    source, track = columns_of_rows(sources=sources, tracks=tracks)
     recent: dict[int, deque[int]] = {}
     identity = np.full(len(source), -1, dtype=np.int64)
     for row, (aircraft, taker) in enumerate(zip(source.tolist(), track.tolist(), strict=True)):
@@ -47,7 +45,7 @@ def identity_after_each(sources: Array, tracks: Array) -> Array:
 
 
 def majority(plots: deque[int]) -> int:
-    """Whose most of these plots are, of equals the last one's; -1 if no plot is anyone's."""
+    """Aircraft of most of these plots, of equals the last; -1 if all are false."""
     votes = Counter(aircraft for aircraft in plots if aircraft >= 0)
     if not votes:
         return -1
@@ -57,11 +55,11 @@ def majority(plots: deque[int]) -> int:
 
 @door
 def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> int:
-    """How often an aircraft goes over to another track, whole plots gone astray not counted.
+    """How often an aircraft changes its track; single plots given to another track do not count.
 
     An aircraft belongs to the last confirmed track that took one of its plots and had its identity then (the
     majority of the track's last 6 plots). A switch is a change of that track: two tracks that swap their
-    aircraft give two, a track that was lost and begun anew gives one.
+    aircraft count two, a track that was lost and started again counts one.
 
     Parameters
     ----------
@@ -70,14 +68,11 @@ def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> i
     confirmed : array_like of bool (n,)
         Whether that track was confirmed then.
     """
-    source, track, sure = np.asarray(sources), np.asarray(tracks), np.asarray(confirmed, dtype=bool)
-    if source.ndim != 1 or not source.shape == track.shape == sure.shape:
-        shapes = f"{source.shape}, {track.shape}, {sure.shape}"
-        raise InvalidInputError(f"sources, tracks and confirmed must have one shape (n,), got {shapes}")
-    own = sure & (source >= 0) & (identity_after_each(source, track) == source)
+    source, track, sure = columns_of_rows(sources=sources, tracks=tracks, confirmed=confirmed)
+    held = sure.astype(bool) & (source >= 0) & (identity_after_each(source, track) == source)
     owner: dict[int, int] = {}
     switches = 0
-    for aircraft, taker in zip(source[own].tolist(), track[own].tolist(), strict=True):
+    for aircraft, taker in zip(source[held].tolist(), track[held].tolist(), strict=True):
         switches += owner.get(aircraft, taker) != taker
         owner[aircraft] = taker
     return switches
@@ -85,10 +80,10 @@ def plot_identity_switches(sources: Array, tracks: Array, confirmed: Array) -> i
 
 @door
 def tracks_of_one_identity(sources: Array, tracks: Array, confirmed: Array) -> tuple[int, int]:
-    """How many confirmed tracks kept one identity for all their life, and how many had any.
+    """How many confirmed tracks kept one identity all the time, and how many had any.
 
-    A track's identity after each plot is the majority of its last 6 (`identity_after_each`), so that a single plot gone
-    astray, or with a garbled code, changes nothing.
+    A track's identity after each plot is the majority of its last 6 (`identity_after_each`), so that a single foreign
+    plot changes nothing.
 
     Parameters
     ----------
@@ -97,12 +92,9 @@ def tracks_of_one_identity(sources: Array, tracks: Array, confirmed: Array) -> t
     confirmed : array_like of bool (n,)
         Whether that track was confirmed then; its plots before that do not count.
     """
-    source, track, sure = np.asarray(sources), np.asarray(tracks), np.asarray(confirmed, dtype=bool)
-    if source.ndim != 1 or not source.shape == track.shape == sure.shape:
-        shapes = f"{source.shape}, {track.shape}, {sure.shape}"
-        raise InvalidInputError(f"sources, tracks and confirmed must have one shape (n,), got {shapes}")
+    source, track, sure = columns_of_rows(sources=sources, tracks=tracks, confirmed=confirmed)
     identity = identity_after_each(source, track)
-    own = sure & (track >= 0) & (identity >= 0)
-    known = np.unique(np.stack([track[own], identity[own]], axis=1), axis=0)
+    held = sure.astype(bool) & (track >= 0) & (identity >= 0)
+    known = np.unique(np.stack([track[held], identity[held]], axis=1), axis=0)
     _, count = np.unique(known[:, 0], return_counts=True)
     return int((count == 1).sum()), len(count)

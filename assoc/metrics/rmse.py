@@ -47,11 +47,11 @@ def track_rmse(truth: Trajectories, tracks: Trajectories, cutoff: float) -> tupl
     """
     squared: dict[int, list[float]] = {}
     _, values = gospa_over_time(truth, tracks, cutoff)
-    for (_, rows, columns), one in zip(epochs(truth, tracks), values, strict=True):
+    for (_, rows, columns), pairing in zip(epochs(truth, tracks), values, strict=True):
         between = distances(truth.positions[rows], tracks.positions[columns])
-        i = np.searchsorted(truth.ids[rows], one.pairs[:, 0])
-        j = np.searchsorted(tracks.ids[columns], one.pairs[:, 1])
-        for target, distance in zip(one.pairs[:, 0].tolist(), between[i, j].tolist(), strict=True):
+        i = np.searchsorted(truth.ids[rows], pairing.pairs[:, 0])
+        j = np.searchsorted(tracks.ids[columns], pairing.pairs[:, 1])
+        for target, distance in zip(pairing.pairs[:, 0].tolist(), between[i, j].tolist(), strict=True):
             squared.setdefault(target, []).append(distance**2)
     every = [value for values in squared.values() for value in values]
     by_target = {target: float(np.sqrt(np.mean(values))) for target, values in sorted(squared.items())}

@@ -18,7 +18,7 @@ from assoc.metrics.trajectories import Trajectories
 
 @dataclass(frozen=True)
 class Summary(Shown):
-    """Averages over all instants, metres, and what the identities did.
+    """Averages over all instants, metres, and identity metrics.
 
     Attributes
     ----------
@@ -55,13 +55,13 @@ def summarise(truth: Trajectories, tracks: Trajectories, cutoff: float) -> Summa
     ----------
     truth, tracks : Trajectories
     cutoff : float
-        Metres: beyond this a track has nothing to do with a target.
+        Metres: beyond this a track does not match a target.
     """
     _, values = gospa_over_time(truth, tracks, cutoff)
     parts = mean_gospa(values)
     means = []
     for _, distances in (ospa_over_time(truth, tracks, cutoff), ospa2(truth, tracks, cutoff)):
-        means.append(float(np.mean([one.distance for one in distances])) if distances else 0.0)
+        means.append(float(np.mean([value.distance for value in distances])) if distances else 0.0)
     return Summary(
         gospa=parts["distance"],
         gospa_localisation=parts["localisation"],

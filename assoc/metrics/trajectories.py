@@ -1,4 +1,4 @@
-"""Truth and tracks in the one form that the metrics take: rows of time, identity and position."""
+"""Truth and tracks as metrics take them: rows of time, identity and position."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
 
 SAME_TIME = 1e-6
-"""Two time stamps that differ by less than about this (s) are one epoch."""
+"""Time stamps that differ by less than about this (s) are one epoch."""
 
 
 @doors
@@ -65,7 +65,7 @@ class Trajectories(Shown):
         once = last_at_each_instant(self.times, self.ids)
         if len(once) < len(self.times):
             row = int(np.setdiff1d(np.arange(len(self.times)), once)[0])
-            raise InvalidInputError(f"ids: {self.ids[row]} is there twice at {self.times[row]:.6g} s")
+            raise InvalidInputError(f"ids: {self.ids[row]} occurs twice at {self.times[row]:.6g} s")
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Trajectories:
@@ -110,11 +110,26 @@ def _numbers(value: object, name: str) -> Array:
     return array
 
 
+def columns_of_rows(**columns: Array) -> list[Array]:
+    """Columns as arrays of one shape (n,).
+
+    Raises
+    ------
+    InvalidInputError
+        Their shapes differ.
+    """
+    arrays = [np.asarray(column) for column in columns.values()]
+    if arrays[0].ndim != 1 or any(array.shape != arrays[0].shape for array in arrays):
+        *names, last = columns
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise InvalidInputError(f"{', '.join(names)} and {last} must have one shape (n,), got {shapes}")
+    return arrays
+
+
 def last_at_each_instant(times: Array, ids: Array) -> Array:
     """Rows that are the last of their identity at their instant, in the order given.
 
-    Several scans may be of one time, as of sensors that report one after the other: targets and tracks are listed in
-    each of them, and count once.
+    Several scans may have the same time, as of sensors that report in turn: each lists targets and tracks again.
 
     Parameters
     ----------
@@ -128,12 +143,11 @@ def last_at_each_instant(times: Array, ids: Array) -> Array:
     ticks = np.round(np.asarray(times, dtype=np.float64) / SAME_TIME)
     order = np.lexsort((ids, ticks))
     again = (np.diff(ticks[order]) == 0) & (np.diff(np.asarray(ids)[order]) == 0)
-    # a row is the last of its kind where the next one is of another
     return np.sort(order[np.append(~again, True)[: len(order)]])
 
 
 def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, Array, Array]]:
-    """Each instant that either of two knows, earliest first: its time and the rows of both, by their ids.
+    """Each instant of the truth or the tracks, earliest first: its time and the rows of both, by their ids.
 
     Parameters
     ----------
@@ -152,6 +166,6 @@ def epochs(truth: Trajectories, tracks: Trajectories) -> Iterator[tuple[float, A
     order = np.lexsort((np.concatenate([truth.ids, tracks.ids]), np.arange(len(ticks)) >= len(truth), ticks))
     for group in np.split(order, np.flatnonzero(np.diff(ticks[order])) + 1):
         if group.size:
-            own = group < len(truth)
-            time = truth.times[group[0]] if own[0] else tracks.times[group[0] - len(truth)]
-            yield float(time), group[own], group[~own] - len(truth)
+            real = group < len(truth)
+            time = truth.times[group[0]] if real[0] else tracks.times[group[0] - len(truth)]
+            yield float(time), group[real], group[~real] - len(truth)

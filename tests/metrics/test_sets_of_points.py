@@ -193,7 +193,7 @@ def test_identities_are_compared_as_whole_numbers():
         (lambda: gospa([[0, 0]], [[1, 1, 1]], 1.0), "truth has 2 dimensions, estimates have 3"),
         (lambda: gospa([[0, np.nan]], [[1, 1]], 1.0), "truth must be finite"),
         (lambda: gospa([["a"]], [[1]], 1.0), "truth must be numbers"),
-        (lambda: Trajectories([0, 0], [1, 1], np.zeros((2, 3))), "ids: 1 is there twice at 0 s"),
+        (lambda: Trajectories([0, 0], [1, 1], np.zeros((2, 3))), "ids: 1 occurs twice at 0 s"),
         (lambda: Trajectories([0, 1], [1.5, 1], np.zeros((2, 3))), "ids must be integers"),
         (lambda: Trajectories(np.array([0, 1], "datetime64[ns]"), [1, 1], np.zeros((2, 3))), "times must be numbers"),
         (lambda: mean_gospa([gospa([[0, 0]], [[1, 1]], 9.0)], 0), "order: expected a number >= 1"),
