@@ -23,6 +23,7 @@ import hashlib
 import json
 import lzma
 import math
+import os
 import re
 import sys
 from collections import Counter
@@ -30,6 +31,7 @@ from collections import Counter
 DECIMALS = 60
 NUMBER = re.compile(r"[+-]?[0-9]{1,400}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
 MOST_ROWS, MOST_BYTES, DEEPEST = 1_000_000, 200_000_000, 1_000
+UNPACKED, TIMES = 4_000_000, 30  # bytes that a packed file may hold, or so many times its own
 Row = tuple[int, int]  # sensor, index from 1; cuts are (-1, number)
 Column = tuple[int, tuple[Row, ...]]  # cost, rows
 
@@ -95,10 +97,11 @@ class Problem:
 
 def read_text(path: str) -> str:
     """Return what a file, or one packed by xz, holds."""
+    most = min(MOST_BYTES, max(UNPACKED, TIMES * os.path.getsize(path))) if path.endswith(".xz") else MOST_BYTES
     with lzma.open(path) if path.endswith(".xz") else open(path, "rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise ValueError(f"has more than {MOST_BYTES} bytes")
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise ValueError(f"has more than {most} bytes{'' if most == MOST_BYTES else '; if you trust it, unpack it'}")
     return content.decode()
 
 

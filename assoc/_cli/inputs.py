@@ -7,8 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from assoc._files.output import STDOUT, check_writable, is_stream
+from assoc._files.reading import read_bytes
 from assoc._text.plain import one_line
 from assoc.errors import InvalidInputError
+
+_LARGEST = 1_000_000
 
 
 def read_toml(path: str) -> dict[str, Any]:
@@ -22,10 +25,9 @@ def read_toml(path: str) -> dict[str, Any]:
     import tomllib  # only with --config
 
     try:
-        with open(path, "rb") as file:
-            content = tomllib.load(file)
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+        content = tomllib.loads(read_bytes(path, _LARGEST).decode())
+    except InvalidInputError:
+        raise
     except (ValueError, RecursionError) as error:  # TOMLDecodeError and UnicodeDecodeError
         raise InvalidInputError(f"{path}: is not a TOML file ({one_line(error)})") from None
     return {key.replace("-", "_"): value for key, value in content.items()}

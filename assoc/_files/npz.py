@@ -14,6 +14,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from assoc._files.output import write_atomically
+from assoc._files.reading import check_unpacked, expands, open_member
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 
@@ -21,10 +22,8 @@ SIZE_LIMIT = 4 * 1024**3
 """The most bytes that the arrays of one npz file may hold together."""
 
 _HEADER_LIMIT = 10_000
-# deflate cannot expand by more than about 1032; a member that claims more is damaged or an attack
-_LARGEST_EXPANSION = 1_100
-# arrays of scenes and problems compress by 3 to 10, and only small ones of equal numbers by much more
-_USUAL_EXPANSION, _SMALL = 100, 128 * 1024**2
+# in memory
+_OF_FORMAT, _OF_ARRAYS = 10_000, 64_000_000
 
 _KINDS = {"float": "fiu", "int": "iu", "str": "U", "bool": "b"}
 _TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_, "bool": np.bool_}
@@ -59,11 +58,17 @@ def save_npz(
     header = {"format": np.asarray(format_name), "version": np.asarray(version)}
 
     def write(file: IO[bytes]) -> None:
-        # as numpy's savez_compressed, whose archive is left open where the disk is full, and complains of that later
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, value in {**header, **content}.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    np.lib.format.write_array(member, value, allow_pickle=False)
+        # what is packed so much that no reader would take it is not packed
+        for method in (zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED):
+            file.seek(0)
+            file.truncate()
+            # as numpy's savez, whose archive is left open where the disk is full, and complains of that later
+            with zipfile.ZipFile(file, "w", method) as archive:
+                for name, value in {**header, **content}.items():
+                    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                        np.lib.format.write_array(member, value, allow_pickle=False)
+            if not expands(sum(8 * value.size + value.nbytes for value in content.values()), file.tell(), _OF_ARRAYS):
+                return
 
     write_atomically(path, write)
 
@@ -142,13 +147,10 @@ def _read(
     for name in wanted:
         if name not in members:
             raise InvalidInputError(f"{file}: the field {name!r} is missing")
-    total = sum(members[name].file_size for name in wanted)
-    if total > SIZE_LIMIT:
-        raise InvalidInputError(f"{file}: its arrays take {total} bytes, the limit is {SIZE_LIMIT}")
-    packed = sum(members[name].compress_size for name in wanted)
-    if total > _SMALL and total > _USUAL_EXPANSION * packed:
-        raise InvalidInputError(f"{file}: its arrays claim to unpack from {packed} to {total} bytes, too many")
-    return {name: _member(file, archive, members[name], spec) for name, spec in wanted.items()}
+    arrays: dict[str, Array] = {}
+    for name, spec in wanted.items():
+        arrays[name] = _member(file, archive, members[name], spec, sum(one.nbytes for one in arrays.values()))
+    return arrays
 
 
 def format_of(path: str | os.PathLike[str]) -> str | None:
@@ -161,12 +163,12 @@ def format_of(path: str | os.PathLike[str]) -> str | None:
         return None
 
 
-def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field) -> Array:
-    """One array; its header is checked before memory is allocated."""
+def _member(
+    file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field, taken: int | None = None
+) -> Array:
+    """One array, beside which others have taken so much; its header is checked before memory is allocated."""
     name = info.filename.removesuffix(".npy")
-    if info.file_size > SIZE_LIMIT or info.file_size > _LARGEST_EXPANSION * info.compress_size + 1000:
-        raise InvalidInputError(f"{file}: the field {name!r} claims {info.file_size} bytes, more than it can hold")
-    with archive.open(info) as stream:
+    with open_member(archive, info) as stream:
         try:
             major, minor = np.lib.format.read_magic(stream)
             if (major, minor) == (1, 0):
@@ -196,6 +198,10 @@ def _member(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: F
             raise InvalidInputError(
                 f"{file}: the field {name!r} claims {size} bytes of data, the file holds {info.file_size}"
             )
+        memory = math.prod(shape) * max(dtype.itemsize, np.dtype(_TARGETS[spec.kind]).itemsize)
+        if memory > (_OF_FORMAT if taken is None else SIZE_LIMIT - taken):
+            raise InvalidInputError(f"{file}: the field {name!r} takes {memory} bytes, more than the limit")
+        check_unpacked(file, memory + (taken or 0), file.stat().st_size, _OF_ARRAYS)
         data = stream.read(size)
         if len(data) != size:
             raise InvalidInputError(f"{file}: the field {name!r} ends after {len(data)} of {size} bytes")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import lzma
 import os
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from assoc._files.output import FilePath, write_atomically
+from assoc._files.reading import read_lines
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 FIRST_LINE = "assoc-problem 1"
 ENDINGS = (".txt", ".txt.xz")
-_LARGEST = 500_000_000
+_LARGEST, _LONGEST_LINE = 500_000_000, 1_000_000
 _MOST_INDEX = 2**31
 
 
@@ -57,21 +58,9 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
     InvalidInputError
         It is no such file.
     """
-    try:
-        with lzma.open(path) if os.fspath(path).endswith(".xz") else open(path, "rb") as file:
-            content = file.read(_LARGEST + 1)  # a packed file may be small and hold more than there is memory for
-        if len(content) > _LARGEST:
-            raise InvalidInputError(f"{path}: is larger than 500 MB")
-        text = content.decode()
-    except (lzma.LZMAError, EOFError):
-        raise InvalidInputError(f"{path}: is damaged, or not packed by xz") from None
-    except UnicodeDecodeError:
-        raise InvalidInputError(f"{path}: is no text, expected a problem in text form or an npz file") from None
-    except InvalidInputError:
-        raise
-    except (OSError, ValueError) as error:  # ValueError: no name of a file
-        raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    every = read_lines(path, _LONGEST_LINE, _LARGEST)
+    rows = (line for line in every if line.strip() and not line.startswith("#"))
+    lines = list(islice(rows, 4))
     if not lines or lines[0].split() != FIRST_LINE.split():
         raise InvalidInputError(f"{path}: the first line must be {FIRST_LINE!r}")
     head = dict(zip(("sizes", "dummies", "tuples"), (line.split() for line in lines[1:4]), strict=False))
@@ -84,14 +73,16 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
         count = int(head["tuples"][1])
     except (ValueError, OverflowError, IndexError):
         raise InvalidInputError(f"{path}: sizes and the number of tuples must be whole numbers") from None
-    if count != len(lines) - 4:
-        raise InvalidInputError(f"{path}: announces {count} tuples and has {len(lines) - 4}")
-    table = np.zeros((0, 1 + sizes.size))
-    if count:
-        try:
-            table = np.loadtxt(io.StringIO("\n".join(lines[4:])), dtype=np.float64, comments=None, ndmin=2)
-        except ValueError as error:
-            raise InvalidInputError(f"{path}: tuples: {str(error).splitlines()[0]:.100}") from None
+    table, first = np.zeros((0, 1 + sizes.size)), list(islice(rows, 1))
+    try:
+        if first:
+            table = np.loadtxt(chain(first, rows), dtype=np.float64, comments=None, ndmin=2)
+    except InvalidInputError:
+        raise
+    except ValueError as error:
+        raise InvalidInputError(f"{path}: tuples: {str(error).splitlines()[0]:.100}") from None
+    if count != len(table):
+        raise InvalidInputError(f"{path}: announces {count} tuples and has {len(table)}")
     if table.shape[1] != 1 + sizes.size:
         raise InvalidInputError(f"{path}: tuples: expected a cost and {sizes.size} indices in each line")
     indices = table[:, 1:]

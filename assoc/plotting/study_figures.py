@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_atomically
+from assoc._files.reading import check_regular
 from assoc._system.extras import load_extra
 from assoc.errors import InvalidInputError
 from assoc.plotting.colours import DASHES, colour
@@ -77,6 +78,7 @@ def new_figure() -> Any:
 
 def save_png(path: Path, figure: Any) -> Path:
     """Write a figure, whole or not at all; returns the path."""
+    check_regular(path)  # into the folder of a study, where others may have put a link
     write_atomically(path, lambda file: figure.savefig(file, format="png", dpi=130))
     return path
 

@@ -8,10 +8,10 @@ import os
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
+from assoc._files.reading import read_lines
 from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError, LimitExceededError
@@ -22,7 +22,6 @@ from assoc.recordings.recording import UNDECODED, Recording
 MAX_DISORDER = 30.0
 """Plots that come at most this late (s) are put where they belong; later ones are an error."""
 
-LONGEST_LINE = 10_000
 MOST_PLOTS = 20_000_000
 _FARTHEST = 1e7
 
@@ -71,40 +70,17 @@ def read_plots(
     file = Path(path)
     if not 0 <= max_disorder < math.inf:
         raise InvalidInputError(f"max_disorder: expected seconds >= 0, got {max_disorder!r}")
-    try:
-        with file.open("rb") as stream:
-            return _read(file, stream, columns or {}, units or {}, max_disorder, garbled_codes)
-    except OSError as error:
-        raise InvalidInputError(f"{file}: cannot be read ({error.strerror or error})") from None
-
-
-def _lines(file: Path, stream: IO[bytes]) -> Iterator[str]:
-    """Decoded lines, none of them longer than a plot can be: memory stays small whatever the file is."""
-    count = 0
-    while True:
-        raw = stream.readline(LONGEST_LINE + 1)
-        if not raw:
-            return
-        count += 1
-        if len(raw) > LONGEST_LINE:
-            raise InvalidInputError(f"{file}: line {count} is longer than {LONGEST_LINE} bytes, expected plots (CSV)")
-        if b"\x00" in raw:
-            raise InvalidInputError(f"{file}: line {count} holds a NUL byte, expected text (UTF-8)")
-        try:
-            yield raw.decode("utf-8-sig" if count == 1 else "utf-8")
-        except UnicodeDecodeError:
-            raise InvalidInputError(f"{file}: line {count} is not UTF-8 text") from None
+    return _read(file, read_lines(file), columns or {}, units or {}, max_disorder, garbled_codes)
 
 
 def _read(
     file: Path,
-    stream: IO[bytes],
+    lines: Iterator[str],
     columns: Mapping[str, str],
     units: Mapping[str, str],
     max_disorder: float,
     garbled_codes: Array | None,
 ) -> Recording:
-    lines = _lines(file, stream)
     head = next((line for line in lines), "")
     if not head.strip():
         raise InvalidInputError(f"{file}: has no header line, expected column names such as time,range,bearing")

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from assoc._files.output import write_text
+from assoc._files.reading import open_regular
 from assoc.errors import InvalidInputError
 from assoc.sweeps.setting import Setting
 
@@ -26,6 +27,8 @@ MANIFEST = "study.json"
 LOG = "runs.jsonl"
 REPORT = "tuning.json"
 
+# bytes of the manifest, and of a line of the log: a batch has a few thousand runs
+_LONGEST = 32_000_000
 _NEW_MANIFEST = (
     f"the runs in {LOG} are not affected: start the same sweep in a new folder, and copy its {MANIFEST} here"
 )
@@ -159,9 +162,9 @@ class Store:
     def _open_log(self) -> IO[bytes]:
         path = self.folder / LOG
         try:
-            log = open(path, "ab", buffering=0)
+            log = open_regular(path, "ab")
             if log.tell() > 0:
-                with open(path, "rb") as written:
+                with open_regular(path) as written:
                     written.seek(-1, os.SEEK_END)
                     if written.read(1) != b"\n":
                         log.write(b"\n")
@@ -249,7 +252,13 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     if not Path(folder).is_dir():
         raise InvalidInputError(f"{folder}: no such folder, expected the folder of a study")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        with open_regular(path) as file:
+            text = file.read(_LONGEST + 1)
+        if len(text) > _LONGEST:
+            raise InvalidInputError(f"{path}: is larger than {_LONGEST} bytes; {_NEW_MANIFEST}")
+        content = json.loads(text)
+    except InvalidInputError:
+        raise
     except FileNotFoundError:
         raise InvalidInputError(f"{folder}: holds no study ({MANIFEST} is missing)") from None
     except OSError as error:
@@ -272,13 +281,15 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
 def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
     """Yield the entries of the log in order; None for a line whose checksum is wrong."""
     path = Path(folder) / LOG
-    if not path.exists():
-        return
     try:
-        with open(path, "rb") as file:
-            for line in file:
+        with open_regular(path) as file:
+            while line := file.readline(_LONGEST + 1):
+                if len(line) > _LONGEST:
+                    raise InvalidInputError(f"{path}: has a line of more than {_LONGEST} bytes")
                 if line != b"\n":
                     yield _read_log_line(line)
+    except FileNotFoundError:
+        return
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -351,7 +362,7 @@ def _lock(folder: Path) -> IO[bytes]:
     """Lock the folder against a second process; the lock ends with the process, however that ends."""
     path = folder / ".lock"
     try:
-        file = open(path, "ab")
+        file = open_regular(path, "ab")
     except OSError as error:
         raise InvalidInputError(f"{folder}: cannot be written ({error.strerror or error})") from None
     try:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._files.output import write_text
+from assoc._files.reading import check_regular
 from assoc._parameters import is_whole
 from assoc._system.door import door
 from assoc._types import Floats
@@ -348,4 +349,5 @@ def _save(path: Path, report: Report) -> None:
         "table": [plain(row) for row in report.table.to_dict("records")],
         "difference": dict(zip(("mean", "low", "high"), report.difference, strict=True)),
     }
+    check_regular(path)
     write_text(path, json.dumps(content, indent=1) + "\n")

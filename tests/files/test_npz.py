@@ -138,7 +138,7 @@ def test_a_bomb_is_refused_before_it_unpacks(tmp_path, monkeypatch):
     path = tmp_path / "bomb.npz"
     write_members(path, {"x.npy": header_only((10**7,)) + bytes(8 * 10**7)})
     monkeypatch.setattr(npz, "SIZE_LIMIT", 10**7)
-    with pytest.raises(InvalidInputError, match="the limit is|more than it can hold"):
+    with pytest.raises(InvalidInputError, match="more than the limit"):
         load(path)
 
 

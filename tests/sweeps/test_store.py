@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from assoc.errors import InvalidInputError
+from assoc.plotting.study_figures import draw_study
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
 from assoc.sweeps import Study, grid, load, load_traces
@@ -245,3 +247,36 @@ def test_half_a_line_on_a_full_disk_is_taken_back(study, whole, tmp_path):
         store._log = log
         assert sum(store.append(study.settings, batch) for batch in batches) == study.size
     assert damaged_lines(tmp_path / "new") == 0 and same(load(tmp_path / "new"), load(whole))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes that have names")
+@pytest.mark.parametrize("name", [LOG, MANIFEST, ".lock"])
+@pytest.mark.parametrize("planted", ["link", "link to nothing", "pipe", "device"])
+def test_what_others_put_into_the_folder_is_not_followed(study, whole, tmp_path, name, planted):
+    victim = tmp_path / "victim"
+    kept = (whole / name).read_bytes()
+    (whole / name).unlink()
+    if planted == "pipe":
+        os.mkfifo(whole / name)
+    elif planted == "device":
+        (whole / name).symlink_to("/dev/zero")
+    else:
+        if planted == "link":
+            victim.write_bytes(kept)
+        (whole / name).symlink_to(victim)
+    with pytest.raises(InvalidInputError) as caught:
+        study.run(whole)
+    assert str(whole) in str(caught.value) and "\n" not in str(caught.value)
+    assert victim.read_bytes() == kept if planted == "link" else not victim.exists()
+    assert planted == "pipe" or (whole / name).is_symlink()
+    if name == LOG:
+        with pytest.raises(InvalidInputError, match="is a link, a pipe"):
+            load(whole)
+
+
+def test_a_picture_or_report_is_not_written_through_a_link(whole, tmp_path):
+    (tmp_path / "victim").write_text("mine")
+    (whole / "convergence.png").symlink_to(tmp_path / "victim")
+    with pytest.raises(InvalidInputError, match=r"convergence.png: is a link"):
+        draw_study(whole)
+    assert (tmp_path / "victim").read_text() == "mine"

@@ -6,14 +6,12 @@ import os
 import struct
 from collections.abc import Iterator
 from functools import lru_cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from assoc._files import reading
 from assoc._system.extras import check_extra, load_extra
-from assoc.errors import InvalidInputError, LimitExceededError
 
-MOST_BYTES = 2_000_000_000
 EDITIONS = {21: "Cat_021_2_7", 34: "Cat_034_1_29", 48: "Cat_048_1_32", 62: "Cat_062_1_21"}
 """Editions by category; earlier ones of the same numbering decode alike."""
 
@@ -33,13 +31,7 @@ class Block(NamedTuple):
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """Content of a file of bearable size."""
     check_extra("asterix", "asterix")
-    file = Path(path)
-    try:
-        if file.stat().st_size > MOST_BYTES:
-            raise LimitExceededError(f"{file}: is larger than {MOST_BYTES} bytes; split it")
-        return file.read_bytes()
-    except OSError as error:
-        raise InvalidInputError(f"{file}: cannot be read ({error.strerror or error})") from None
+    return reading.read_bytes(path)
 
 
 def data_blocks(content: bytes, notes: dict[str, int]) -> Iterator[Block]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import islice
@@ -11,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assoc._files.reading import check_unpacked, open_input
 from assoc._system.extras import check_extra
 from assoc._types import Array
-from assoc.errors import InvalidInputError, warn
+from assoc.errors import InvalidInputError, LimitExceededError, warn
+from assoc.recordings.reading import MOST_PLOTS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,6 +45,8 @@ HIGH = 18_000.0
 
 _MISSING = ["", "nan", "NaN", "-nan", "-NaN", "NA", "<NA>", "#N/A", "N/A", "n/a", "null", "NULL", "None"]
 
+# bytes in which the names of the columns are
+_START = 1_000_000
 _LIMITS = {"latitude": 90.0, "longitude": 360.0, "altitude": 1e6, "time": 1e12}
 
 
@@ -119,6 +125,8 @@ def read_flight_reports(
     AssocWarning
         Altitudes too high for aircraft, as when feet are read as metres.
     """
+    import pandas as pd
+
     table, chosen = _table(path, named)
     columns = {"time": _times(path, chosen["time"], table[chosen["time"]])}
     for meaning in ("latitude", "longitude", "altitude"):
@@ -139,7 +147,7 @@ def read_flight_reports(
                 f"expected at most {limit:g} in size, got {columns[meaning][row]:g}"
             )
     # without missing ones: beside these pandas cuts texts to their first letter
-    ids, target = np.unique(identity[known].astype(str).to_numpy(dtype=str), return_inverse=True)
+    target, ids = pd.factorize(identity[known].astype(str), sort=True)
     time, lat, lon, height = (columns[meaning][known] for meaning in ("time", "latitude", "longitude", "altitude"))
     height = height * ALTITUDE_UNITS[altitude_unit]
     if len(height) >= 10 and float(np.quantile(height, 0.9)) > HIGH:
@@ -167,34 +175,77 @@ def read_flight_reports(
 def _table(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, dict[str, str]]:
     import pandas as pd
 
-    parquet = Path(path).suffix.lower() in (".parquet", ".pq")
+    parquet = _is_parquet(path)
     if parquet:
         check_extra("pyarrow", "parquet")
     try:
         if parquet:
-            table = pd.read_parquet(path)
-            chosen = choose_columns(path, [str(name) for name in table.columns], named)
+            table, chosen = _read_parquet(path, named)
         else:
-            chosen = choose_columns(path, list(pd.read_csv(path, nrows=0).columns), named)
+            with open_input(path) as file:
+                start = file.read(_START)
+            if len(start) == _START and b"\n" not in start:
+                raise InvalidInputError(f"{path}: the first line is longer than {_START} bytes, expected column names")
+            chosen = choose_columns(path, list(pd.read_csv(io.BytesIO(start), nrows=0).columns), named)
             # nan and null are missing numbers, but valid names
             texts: Any = {chosen[meaning]: str for meaning in ("id", "name") if meaning in chosen}
             missing = {column: [""] if column in texts else _MISSING for column in chosen.values()}
-            table = pd.read_csv(
-                path,
-                usecols=list(chosen.values()),
-                dtype=texts,
-                low_memory=False,
-                keep_default_na=False,
-                na_values=missing,
-            )
-    except OSError as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
+            with open_input(path) as file:
+                table = pd.read_csv(
+                    file,
+                    usecols=list(chosen.values()),
+                    dtype=texts,
+                    low_memory=False,
+                    keep_default_na=False,
+                    na_values=missing,
+                    nrows=MOST_PLOTS + 1,
+                )
     except InvalidInputError:
         raise
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except ValueError as error:  # pandas' parser errors, pyarrow's and UnicodeDecodeError are ValueErrors
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise InvalidInputError(f"{path}: is not a {'Parquet' if parquet else 'CSV'} file ({reason})") from None
+    if len(table) > MOST_PLOTS:
+        raise LimitExceededError(f"{path}: more than {MOST_PLOTS} rows; split the file")
     return table, chosen
+
+
+def _is_parquet(path: str) -> bool:
+    return Path(path).suffix.lower() in (".parquet", ".pq")
+
+
+def _read_parquet(path: str, named: Mapping[str, str | None]) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Read the columns that are needed, after their memory was added up: equal rows take next to none in the file."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    from pyarrow import parquet
+
+    with parquet.ParquetFile(path) as file:
+        schema = file.schema_arrow
+    chosen = choose_columns(path, schema.names, named)
+    wanted = [*chosen.values()]
+    for name in wanted:
+        kinds = [field.type for field in schema if field.name == name]
+        if len(kinds) > 1 or pa.types.is_nested(kinds[0]) or pa.types.is_fixed_size_binary(kinds[0]):
+            raise InvalidInputError(f"{path}: column {name!r}: expected one column of numbers, dates or texts")
+    # of texts a list of the different ones is read first, for any of them may be long and stand in all rows
+    with parquet.ParquetFile(path, read_dictionary=wanted) as file:
+        rows, packed = file.metadata.num_rows, os.path.getsize(path)
+        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+        columns = [group.column(k) for group in groups for k in range(group.num_columns)]
+        held = sum(one.total_uncompressed_size for one in columns if one.path_in_schema in wanted)
+        check_unpacked(path, held + 8 * rows * len(wanted), packed)
+        table = file.read(wanted)
+    for place, name in enumerate(wanted):
+        column = table[name]
+        if pa.types.is_dictionary(column.type):
+            longest = (pc.max(pc.binary_length(chunk.dictionary)).as_py() or 0 for chunk in column.chunks)
+            held += rows * max(longest, default=0)
+            check_unpacked(path, held + 8 * rows * len(wanted), packed)
+            table = table.set_column(place, name, column.cast(column.type.value_type))
+    return table.to_pandas(ignore_metadata=True), chosen
 
 
 def choose_columns(path: str, header: list[str], named: Mapping[str, str | None]) -> dict[str, str]:
@@ -240,9 +291,9 @@ def _motion(table: pd.DataFrame, chosen: Mapping[str, str]) -> tuple[Array, Arra
 
 
 def _cell(path: str, row: int, column: str) -> str:
-    if Path(path).suffix.lower() in (".parquet", ".pq"):
+    if _is_parquet(path):
         return f"{path}: row {row}, column {column!r}"
-    with open(path, "rb") as file:
+    with open_input(path) as file:
         # empty lines are not rows
         filled = (number for number, line in enumerate(file, start=1) if line.strip())
         line = next(islice(filled, row + 1, None), row + 2)

@@ -12,6 +12,7 @@ from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from assoc._files.reading import open_regular
 from assoc._system import temporary
 from assoc._system.processes import end_with_parent, not_sent, require_processes, signals_as_they_are
 from assoc.errors import InvalidInputError
@@ -108,7 +109,8 @@ def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
     global _job
     if _job is None or _job[0] != path:
         end_with_parent(parent, path)
-        content = Path(path).read_bytes()
+        with open_regular(path) as file:
+            content = file.read()
         # other users may be able to write to the study's folder, and a pickle can run any code
         if content_digest(content) != digest:
             raise InvalidInputError(f"{path}: was changed by someone else")

@@ -1,0 +1,185 @@
+"""Files that are read: opened without trust, unpacked on the way, and counted while they are.
+
+A packed file may hold `FLOOR` bytes, or `EXPANSION` times its own size; what holds more is made to fill the memory, or
+can be unpacked by its owner first. This is the only place where inputs are opened (but for `assoc.check`, which needs
+nothing of the package).
+"""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import lzma
+import os
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from typing import IO, Any
+
+from assoc.errors import InvalidInputError
+
+FilePath = str | os.PathLike[str]
+
+FLOOR = 16_000_000
+EXPANSION = 50
+MOST_BYTES = 2_000_000_000
+"""The most that any file may hold, packed or not, if its reader allows no less."""
+LONGEST_LINE = 10_000
+
+
+def _open_zipped(file: IO[bytes]) -> IO[bytes]:
+    archive = zipfile.ZipFile(file)
+    members = archive.infolist()
+    if len(members) != 1:
+        raise ValueError(f"it holds {len(members)} files, expected one")
+    return open_member(archive, members[0])
+
+
+def open_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> IO[bytes]:
+    """Open a file of an archive, plain or deflated: what other methods unpack to zipfile does not limit."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError(f"{member.filename[:60]!r} is packed in an unusual way, expected deflate")
+    return archive.open(member)
+
+
+_OPENERS: dict[str, Any] = {".xz": lzma.open, ".gz": gzip.open, ".bz2": bz2.open, ".zip": _open_zipped}
+_DAMAGED = (lzma.LZMAError, zlib.error, EOFError, gzip.BadGzipFile, zipfile.BadZipFile)
+
+
+@contextmanager
+def readable(path: FilePath) -> Iterator[None]:
+    """Say in one line of a file that cannot be read which it is, and why."""
+    try:
+        yield
+    except InvalidInputError:
+        raise
+    except _DAMAGED:
+        raise InvalidInputError(f"{path}: is damaged, or not packed as its name says") from None
+    except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # ValueError: no name of a file
+        raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+def expands(size: float, packed: int, floor: int = FLOOR) -> bool:
+    """Whether ``size`` bytes are more than a file of ``packed`` bytes may hold."""
+    return size > max(floor, EXPANSION * packed)
+
+
+def check_unpacked(path: FilePath, size: float, packed: int, floor: int = FLOOR) -> None:
+    """Refuse a file of ``packed`` bytes that takes ``size`` bytes of memory, if it may not; see `expands`."""
+    if expands(size, packed, floor):
+        raise InvalidInputError(
+            f"{path}: would unpack from {packed} bytes to {size:.0f} or more, expected at most {EXPANSION} times as "
+            "many; if you trust it, unpack it first"
+        )
+
+
+class _Counted(io.RawIOBase):
+    """What a file holds, until it is too much."""
+
+    def __init__(self, path: FilePath, most: int) -> None:
+        self._path, self._most, self._count = path, most, 0
+        with ExitStack() as stack, readable(path):
+            file = self._stream = stack.enter_context(open(path, "rb"))
+            ending = os.path.splitext(os.fspath(path))[1].lower()
+            self._packed = os.fstat(file.fileno()).st_size if ending in _OPENERS else None
+            if ending in _OPENERS:
+                self._stream = stack.enter_context(_OPENERS[ending](file))
+            self._close = stack.pop_all().close
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        with readable(self._path):
+            count: int = self._stream.readinto(buffer)
+        self._count += count
+        if self._count > self._most:
+            raise InvalidInputError(f"{self._path}: is larger than {self._most} bytes")
+        if self._packed is not None:
+            check_unpacked(self._path, self._count, self._packed)
+        return count
+
+    def close(self) -> None:
+        if not self.closed:
+            super().close()
+            self._close()
+
+
+def open_input(path: FilePath, most: int = MOST_BYTES) -> IO[bytes]:
+    """Open a file, unpacked if its name ends in .xz, .gz, .bz2 or .zip.
+
+    Raises
+    ------
+    InvalidInputError
+        It cannot be read, or, as soon as that much of it was, is larger than ``most`` or than packed files are.
+    """
+    return io.BufferedReader(_Counted(path, most), 1 << 16)
+
+
+def read_bytes(path: FilePath, most: int = MOST_BYTES) -> bytes:
+    """Return all of a file; see `open_input`."""
+    with open_input(path, most) as file:
+        return file.read()
+
+
+def read_lines(path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYTES) -> Iterator[str]:
+    """Yield the lines of a text file (UTF-8) one by one.
+
+    Raises
+    ------
+    InvalidInputError
+        As of `open_input`; or a line has more bytes than ``longest``, or is no text.
+    """
+    with open_input(path, most) as file:
+        number = 0
+        while line := file.readline(longest + 1):
+            number += 1
+            if len(line) > longest:
+                raise InvalidInputError(f"{path}: line {number} is longer than {longest} bytes")
+            if b"\0" in line:
+                raise InvalidInputError(f"{path}: line {number} holds a NUL byte, expected text (UTF-8)")
+            try:
+                yield line.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError:
+                raise InvalidInputError(f"{path}: line {number} is not UTF-8 text") from None
+
+
+def check_regular(path: FilePath) -> None:
+    """Refuse what others may have put in the place of a file: a link, a pipe, a device, a folder.
+
+    Raises
+    ------
+    InvalidInputError
+        It is there, and no regular file.
+    """
+    with suppress(FileNotFoundError):
+        if not stat.S_ISREG(os.lstat(path).st_mode):
+            raise InvalidInputError(f"{path}: is a link, a pipe or a folder, expected a file")
+
+
+def open_regular(path: FilePath, mode: str = "rb") -> IO[bytes]:
+    """Open a file of a folder in which others may write: no link is followed, and no pipe or device waited for.
+
+    Parameters
+    ----------
+    path : path-like
+    mode : {"rb", "ab"}
+        To append is not buffered, and makes the file.
+
+    Raises
+    ------
+    InvalidInputError
+        It is no regular file.
+    OSError
+        As of `open`.
+    """
+
+    def opener(name: str, flags: int) -> int:
+        check_regular(name)
+        # the same again, for what is put there now
+        return os.open(name, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
+
+    return open(path, mode, buffering=0 if mode == "ab" else -1, opener=opener)

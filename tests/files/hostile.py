@@ -1,0 +1,206 @@
+"""Files that are small and want much memory, and how much of it a program takes for them.
+
+python -m tests.files.hostile [NAME ...]        a table: the file, its size, the peak, how the program ended
+"""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import json
+import lzma
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+MOST = 1_000_000_000
+"""Bytes of memory that no hostile file may take."""
+
+_RUN = """
+import runpy, sys
+sys.argv = sys.argv[1:]
+try:
+    runpy.run_module(sys.argv[0], run_name="__main__")
+finally:
+    sys.stdout.flush()
+    print(*(line for line in open("/proc/self/status") if "VmHWM" in line), file=sys.stderr)
+"""
+_LIMITED = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_AS, 2 * [12 << 30]); " + (
+    "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+)
+
+HEAD = b"assoc-problem 1\nsizes 9\ndummies no\ntuples 9\n"
+REPORTS = b"time,id,lat,lon,altitude\n"
+
+
+class Hostile(NamedTuple):
+    """A file and the program that reads it: its words, of which {} is the file; what comes by stdin; its exit code."""
+
+    name: str
+    make: Callable[[Path], object]
+    words: str
+    stdin: str = os.devnull
+    code: int = 2
+
+
+def packed(module: Any, start: bytes, again: bytes, size: float) -> Callable[[Path], object]:
+    """A packed file that begins so, and then says the same thing again and again, in streams of ten megabytes."""
+    chunk = again * (10_000_000 // len(again))
+    return lambda path: path.write_bytes(module.compress(start) + module.compress(chunk) * int(size / 1e7))
+
+
+def _zipped(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("x.csv", REPORTS + b"0,a,1,2,3\n" * 20_000_000)
+
+
+def _parquet(path: Path, name: str, rows: int, groups: int = 1) -> None:
+    """Equal rows: almost nothing in the file, however many."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    rows = rows // groups
+    numbers = pa.array(np.zeros(rows))
+    names = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), [name])
+    table = pa.table({"time": numbers, "id": names, "lat": numbers, "lon": numbers, "altitude": numbers})
+    with parquet.ParquetWriter(path, table.schema) as writer:
+        for _ in range(groups):
+            writer.write_table(table)
+
+
+def _npz(format_name: str, arrays: dict[str, Any], kind: int = zipfile.ZIP_DEFLATED) -> Callable[[Path], object]:
+    """An npz; a shape and a type stand for zeros."""
+
+    def make(path: Path) -> None:
+        with zipfile.ZipFile(path, "w", kind) as archive:
+            for name, value in {"format": np.array(format_name), "version": np.array(1), **arrays}.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    if isinstance(value, np.ndarray):
+                        np.lib.format.write_array(member, value)
+                        continue
+                    shape, dtype = value
+                    head = {"descr": dtype, "fortran_order": False, "shape": shape}
+                    np.lib.format.write_array_header_1_0(member, head)
+                    left = int(np.prod(shape)) * np.dtype(dtype).itemsize
+                    for _ in range(left >> 24):
+                        member.write(bytes(1 << 24))
+                    member.write(bytes(left & 0xFFFFFF))
+
+    return make
+
+
+def _problem(count: int, **more: Any) -> dict[str, Any]:
+    return {"tuples": ((count, 2), "|u1"), "costs": ((count,), "|u1"), "sizes": np.array([9, 9]), **more}
+
+
+def _scene(scans: int) -> dict[str, Any]:
+    one = {"sensor_position": np.zeros((1, 3)), "sensor_dim": np.array([2]), "sensor_kind": np.array(["radar2d"])}
+    one |= {"sensor_name": np.array(["a"]), "sensor_covariance": np.eye(2).ravel()}
+    one |= {"sensor_field_of_view": np.array([[0.0, 1e5], [-4.0, 4.0]])}
+    one |= {"sensor_detection_probability": np.array([0.9]), "sensor_false_alarm_rate": np.array([1.0])}
+    offsets = ((1, scans + 1), "|u1")
+    return {**one, "times": np.arange(scans), "measurement_values": np.zeros(0), "measurement_offsets": offsets}
+
+
+def _study(log: bytes | None, manifest: bytes | None = None) -> Callable[[Path], object]:
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        whole = {"format": "assoc.study", "version": 1, "assoc": "0", "code": "", "seed": 0, "sources": []}
+        plain = json.dumps({**whole, "time_limit": None, "gating": {}}).encode()
+        (folder / "study.json").write_bytes(manifest or plain)
+        if log is None:
+            (folder / "runs.jsonl").symlink_to("/dev/zero")
+        else:
+            (folder / "runs.jsonl").write_bytes(b"%08x %s\n" % (zlib.crc32(log), log))
+
+    return make
+
+
+def _asterix(path: Path) -> None:
+    """Service messages of the least size: a north crossing of a few bytes, in many blocks."""
+    record = bytes([0b11110000, 1, 2, 1, 0, 0, 1, 5])
+    content = record * 8000
+    block = bytes([34]) + (3 + len(content)).to_bytes(2, "big") + content
+    path.write_bytes(block * 60)
+
+
+def _scene_file(path: Path) -> None:
+    from assoc.simulation import simulate
+
+    simulate("rotating-radars", 0, aircraft=1, duration=5.0).save(path)
+
+
+SOLVE = "assoc.solve {} --solver greedy"
+CHECK = "assoc.check {} /dev/null"
+FLIGHTS = "assoc.simulate from-tracks {} -o /dev/null --scans 2"
+LIVE = "assoc.track {} --live --turns 4,5,5.5 -o /dev/null"
+
+HOSTILE = [
+    Hostile("problem.txt.xz", packed(lzma, HEAD, b"0 1\n", 4.9e8), SOLVE),
+    Hostile("empty-lines.txt.xz", packed(lzma, HEAD, b"\n", 4.9e8), SOLVE),
+    Hostile("one-line.txt.xz", packed(lzma, HEAD, b"0 ", 4.9e8), SOLVE),
+    Hostile("checked.txt.xz", packed(lzma, HEAD, b"0 1\n", 1.9e8), CHECK),
+    Hostile("checked-empty.txt.xz", packed(lzma, HEAD, b"\n", 1.9e8), CHECK),
+    Hostile("proof.xz", packed(lzma, b'{"a": [1', b",[]", 1.5e8), "assoc.check {folder}/good.txt {}"),
+    Hostile("proof-of-numbers.xz", packed(lzma, b'{"a": [1', b",1", 1.5e8), "assoc.check {folder}/good.txt {}"),
+    Hostile("solution.xz", packed(lzma, b"assoc-solution 1\n", b"1\n", 1.9e8), "assoc.check {folder}/good.txt {}"),
+    Hostile("flights.csv.xz", packed(lzma, REPORTS, b"0,a,1,2,3\n", 1e9), FLIGHTS),
+    Hostile("flights.csv.gz", packed(gzip, REPORTS, b",,,,\n", 4e8), FLIGHTS),
+    Hostile("flights.csv.bz2", packed(bz2, REPORTS, b"0,a,1,2,3\n", 2e8), FLIGHTS),
+    Hostile("flights.csv.zip", _zipped, FLIGHTS),
+    Hostile("header.csv.xz", packed(lzma, REPORTS[:-1], b",a", 5e7), FLIGHTS),
+    Hostile("flights.parquet", lambda path: _parquet(path, "a", 40_000_000), FLIGHTS),
+    Hostile("long-names.parquet", lambda path: _parquet(path, "a" * 1_000_000, 5_000), FLIGHTS),
+    Hostile("groups.parquet", lambda path: _parquet(path, "a", 20_000_000, 200), FLIGHTS),
+    Hostile("wide.npz", _npz("assoc.problem", _problem(40_000_000)), SOLVE),
+    Hostile("format.npz", _npz("", {"format": ((), "<U500000000")}), SOLVE),
+    Hostile("lzma.npz", _npz("assoc.problem", _problem(10), zipfile.ZIP_LZMA), SOLVE),
+    Hostile("scans.npz", _npz("assoc.scene", _scene(4_000_000)), SOLVE),
+    Hostile("texts.npz", _npz("assoc.scene", _scene(3) | {"sensor_name": ((1,), "<U30000000")}), SOLVE),
+    Hostile("asterix.ast", _asterix, "assoc.track {} -o /dev/null"),
+    Hostile("config.toml", lambda path: path.symlink_to("/dev/zero"), "assoc.solve x --config {}"),
+    Hostile("plots.csv", lambda path: path.symlink_to("/dev/zero"), "assoc.track {} -o /dev/null"),
+    Hostile("study", _study(b'{"a": [1' + b",[]" * 20_000_000 + b"]}"), "assoc.sweep --summary {}"),
+    Hostile("study-without-end", _study(None), "assoc.sweep --summary {}"),
+    Hostile("manifest", _study(b"", b"[[]" + b",[]" * 20_000_000 + b"]"), "assoc.sweep --summary {}"),
+    Hostile("zero.npz", _scene_file, LIVE, "/dev/zero"),
+]
+
+
+class Outcome(NamedTuple):
+    """How a program ended: its exit code, bytes at the peak, what it said."""
+
+    code: int
+    peak: int
+    said: str
+
+
+def run(case: Hostile, folder: Path) -> Outcome:
+    """Make the file, and let the program read it in a process of its own."""
+    path = folder / case.name
+    case.make(path)
+    (folder / "good.txt").write_text("assoc-problem 1\nsizes 1\ndummies yes\ntuples 1\n0 1\n")
+    words = case.words.replace("{folder}", str(folder)).replace("{}", str(path)).split()
+    with open(case.stdin, "rb") as stdin:
+        command = [sys.executable, "-c", _LIMITED, "-c", _RUN, *words]
+        done = subprocess.run(command, stdin=stdin, capture_output=True, text=True, timeout=300)
+    *said, peak = done.stderr.strip().splitlines()
+    return Outcome(done.returncode, 1024 * int(peak.split()[1]), "\n".join(said))
+
+
+if __name__ == "__main__":
+    for one in HOSTILE:
+        if len(sys.argv) == 1 or one.name in sys.argv[1:]:
+            with tempfile.TemporaryDirectory() as place:
+                found = run(one, Path(place))
+                size = (Path(place) / one.name).lstat().st_size
+                figures = f"{size / 1e3:.0f} kB | {found.peak / 1e6:.0f} MB | {found.code}"
+                print(f"| {one.name} | {figures} | {found.said[-150:]} |", flush=True)

@@ -1,0 +1,20 @@
+"""Small files that want much memory: each is refused by one line, below a gigabyte at the peak."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.files.hostile import HOSTILE, MOST, Hostile, run
+from tests.sizes import sample
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the peak of memory")
+
+
+@sample("case", HOSTILE, every=7)
+def test_memory_stays_small(case: Hostile, tmp_path: Path) -> None:
+    found = run(case, tmp_path)
+    assert found.peak < MOST, found
+    assert found.code == case.code and "Traceback" not in found.said, found
+    assert case.code == 0 or (case.name in found.said and "\n" not in found.said), found
