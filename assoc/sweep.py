@@ -47,7 +47,7 @@ def start(arguments: Sequence[str] | None = None) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run_program(lambda: _sweep(words), "assoc.sweep")
+    return run_program(lambda: _sweep(words), "assoc.sweep", _INTERRUPTION)
 
 
 def _sweep(words: list[str]) -> None:

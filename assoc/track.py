@@ -54,7 +54,7 @@ def start(arguments: Sequence[str] | None = None) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run_program(lambda: _track(words), "assoc.track")
+    return run_program(lambda: _track(words), "assoc.track", _INTERRUPTION)
 
 
 def _track(words: list[str]) -> None:

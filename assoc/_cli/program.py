@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from assoc._cli.lines import HelpFormatter
-from assoc._cli.signals import exit_on_signals
+from assoc._cli.signals import Interruption, exit_on_signals
 from assoc._cli.warnings import warnings_as_lines
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
@@ -60,8 +60,8 @@ def command(name: str) -> str:
     return f"assoc {name}" if called == "assoc" else f"python -m assoc.{name}"
 
 
-def run_program(program: Callable[[], None], name: str) -> int:
-    """Run a program and turn what it raises into one line on stderr and an exit code."""
+def run_program(program: Callable[[], None], name: str, interruption: Interruption | None = None) -> int:
+    """Run a program and turn what it raises into one line on stderr and an exit code; which signal, knows the last."""
     try:
         with warnings_as_lines(name):
             program()
@@ -76,8 +76,9 @@ def run_program(program: Callable[[], None], name: str) -> int:
         print(f"{name}: out of memory", file=sys.stderr)
         return NOTHING_FEASIBLE
     except KeyboardInterrupt:
-        print(f"{name}: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        signalled = interruption is not None and interruption.code
+        print(interruption.line() if interruption and signalled else f"{name}: interrupted", file=sys.stderr)
+        return signalled or INTERRUPTED
     except BrokenPipeError:
         # the reader of our output (head, less) has seen enough; keep Python from flushing into it again
         sys.stdout = None
@@ -87,6 +88,9 @@ def run_program(program: Callable[[], None], name: str) -> int:
         print(f"{name}: error: {one_line(error.strerror or error)}", file=sys.stderr)
         sys.stdout = None
         return BAD_INPUT
+    finally:
+        # where an interrupt has passed through an exec, Python ends with its own code for that, until the next one
+        exec("")
     return DONE
 
 

@@ -42,7 +42,7 @@ REPORTS = b"time,id,lat,lon,altitude\n"
 
 
 class Hostile(NamedTuple):
-    """A file and the program that reads it: its words, of which {} is the file; what comes by stdin; its exit code."""
+    """A file, the words of the program that reads it ({} is the file), what it gets from stdin, its exit code."""
 
     name: str
     make: Callable[[Path], object]
@@ -171,7 +171,7 @@ HOSTILE = [
     Hostile("study", _study(b'{"a": [1' + b",[]" * 20_000_000 + b"]}"), "assoc.sweep --summary {}"),
     Hostile("study-without-end", _study(None), "assoc.sweep --summary {}"),
     Hostile("manifest", _study(b"", b"[[]" + b",[]" * 20_000_000 + b"]"), "assoc.sweep --summary {}"),
-    Hostile("zero.npz", _scene_file, LIVE, "/dev/zero"),
+    Hostile("zeros.npz", _scene_file, LIVE, "zeros", 0),
 ]
 
 
@@ -187,9 +187,11 @@ def run(case: Hostile, folder: Path) -> Outcome:
     """Make the file, and let the program read it in a process of its own."""
     path = folder / case.name
     case.make(path)
+    with open(folder / "zeros", "wb") as zeros:
+        zeros.truncate(2_000_000_000)
     (folder / "good.txt").write_text("assoc-problem 1\nsizes 1\ndummies yes\ntuples 1\n0 1\n")
     words = case.words.replace("{folder}", str(folder)).replace("{}", str(path)).split()
-    with open(case.stdin, "rb") as stdin:
+    with open(folder / case.stdin, "rb") as stdin:
         command = [sys.executable, "-c", _LIMITED, "-c", _RUN, *words]
         done = subprocess.run(command, stdin=stdin, capture_output=True, text=True, timeout=300)
     *said, peak = done.stderr.strip().splitlines()

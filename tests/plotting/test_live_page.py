@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import http.client
 import io
+import socket
 import threading
 import time
+from socketserver import TCPServer
 
 import numpy as np
 import pytest
 
 from assoc._cli.track.plot_lines import replayed
 from assoc.errors import InvalidInputError
-from assoc.plotting.live import LivePage
+from assoc.plotting.live import LivePage, server
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
 from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot
@@ -124,5 +127,43 @@ def test_only_this_machine_is_served(scene):
             connection.close()
         with pytest.raises(InvalidInputError, match=f"--page: port {port} cannot be used"):
             LivePage(scene, port)
+    finally:
+        page.close()
+
+
+def test_connections_are_few_and_idle_ones_end(scene, monkeypatch):
+    monkeypatch.setattr(server._Handler, "timeout", 2.0)
+    monkeypatch.setattr(server, "_MOST", 8)
+    page = LivePage(scene)
+    port = int(page.address.rsplit(":", 1)[1].strip("/"))
+    try:
+        begin = time.monotonic()
+        all_of_them = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(12)]
+        # who comes too late is sent away at once, the others when they have said nothing for so long
+        assert [one.recv(1) for one in all_of_them[8:]] == [b""] * 4 and time.monotonic() - begin < 1.9
+        assert [one.recv(1) for one in all_of_them[:8]] == [b""] * 8 and time.monotonic() - begin > 1.9
+        for one in all_of_them:
+            one.close()
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+        connection.request("GET", "/")
+        assert connection.getresponse().status == 200
+        connection.close()
+    finally:
+        page.close()
+
+
+def test_no_spinning_where_no_connection_is_to_be_had(scene, monkeypatch):
+    asked = []
+
+    def accept(self):
+        asked.append(time.monotonic())
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(TCPServer, "get_request", accept)
+    page = LivePage(scene)
+    try:
+        with socket.create_connection(("127.0.0.1", int(page.address.rsplit(":", 1)[1].strip("/")))):
+            time.sleep(1.0)
+        assert 0 < len(asked) < 10
     finally:
         page.close()

@@ -10,14 +10,17 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from assoc import track
+from assoc._cli.track import plot_lines
 from assoc._cli.track.options import make_tracker
-from assoc._cli.track.plot_lines import parse_line, replayed
+from assoc._cli.track.plot_lines import LONGEST, Lines, parse_line, replayed
 from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
@@ -128,6 +131,70 @@ def test_datagrams_on_loopback_until_a_signal(scene_file):
     assert program.returncode == 130
     assert "p99" in told and "interrupted" in told and "Traceback" not in told
     assert rest == "" or rest.endswith("\n")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux what it dropped")
+@pytest.mark.parametrize("slow", ["system", "tracker"])
+def test_datagrams_that_are_lost_are_counted(slow, monkeypatch):
+    """Where nobody takes them out of the socket, and where nobody takes them from who does."""
+    begin, receive = threading.Event(), Lines._receive
+    if slow == "system":
+        monkeypatch.setattr(Lines, "_receive", lambda *all: begin.wait(60) and receive(*all))
+    monkeypatch.setattr(plot_lines, "_WAITING", 20_000)
+    lines = Lines(0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for _ in range(5000):
+            out.sendto(b"1,2.5,1000,0.5,0.1\n", ("127.0.0.1", lines.port))
+        begin.set()
+        time.sleep(0.5)
+        taken = iter(lines)
+        got = [next(taken)]
+        time.sleep(0.5)
+        out.sendto(b"2,2.5,1000,0.5,0.1\nend", ("127.0.0.1", lines.port))
+        got += taken
+    assert len(got) + lines.lost == 5001 and lines.lost > 1000 and len(got) > 20
+
+
+def test_long_lines_are_cut_while_they_are_read():
+    """A line of any length takes no more memory than the longest that there may be, and what follows it is read."""
+    read = []
+
+    class Stream(io.BytesIO):
+        def readline(self, most=-1):
+            read.append(most)
+            return super().readline(most)
+
+    lines = object.__new__(Lines)
+    lines._waiting = plot_lines._Waiting(0)
+    lines._take_lines(Stream(b"a\n" + b"b" * 10**6 + b"\n" + b"c" * LONGEST + b"\nd"))
+    assert [len(one) for one in lines._waiting.queue] == [2, LONGEST + 1, LONGEST + 1, 1]
+    assert set(read) == {LONGEST + 1}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs signals of POSIX")
+def test_a_signal_twice_ends_with_its_own_code(scene_file):
+    """At any moment, also while kernels are compiled or loaded."""
+    for wait in (2.0, 2.4, 2.8, 4.0):
+        program = subprocess.Popen(words(scene_file, "--udp", 0), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        time.sleep(wait)
+        for _ in range(2):
+            program.send_signal(signal.SIGTERM)
+            time.sleep(0.05)
+        told = program.communicate(timeout=60)[1]
+        assert program.returncode == 143 and b"Traceback" not in told and b"terminated" in told, (wait, told)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs signals of POSIX")
+def test_an_interrupt_inside_exec_leaves_the_code():
+    code = (
+        "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])\n"
+        "from assoc._cli.program import Interruption, run_program\n"
+        "found = Interruption('x'); found.code, found.word = 143, 'terminated'\n"
+        "raise SystemExit(run_program(lambda: exec('raise KeyboardInterrupt'), 'x', found))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (143, "x: terminated\n")
 
 
 def test_verbose_and_an_output_that_is_full(scene_file, tmp_path, capsys):

@@ -88,12 +88,21 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
     with _named(target, stream):
         writer = TrackWriter(stream, tracker.positions)
 
+    lost = 0
+
+    def tell_lost() -> None:
+        nonlocal lost
+        before, lost = lost, 0 if lines is None else lines.lost
+        if lost and not before:
+            tell("datagrams are lost: they come quicker than tracks can be made")
+
     def show(pictures: list[Any]) -> None:
         for picture in pictures:
             with _named(target, stream):
                 writer.write(picture)
             if page is not None:
                 page.show(picture)
+            tell_lost()
 
     def end() -> None:
         show(tracker.finish())
@@ -102,7 +111,7 @@ def track_live(file: str, parsed: dict[str, Any], settings: dict[str, Any], inte
         if kept:
             stream.close()
         if lines is not None and lines.lost:
-            tell(f"{lines.lost} lines lost: they came quicker than tracks can be made")
+            tell(f"{lines.lost} datagrams lost: they came quicker than tracks can be made")
         say(tracker.summary())
 
     ignored = parsed["identity"] == "ignore"

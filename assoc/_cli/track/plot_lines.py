@@ -23,8 +23,10 @@ ADDRESSES = 2**24
 """ICAO addresses that there are."""
 LONGEST = 10_000
 """Characters of a line at the most."""
-# lines that may wait: stdin is not read on while they do, datagrams are lost and counted
-_WAITING = 100_000
+# bytes that may wait: stdin is not read on while they do, datagrams are lost and counted
+_WAITING = 64_000_000
+# of Linux, and where among its numbers the datagrams are for which a socket had no room
+_SO_MEMINFO, _DROPS = 55, 8
 _DATAGRAM = 65_535
 _POLL = 0.2
 
@@ -128,6 +130,26 @@ def _from_json(text: str, scene: Scene) -> Plot:
         raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None
 
 
+class _Waiting(queue.Queue[bytes | None]):
+    """A queue whose size is the memory that it takes."""
+
+    def _init(self, maxsize: int) -> None:
+        super()._init(maxsize)
+        self._bytes = 0
+
+    def _qsize(self) -> int:
+        return self._bytes
+
+    def _put(self, item: bytes | None) -> None:
+        super()._put(item)
+        self._bytes += sys.getsizeof(item)
+
+    def _get(self) -> bytes | None:
+        item: bytes | None = super()._get()
+        self._bytes -= sys.getsizeof(item)
+        return item
+
+
 class Lines:
     """Lines that a thread reads, so that a signal can end the wait for them.
 
@@ -138,12 +160,13 @@ class Lines:
     """
 
     def __init__(self, port: int | None) -> None:
-        self.lost = 0
-        self._lines: queue.Queue[str | None] = queue.Queue(_WAITING)
+        self._dropped = 0
+        self._waiting = _Waiting(_WAITING)
         self._socket = None
         if port is not None:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             try:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING)
                 self._socket.bind(("127.0.0.1", port))
             except (OSError, OverflowError) as error:
                 self._socket.close()
@@ -155,35 +178,52 @@ class Lines:
         """The UDP port."""
         return None if self._socket is None else int(self._socket.getsockname()[1])
 
+    @property
+    def lost(self) -> int:
+        """Datagrams that came quicker than they were taken, here or, as far as Linux says it, in the system."""
+        if self._socket is None or not sys.platform.startswith("linux"):
+            return self._dropped
+        numbers = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
+        return self._dropped + int.from_bytes(numbers[4 * _DROPS :], sys.byteorder)
+
     def _read(self) -> None:
         try:
             if self._socket is None:
-                for raw in sys.stdin.buffer:
-                    self._lines.put(raw[: 2 * LONGEST].decode("utf-8", "replace"))
+                self._take_lines(sys.stdin.buffer)
             else:
                 self._receive(self._socket)
         finally:
-            self._lines.put(None)
+            self._waiting.put(None)
+
+    def _take_lines(self, stream: IO[bytes]) -> None:
+        """Lines of a stream; for one that is too long a line that says no more than that."""
+        while line := stream.readline(LONGEST + 1):
+            whole = len(line) <= LONGEST or line.endswith(b"\n")
+            self._waiting.put(line if whole else b"x" * (LONGEST + 1))
+            while len(line) > LONGEST and not line.endswith(b"\n"):
+                line = stream.readline(LONGEST + 1)
 
     def _receive(self, port: socket.socket) -> None:
+        """Datagrams, split by who takes them: the less is done here, the fewer are lost."""
         while True:
-            for line in port.recv(_DATAGRAM).decode("utf-8", "replace").splitlines():
-                if line.strip() == "end":
-                    return
-                try:
-                    self._lines.put_nowait(line)
-                except queue.Full:
-                    self.lost += 1
+            datagram = port.recv(_DATAGRAM)
+            try:
+                self._waiting.put_nowait(datagram)
+            except queue.Full:
+                self._dropped += 1
 
     def __iter__(self) -> Iterator[str]:
         while True:
             try:
-                line = self._lines.get(timeout=_POLL)
+                content = self._waiting.get(timeout=_POLL)
             except queue.Empty:
                 continue
-            if line is None:
+            if content is None:
                 return
-            yield line
+            for line in content.decode("utf-8", "replace").splitlines():
+                if self._socket is not None and line.strip() == "end":
+                    return
+                yield line
 
 
 def replayed(scene: Scene, speed: float) -> Iterator[Plot]:

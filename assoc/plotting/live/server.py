@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import queue
 import threading
+import time
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -32,6 +33,8 @@ _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 
 # pictures that may wait for a browser that is too slow; then it misses some
 _WAITING = 50
 _BEAT = 10.0
+# connections at once, the seconds that one may be silent, and a pause where there are none to be had
+_MOST, _IDLE, _PAUSE = 32, 15.0, 0.2
 # digits: centimetres
 _DIGITS = 2
 
@@ -72,10 +75,9 @@ class LivePage:
             owner = page
 
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+            self._server = _Server(("127.0.0.1", port), Handler)
         except (OSError, OverflowError) as error:
             raise InvalidInputError(f"--page: port {port} cannot be used ({error})") from None
-        self._server.daemon_threads = True
         threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
 
     @property
@@ -143,9 +145,40 @@ def _event(name: str, content: Any) -> str:
     return f"event: {name}\ndata: {json.dumps(content)}\n\n"
 
 
+class _Server(ThreadingHTTPServer):
+    """Answers so many at once; who comes then is sent away, until another is done or says nothing any more."""
+
+    daemon_threads = True
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._free = threading.BoundedSemaphore(_MOST)
+
+    def get_request(self) -> tuple[Any, Any]:
+        try:
+            return super().get_request()
+        except OSError:
+            # the system has no more connections to give, and says so again at once
+            time.sleep(_PAUSE)
+            raise
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        return self._free.acquire(blocking=False)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing: a browser has gone, and the terminal is the tracker's."""
+
+
 class _Handler(BaseHTTPRequestHandler):
     owner: ClassVar[LivePage]
     protocol_version = "HTTP/1.1"
+    timeout = _IDLE
 
     def do_GET(self) -> None:
         """Answer with the page, one of its files, or the events."""
