@@ -3,7 +3,10 @@
 The public names below are loaded on first use, so that ``import assoc`` stays quick.
 """
 
-from __future__ import annotations
+# first of all: it decides where all others are looked for
+from assoc._system import current_folder as _current_folder  # noqa: F401
+
+# isort: split
 
 from typing import TYPE_CHECKING
 

@@ -22,9 +22,9 @@ def import_modules(names: str | None) -> None:
     if names is None:
         return
     folder = os.getcwd()
-    # python -m puts it there, an installed command does not; worker processes get the same path
+    # behind all others: no other import finds what lies here; worker processes get the same path
     if folder not in sys.path and "" not in sys.path:
-        sys.path.insert(0, folder)
+        sys.path.append(folder)
     for name in names.split(","):
         if name.endswith(".py") or os.sep in name:
             raise InvalidInputError(f"--import: expected the name of a module (mine, not mine.py), got {name!r}")

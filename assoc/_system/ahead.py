@@ -6,12 +6,11 @@ On two cores the first hard problem after an installation then waits half as lon
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 from assoc._system import compile_time, interpreted
+from assoc._system.beside import call_beside
 from assoc._system.compiled import is_kept
 
 _under_way: list[subprocess.Popen[bytes]] = []
@@ -40,11 +39,8 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
     if is_kept(kernel):
         _kept.add(kernel)
         return False
-    words = [sys.executable, "-m", __name__, prepare.__module__, prepare.__qualname__]
-    quiet = subprocess.DEVNULL
     try:
-        # Ctrl-C is for the program, with which this process ends
-        _under_way.append(subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True))
+        _under_way.append(call_beside(prepare.__module__, prepare.__qualname__))
     except OSError:
         # no process to be had: this one compiles
         return False
@@ -56,17 +52,3 @@ def wait_for_kernels() -> None:
     while _under_way:
         with compile_time.loading():
             _under_way.pop().wait()
-
-
-def _work(module: str, name: str) -> None:
-    import os
-
-    from assoc._system.processes import end_with_parent
-
-    end_with_parent(os.getppid())
-    with interpreted.compiled_only():
-        getattr(import_module(module), name)()
-
-
-if __name__ == "__main__":
-    _work(*sys.argv[1:])

@@ -23,9 +23,9 @@ import numpy as np
 from numba.core import caching, event, types
 
 from assoc._system import compile_time, shipped, temporary
+from assoc._system.in_time import end_if_abandoned, uninterrupted
 from assoc._system.inner_library import InnerCompiler
 from assoc._system.interpreted import SMALL, SMALL_SEARCH, NotCompiled, first_small, thread
-from assoc._system.interrupts import signals_held
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -88,18 +88,16 @@ class _KernelCache(_FUNCTION_CACHE):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load compiled code, own or shipped; what cannot be read (cut by a crash) is compiled again, and replaced."""
-        # LLVM asks Python for the code: if Ctrl-C came in its place, the kernel would be empty, and its call a crash
-        with signals_held():
-            try:
-                found = super().load_overload(sig, target_context)
-            except Exception:
-                # an index that cannot be read cannot be added to either
-                with contextlib.suppress(OSError):
-                    self.flush()
-                found = None
-            if found is None:
-                with contextlib.suppress(Exception):
-                    found = shipped.load(self, sig, target_context)
+        try:
+            found = super().load_overload(sig, target_context)
+        except Exception:
+            # an index that cannot be read cannot be added to either
+            with contextlib.suppress(OSError):
+                self.flush()
+            found = None
+        if found is None:
+            with contextlib.suppress(Exception):
+                found = shipped.load(self, sig, target_context)
         if found is None and thread.may_interpret:
             raise NotCompiled
         return found
@@ -124,6 +122,37 @@ def _called_with_common_types(kernel: Any) -> Callable[..., Any]:
         return call_template(tuple(map(_common, args)), {name: _common(kind) for name, kind in dict(kws).items()})
 
     return template
+
+
+class _Passes(event.Listener):
+    """Between two passes of the compiler nothing is half done: what nobody waits for ends there."""
+
+    def on_start(self, event: Any) -> None:
+        end_if_abandoned()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def _uninterrupted(compiled: Callable[..., Any]) -> Callable[..., Any]:
+    """Let no signal's handler raise while kernels are compiled or loaded: LLVM calls Python where that is a crash."""
+
+    def aside(may_interpret: bool, arguments: tuple[Any, ...]) -> Any:
+        thread.may_interpret = may_interpret
+        try:
+            with event.install_listener("numba:run_pass", _Passes()):
+                return compiled(*arguments)
+        except NotCompiled:
+            return None
+        finally:
+            thread.may_interpret = False
+
+    def wait(*arguments: Any) -> Any:
+        may_interpret = thread.may_interpret
+        with compile_time.loading():
+            return uninterrupted(lambda: aside(may_interpret, arguments))
+
+    return wait
 
 
 def njit(
@@ -151,6 +180,7 @@ def njit(
 
         return silent
     kernel: Any = numba.njit(**_OPTIONS)(function)
+    kernel._compile_for_args = _uninterrupted(kernel._compile_for_args)
     if not literal:
         kernel.get_call_template = _called_with_common_types(kernel)
     # nowhere to keep it, not even for a while: each process compiles for itself

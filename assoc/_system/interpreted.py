@@ -11,14 +11,8 @@ that has been interpreted for longer than compiling would have taken. Results ar
 
 from __future__ import annotations
 
-import base64
 import contextlib
-import functools
-import importlib
 import os
-import pickle
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -26,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from assoc._system.beside import beside, has_room
+
 # elements of a call's arrays, all together, up to which it may be interpreted; and of kernels that search a tree,
 # whose work grows faster than their arrays
 SMALL, SMALL_SEARCH = 6000, 4800
 # processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
 PATIENCE = 6.0
-# how far the process that compiles beside stands back
-_NICE = 10
 # seconds between two looks whether the kernel has come into the cache
 _LOOK = 0.5
 
@@ -94,7 +88,8 @@ def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) ->
         For ``kernel._compile_for_args``; it returns what is then called with the same arguments.
     """
     compiled = kernel._compile_for_args
-    function = stand_in or kernel.py_func
+    function_of = kernel.py_func
+    function = stand_in or function_of
     spent = 0.0
     looked = -_LOOK
 
@@ -120,13 +115,14 @@ def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) ->
             return interpreted
         thread.may_interpret = True
         try:
-            return compiled(*arguments)
-        except NotCompiled:
-            looked = time.monotonic()
-            _compile_beside(kernel.py_func, tuple(map(kernel.typeof_pyval, arguments)))
-            return interpreted
+            found = compiled(*arguments)
         finally:
             thread.may_interpret = False
+        if found is None:
+            looked = time.monotonic()
+            beside.ask(function_of.__module__, function_of.__qualname__, tuple(map(kernel.typeof_pyval, arguments)))
+            return interpreted
+        return found
 
     return choose if _switched_on else compiled
 
@@ -137,80 +133,6 @@ def _elements(value: Any) -> int:
     return sum(map(_elements, value)) if isinstance(value, tuple) else 0
 
 
-class _Beside:
-    """The process that compiles; it ends with this one, after the kernel that it is at."""
-
-    def __init__(self) -> None:
-        self._asked: set[Any] = set()
-        self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._owner = 0
-
-    def ask(self, module: str, name: str, kinds: Any) -> None:
-        with self._lock:
-            if self._owner != os.getpid():
-                # a forked process has a copy of its parent's
-                self._asked, self._process, self._owner = set(), None, os.getpid()
-            if (module, name, kinds) in self._asked:
-                return
-            self._asked.add((module, name, kinds))
-            line = base64.b64encode(pickle.dumps((module, name, kinds))) + b"\n"
-            try:
-                if self._process is None:
-                    self._process = _start()
-                assert self._process.stdin is not None
-                self._process.stdin.write(line)
-                self._process.stdin.flush()
-            except (OSError, ValueError):
-                # no process to be had, or it has died: this one compiles, once its patience is over
-                self._process = None
-
-
-def _start() -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-m", __name__],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "ASSOC_INTERPRET": "0"},
-        # Ctrl-C is for the program, which then closes the pipe; in a session of its own the process would get an equal
-        # share of the cores, whatever its nice value (sched(7), autogroups)
-        process_group=0,
-    )
-
-
-_beside = _Beside()
-
-
-@functools.cache
-def _has_room() -> bool:
-    """Whether there is a core for another process."""
-    return (os.cpu_count() or 1) > 1
-
-
 def may_use_processes() -> bool:
     """Whether another process may compile for this thread."""
-    return _switched_on and not thread.never and _has_room()
-
-
-def _compile_beside(function: Any, kinds: Any) -> None:
-    if _has_room():
-        _beside.ask(function.__module__, function.__qualname__, kinds)
-
-
-def _serve() -> None:
-    """Compile what the lines of standard input ask for, as long as the process that asks is there."""
-    if hasattr(os, "nice"):
-        # nobody waits for this process, so that it leaves the cores to those that somebody waits for
-        os.nice(_NICE)
-    parent = os.getppid()
-    for line in sys.stdin.buffer:
-        if os.getppid() != parent:
-            return
-        module, name, kinds = pickle.loads(base64.b64decode(line))
-        kernel = getattr(importlib.import_module(module), name)
-        kernel.compile(kinds)
-
-
-if __name__ == "__main__":
-    _serve()
+    return _switched_on and not thread.never and has_room()

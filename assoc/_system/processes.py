@@ -6,6 +6,8 @@ import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -16,6 +18,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from assoc._system import memory, temporary
+from assoc._system.current_folder import path_without
 from assoc.errors import InvalidInputError, LimitExceededError
 
 # bytes of a process with numpy, scipy and compiled kernels, and a small task
@@ -66,11 +69,12 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     path = _written(task)
-    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path, os.getpid()))
+    with safe_path():
+        executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path, os.getpid()))
     # all at once at the start: the executor loses count when one dies while it starts another on demand
     executor._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]
     try:
-        with signals_as_they_are():
+        with signals_as_they_are(), safe_path():
             waiting = _submit(executor, items)
         for future in waiting:
             yield future.result()
@@ -132,6 +136,49 @@ def _written(task: object) -> str:
     return path
 
 
+def start_python(module: str, *words: str, **options: Any) -> subprocess.Popen[bytes]:
+    """Start a process that calls ``serve(*words)`` of a module, and finds modules where this process does.
+
+    It reads what is written to its stdin, says nothing, and never looks into the current folder.
+    """
+    code = f"import sys; sys.path[:] = {path_without()!r}; from {module} import serve; serve(*sys.argv[1:])"
+    quiet = subprocess.DEVNULL
+    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": quiet, "stderr": quiet}
+    return subprocess.Popen([sys.executable, "-c", code, *words], **streams, **options)
+
+
+# any text means yes; this one, that it is not the user's
+_SAFE_PATH, _OWN = "PYTHONSAFEPATH", "assoc"
+_lock = threading.Lock()
+_starting = 0
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Let Python processes that are started within not look into the current folder.
+
+    Libraries that start them hand them the ``sys.path`` of this process later, but import modules before that.
+    """
+    global _starting
+    with _lock:
+        if not os.environ.get(_SAFE_PATH):
+            os.environ[_SAFE_PATH] = _OWN
+        _starting += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _starting -= 1
+            if not _starting:
+                forget_safe_path()
+
+
+def forget_safe_path() -> None:
+    """Let what a user's own code starts look where it always does."""
+    if os.environ.get(_SAFE_PATH) == _OWN:
+        del os.environ[_SAFE_PATH]
+
+
 @contextmanager
 def signals_as_they_are() -> Iterator[None]:
     """Keep blocked what is blocked: starting processes lets Ctrl-C and its kin through afterwards."""
@@ -171,6 +218,7 @@ def end_with_parent(parent: int, *paths: str) -> None:
 
 def _start(path: str, parent: int) -> None:
     global _task, _problem
+    forget_safe_path()
     # Ctrl-C reaches the whole group: only the parent reports it
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 import assoc
-from assoc._system import interpreted
+from assoc._system import beside
+from assoc._system.processes import start_python
 from assoc.simulation import simulate
 from tests.sizes import sample
 
@@ -21,7 +22,7 @@ from assoc._system import interpreted
 from assoc.packing.neighbourhoods.cover import chosen_columns
 
 asked = []
-interpreted._compile_beside = lambda function, kinds: asked.append(function.__name__)
+interpreted.beside.ask = lambda module, name, kinds: asked.append(name)
 
 
 def call(rows):
@@ -124,7 +125,7 @@ def doubtful_calls(function: ast.FunctionDef) -> list[str]:
 @pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no priorities on this system")
 def test_the_process_beside_leaves_the_cores_to_the_program():
     """In a session of its own it would get an equal share, whatever its nice value (sched(7), autogroups)."""
-    process = interpreted._start()
+    process = start_python(beside.__name__, process_group=0)
     try:
         assert os.getsid(process.pid) == os.getsid(0)
         # Ctrl-C is for the group of the program

@@ -14,7 +14,14 @@ from pathlib import Path
 
 from assoc._files.reading import open_regular
 from assoc._system import temporary
-from assoc._system.processes import end_with_parent, not_sent, require_processes, signals_as_they_are
+from assoc._system.processes import (
+    end_with_parent,
+    forget_safe_path,
+    not_sent,
+    require_processes,
+    safe_path,
+    signals_as_they_are,
+)
 from assoc.errors import InvalidInputError
 from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
@@ -42,7 +49,8 @@ def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path)
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
-    with _shared(job, folder) as (path, digest):
+    # joblib starts a process anew where one was idle for long
+    with _shared(job, folder) as (path, digest), safe_path():
         require_processes(jobs)
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
@@ -108,6 +116,7 @@ def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
     """Do a batch in a worker process, of the job in the file ``path``, which the process reads once."""
     global _job
     if _job is None or _job[0] != path:
+        forget_safe_path()
         end_with_parent(parent, path)
         with open_regular(path) as file:
             content = file.read()

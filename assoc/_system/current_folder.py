@@ -1,0 +1,32 @@
+"""Programs, and the processes that are started, import nothing from the current folder: data of others may lie there.
+
+`python -m` puts it before all other folders. So this module is the package's first import, and imports nothing that
+Python has not loaded by then.
+"""
+
+import os
+import sys
+
+_HOME = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+
+def path_without() -> list[str]:
+    """Return where modules are looked for, without the current folder unless this package lies there."""
+    return [folder for folder in sys.path if _is(folder, _HOME) or not _is(folder, ".")]
+
+
+def _is(folder: str, other: str) -> bool:
+    folder = folder or "."
+    return os.path.isdir(folder) and os.path.samefile(folder, other)
+
+
+def _is_program() -> bool:
+    """Whether this process runs `python -m assoc...` or the command `assoc`."""
+    words = getattr(sys, "argv", None) or [""]
+    if words[0] == "-m":
+        return sys.orig_argv[-len(words)].removeprefix("-m").partition(".")[0] == "assoc"
+    return os.path.basename(words[0]).removesuffix(".exe") == "assoc"
+
+
+if _is_program():
+    sys.path[:] = path_without()
