@@ -186,6 +186,9 @@ def _of_scene(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
     with _EARLY_END.work(_LAST_SCAN):
         table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
+    bar.close()
+    if not bar.done:
+        _EARLY_END.say("")
     if parsed["smooth"]:
         table = smoothed(tracker, scene, decisions)
     tracked = scene if bar.done == scene.num_scans else scene.part(0, bar.done)
@@ -240,10 +243,14 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     tracker = make_tracker(name, [radar_of(recording, **radar)], parsed, settings, None)
     if parsed["map"] and parsed["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    shown = with_progress(windows, len(windows), ProgressBar("tracking", "scans", shown=not parsed["quiet"]))
+    bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
+    shown = with_progress(windows, len(windows), bar)
     shown = with_scan_table(shown, tracker, lambda window: (window.times[-1], [len(window)]))
     with _EARLY_END.work(_LAST_SCAN):
         done = track_plots(tracker, recording, shown, confirmed=not parsed["all"])
+    bar.close()
+    if not bar.done:
+        _EARLY_END.say("")
     return tracker, done, len(windows)
 
 

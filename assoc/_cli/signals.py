@@ -16,13 +16,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
+from typing import Any, NoReturn
 
 from assoc._system import temporary
+from assoc._system.compile_time import is_compiling
+from assoc._system.in_time import threads_left
 from assoc._system.interrupts import ask_to_end
 
 _CLEAN_UP_SECONDS = 5.0
+# a solver that is loading or compiling a kernel for so long is not at the end of its work
+_LOADING_SECONDS = 0.2
+_AGAIN_SECONDS = 1.0
 
 
 def ending_signals() -> dict[int, str]:
@@ -39,9 +44,7 @@ def exit_on_signals(name: str) -> None:
     ending = ending_signals()
 
     def leave(number: int, frame: object = None) -> None:
-        for child in multiprocessing.active_children():
-            child.kill()
-        temporary.end_process(128 + number, f"{name}: {ending[number]}\n")
+        _leave(128 + number, f"{name}: {ending[number]}\n")
 
     # the handler is for signals that a library lets through
     _wait_for_signals(ending, handler=leave, waiter=leave)
@@ -124,9 +127,7 @@ class Interruption:
             if not (isinstance(error, KeyboardInterrupt) or self.code):
                 raise
             clean_up()
-            print(self.line(), file=sys.stderr)
-            sys.stderr.flush()
-            raise SystemExit(self.code or 128 + signal.SIGINT) from None
+            _leave_in_order(self.code or 128 + signal.SIGINT, f"{self.line()}\n")
 
 
 class EarlyEnd:
@@ -155,9 +156,7 @@ class EarlyEnd:
         words = {number: f"{self._name}: {word}\n" for number, word in ending.items()}
 
         def leave(number: int) -> None:
-            for child in multiprocessing.active_children():
-                child.kill()
-            temporary.end_process(128 + number, words[number])
+            _leave(128 + number, words[number])
 
         def end(number: int, frame: object = None) -> None:
             with self._lock:
@@ -169,9 +168,7 @@ class EarlyEnd:
                     leave(number)
                 self._signal = number
                 ask_to_end()
-            timer = threading.Timer(self._patience, self._insist)
-            timer.daemon = True
-            timer.start()
+            threading.Thread(target=self._insist, daemon=True).start()
 
         def wait(number: int) -> None:
             end(number)
@@ -181,10 +178,16 @@ class EarlyEnd:
         _wait_for_signals(ending, handler=end, waiter=wait)
 
     def _insist(self) -> None:
-        with self._lock:
-            if self._working:
-                self._insists = True
-                _thread.interrupt_main()
+        last = time.monotonic() + self._patience
+        while time.monotonic() < last and not is_compiling(_LOADING_SECONDS):
+            time.sleep(0.05)
+        while self._working:
+            with self._lock:
+                if self._working:
+                    self._insists = True
+                    _thread.interrupt_main()
+            # Python drops what is raised in a destructor
+            time.sleep(_AGAIN_SECONDS)
 
     @contextmanager
     def work(self, patience: float) -> Iterator[None]:
@@ -212,9 +215,27 @@ class EarlyEnd:
         """Leave with what is said of the signal, and of what is kept, if there was a signal."""
         if self._signal:
             line = "; ".join(filter(None, [f"{self._name}: {ending_signals()[self._signal]}", kept]))
-            print(line, file=sys.stderr, flush=True)
-            _end_at_the_latest(128 + self._signal, "")
-            raise SystemExit(128 + self._signal)
+            _leave_in_order(128 + self._signal, f"{line}\n")
+
+
+def _leave(code: int, line: str) -> NoReturn:
+    """End the process with its processes: a thread that compiles may not be waited for."""
+    for child in multiprocessing.active_children():
+        child.kill()
+    temporary.end_process(code, line)
+
+
+def _leave_in_order(code: int, line: str) -> NoReturn:
+    """End the process, but wait for no thread that is compiling."""
+    ask_to_end()
+    # who reads the output may have stopped to
+    _end_at_the_latest(code, "")
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+    if threads_left():
+        _leave(code, line)
+    print(line, end="", file=sys.stderr, flush=True)
+    raise SystemExit(code)
 
 
 def _end_at_the_latest(code: int, text: str) -> None:

@@ -7,6 +7,7 @@ import os
 import shutil
 import threading
 from contextlib import suppress
+from typing import NoReturn
 
 lock = threading.RLock()
 """Held while a temporary file is made and listed, or takes its name and leaves the list."""
@@ -34,7 +35,7 @@ def remove(path: str) -> None:
     forget(path)
 
 
-def end_process(code: int, message: str = "") -> None:
+def end_process(code: int, message: str = "") -> NoReturn:
     """End the process now: remove unfinished files, let no other thread make more, and wait for nothing else."""
     # a thread that holds the lock may hang in a file system that does not answer
     lock.acquire(timeout=2.0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assoc._system.door import door, doors
+from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.metrics.trajectories import last_at_each_instant
@@ -186,7 +187,13 @@ def track_scene(
     decisions: list[Decision] = []
     for k in range(scene.num_scans) if scans is None else scans:
         scan = scene.scan(k)
-        step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
+        try:
+            step = tracker.step(scan.time, scan.measurements, scan.times, scan.sectors)
+        except KeyboardInterrupt:
+            if end_is_asked():
+                # the tracker is as it was before this scan
+                break
+            raise
         decisions += step.final
         table.add(
             (track for track in tracker.tracks if track.reported or not confirmed), tracker.filter.motion.position

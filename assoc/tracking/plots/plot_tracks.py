@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from assoc._system.interrupts import end_is_asked
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
 from assoc.recordings import Recording, Window
@@ -70,7 +71,13 @@ def track_plots(
     altitudes: dict[int, float] = {}
     done: list[Window] = []
     for window in windows:
-        (step,) = step_windows(tracker, [window])
+        try:
+            (step,) = step_windows(tracker, [window])
+        except KeyboardInterrupt:
+            if end_is_asked():
+                # the tracker is as it was before this window
+                break
+            raise
         done.append(window)
         ids = step.assigned[0]
         takers.append(np.where(ids > 0, ids, -1))

@@ -1,0 +1,129 @@
+"""Ctrl-C at random moments while kernels are compiled: what ends how, and when.
+
+    python -m tests.reliability.signals [--count N] [--seed N]
+
+Each trial starts with an empty cache of kernels. A program must end with its own code and line, the library by
+KeyboardInterrupt, and no process that they started may be left a second later.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import NamedTuple
+
+from assoc.simulation import simulate
+
+LIBRARY = "import assoc\nfor scan in range(4):\n    assoc.assign(assoc.build_problem(assoc.load({!r}), scan), {!r})\n"
+WAYS = {
+    "solve exact": ["-m", "assoc.solve", "ghosts.npz", "--json", "o.json"],
+    "solve aco, interpreted": ["-m", "assoc.solve", "radars.npz", "--solver", "aco", "--json", "o.json"],
+    "solve, 2 processes": ["-m", "assoc.solve", "radars.npz", "--jobs", "2", "--json", "o.json"],
+    "track": ["-m", "assoc.track", "radars.npz", "-o", "t.csv"],
+    "sweep": ["-m", "assoc.sweep", "radars.npz", "--solver", "aco", "-o", "study"],
+    "library, exact": ["-c", LIBRARY.format("ghosts.npz", "exact")],
+    "library, warm_up": ["-c", "import assoc\nassoc.warm_up()"],
+}
+# a program that compiles is to end within a second, and the library after a step of the compiler; on a busy machine
+PATIENCE = 60.0
+
+
+class Trial(NamedTuple):
+    """How one ended: "as it should" or what was wrong, and the seconds from the signal to the end."""
+
+    verdict: str
+    seconds: float
+
+
+def folder_of_scenes(folder: Path) -> Path:
+    """Write the scenes that all trials use."""
+    simulate("three-radar", 2, scans=12).save(folder / "radars.npz")
+    simulate("bearing-only", 2, targets=12, scans=4).save(folder / "ghosts.npz")
+    return folder
+
+
+def trial(way: str, after: float, scenes: Path) -> Trial:
+    """Send Ctrl-C after so many seconds; "done before" if the work was done by then."""
+    library = way.startswith("library")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        for scene in scenes.glob("*.npz"):
+            os.symlink(scene, Path(name) / scene.name)
+        interpret = "1" if "interpreted" in way or "library" in way else random.choice("01")
+        environment = {**os.environ, "NUMBA_CACHE_DIR": f"{name}/kernels", "ASSOC_INTERPRET": interpret}
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        process = subprocess.Popen([sys.executable, *WAYS[way]], cwd=name, env=environment, text=True, **pipes)
+        time.sleep(after)
+        if process.poll() is not None:
+            return Trial("done before" if process.returncode == 0 else "failed before", 0.0)
+        process.send_signal(signal.SIGINT)
+        sent = time.monotonic()
+        try:
+            _, errors = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return Trial("lost", PATIENCE)
+        seconds = time.monotonic() - sent
+        time.sleep(1.0)
+        left = _end_processes_with(f"{name}/kernels")
+        if process.returncode == 0:
+            return Trial("done before" if seconds < 1.0 else "lost", seconds)
+        lines = errors.splitlines()
+        if library:
+            good = process.returncode in (-signal.SIGINT, 130) and lines[-1:] == ["KeyboardInterrupt"]
+            good = good and "Exception ignored" not in errors and errors.count("Traceback") == 1
+        else:
+            good = process.returncode == 130 and len(lines) == 1 and ": interrupted" in lines[0]
+        if not good:
+            return Trial(f"exit {process.returncode}: {' | '.join(lines[-3:])[:200]}", seconds)
+        return Trial(f"left: {left}" if left else "as it should", seconds)
+
+
+def _end_processes_with(text: str) -> list[str]:
+    """End the processes in whose environment a text is; returns their command lines."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if text.encode() in (path / "environ").read_bytes():
+                found.append(" ".join((path / "cmdline").read_text().split("\0"))[-150:])
+                os.kill(int(path.name), signal.SIGKILL)
+        except OSError:
+            continue
+    return found
+
+
+def main() -> int:
+    """Run the program; exit code 1 if one trial ended otherwise."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ways", default=";".join(WAYS))
+    parser.add_argument("--latest", type=float, default=25.0)
+    options = parser.parse_args()
+    ways = options.ways.split(";")
+    rng = random.Random(options.seed)
+    random.seed(options.seed)
+    found: dict[str, list[Trial]] = defaultdict(list)
+    with tempfile.TemporaryDirectory() as name:
+        scenes = folder_of_scenes(Path(name))
+        for number in range(options.count):
+            way = ways[number % len(ways)]
+            found[way].append(trial(way, rng.uniform(0.2, options.latest), scenes))
+            print(number, way, *found[way][-1], flush=True)
+    for way, trials in found.items():
+        late = sorted(one.seconds for one in trials if one.verdict == "as it should") or [0.0]
+        counts = dict(Counter(one.verdict for one in trials))
+        print(f"{way}: {counts}; seconds: median {late[len(late) // 2]:.2f}, longest {late[-1]:.2f}")
+    good = {"as it should", "done before"}
+    return int(any(one.verdict not in good for trials in found.values() for one in trials))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

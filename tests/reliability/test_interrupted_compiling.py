@@ -1,0 +1,54 @@
+"""Ctrl-C at random moments while kernels are compiled; `python -m tests.reliability.signals` does some hundred."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.reliability.signals import WAYS, folder_of_scenes, trial
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="finds processes through /proc")
+@pytest.mark.parametrize("way", WAYS)
+def test_it_ends_as_it_should(way, tmp_path):
+    scenes = folder_of_scenes(tmp_path)
+    for after in (random.uniform(0.5, 4.0), random.uniform(4.0, 10.0)):
+        found = trial(way, after, scenes)
+        assert found.verdict in ("as it should", "done before"), (after, found)
+        # on a busy machine; usually it is less than one
+        assert found.seconds < 10.0, (after, found)
+
+
+COMPILING = """
+import atexit, os, signal, threading
+from assoc._system.in_time import end_if_abandoned, uninterrupted
+
+steps = []
+
+
+def work():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(2):
+        threading.Event().wait(0.5)
+        steps.append(threading.current_thread() is threading.main_thread())
+    end_if_abandoned()
+    steps.append("not ended")
+
+
+atexit.register(lambda: print(steps))
+try:
+    uninterrupted(work)
+except KeyboardInterrupt:
+    print(steps)
+assert uninterrupted(lambda: 3) == 3
+"""
+
+
+def test_a_signal_is_heard_at_once_and_work_ends_between_two_steps():
+    done = subprocess.run([sys.executable, "-c", COMPILING], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n[False, False]\n", "")
