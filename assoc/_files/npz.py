@@ -22,8 +22,10 @@ SIZE_LIMIT = 4 * 1024**3
 """The most bytes that the arrays of one npz file may hold together."""
 
 _HEADER_LIMIT = 10_000
-# in memory
-_OF_FORMAT, _OF_ARRAYS = 10_000, 64_000_000
+FLOOR = 64_000_000
+"""Bytes that the arrays of any file may take: they are not of many small objects, as what text becomes."""
+
+_OF_FORMAT = 10_000
 
 _KINDS = {"float": "fiu", "int": "iu", "str": "U", "bool": "b"}
 _TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_, "bool": np.bool_}
@@ -67,7 +69,7 @@ def save_npz(
                 for name, value in {**header, **content}.items():
                     with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                         np.lib.format.write_array(member, value, allow_pickle=False)
-            if not expands(sum(8 * value.size + value.nbytes for value in content.values()), file.tell(), _OF_ARRAYS):
+            if not expands(sum(8 * value.size + value.nbytes for value in content.values()), file.tell(), FLOOR):
                 return
 
     write_atomically(path, write)
@@ -201,7 +203,7 @@ def _member(
         memory = math.prod(shape) * max(dtype.itemsize, np.dtype(_TARGETS[spec.kind]).itemsize)
         if memory > (_OF_FORMAT if taken is None else SIZE_LIMIT - taken):
             raise InvalidInputError(f"{file}: the field {name!r} takes {memory} bytes, more than the limit")
-        check_unpacked(file, memory + (taken or 0), file.stat().st_size, _OF_ARRAYS)
+        check_unpacked(file, memory + (taken or 0), file.stat().st_size, FLOOR)
         data = stream.read(size)
         if len(data) != size:
             raise InvalidInputError(f"{file}: the field {name!r} ends after {len(data)} of {size} bytes")

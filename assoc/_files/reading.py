@@ -1,8 +1,7 @@
 """Files that are read: opened without trust, unpacked on the way, and counted while they are.
 
-A packed file may hold `FLOOR` bytes, or `EXPANSION` times its own size; what holds more is made to fill the memory, or
-can be unpacked by its owner first. This is the only place where inputs are opened (but for `assoc.check`, which needs
-nothing of the package).
+A packed file may hold `FLOOR` bytes, or `EXPANSION` times its own size; text that holds more can be unpacked by hand.
+`assoc.check`, which needs nothing of the package, has a limit of its own.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from assoc.errors import InvalidInputError
 FilePath = str | os.PathLike[str]
 
 FLOOR = 16_000_000
-EXPANSION = 50
+EXPANSION = 30
 MOST_BYTES = 2_000_000_000
 """The most that any file may hold, packed or not, if its reader allows no less."""
 LONGEST_LINE = 10_000
@@ -71,8 +70,7 @@ def check_unpacked(path: FilePath, size: float, packed: int, floor: int = FLOOR)
     """Refuse a file of ``packed`` bytes that takes ``size`` bytes of memory, if it may not; see `expands`."""
     if expands(size, packed, floor):
         raise InvalidInputError(
-            f"{path}: would unpack from {packed} bytes to {size:.0f} or more, expected at most {EXPANSION} times as "
-            "many; if you trust it, unpack it first"
+            f"{path}: would unpack from {packed} bytes to {size:.0f} or more, expected at most {EXPANSION} times that"
         )
 
 

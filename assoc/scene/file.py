@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from assoc._files.npz import Field, load_npz, save_npz
+from assoc._files.npz import FLOOR, Field, load_npz, save_npz
+from assoc._files.reading import check_unpacked
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.metadata import METADATA_FIELDS, metadata_arrays, metadata_parts
@@ -16,6 +17,8 @@ from assoc.sensors import KINDS
 
 FORMAT = "assoc.scene"
 VERSION = 2
+# bytes, a quarter of what it takes: what is in it is counted, too
+_OF_A_SCAN = 120
 # what only files of version 2 have; a scene without them is written as version 1, byte for byte as before
 _OWN_TIMES = ("measurement_times", "sectors")
 
@@ -52,6 +55,8 @@ def save_parts(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
 def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read what `save_parts` wrote, as arguments of `assoc.scene.Scene` and `assoc.scene.Truth`."""
     arrays = load_npz(path, FORMAT, VERSION, _FIELDS)
+    # each scan of each sensor becomes an array of its own, also where it is empty
+    check_unpacked(path, _OF_A_SCAN * arrays["measurement_offsets"].size, os.path.getsize(path), FLOOR)
     try:
         return _from_arrays(arrays)
     except InvalidInputError as error:

@@ -104,7 +104,7 @@ def _problem(count: int, **more: Any) -> dict[str, Any]:
 def _scene(scans: int) -> dict[str, Any]:
     one = {"sensor_position": np.zeros((1, 3)), "sensor_dim": np.array([2]), "sensor_kind": np.array(["radar2d"])}
     one |= {"sensor_name": np.array(["a"]), "sensor_covariance": np.eye(2).ravel()}
-    one |= {"sensor_field_of_view": np.array([[0.0, 1e5], [-4.0, 4.0]])}
+    one |= {"sensor_field_of_view": np.array([[0.0, 1e5], [-3.0, 3.0]])}
     one |= {"sensor_detection_probability": np.array([0.9]), "sensor_false_alarm_rate": np.array([1.0])}
     offsets = ((1, scans + 1), "|u1")
     return {**one, "times": np.arange(scans), "measurement_values": np.zeros(0), "measurement_offsets": offsets}
@@ -124,12 +124,37 @@ def _study(log: bytes | None, manifest: bytes | None = None) -> Callable[[Path],
     return make
 
 
+def _counted(head: bytes, again: bytes, size: int) -> Callable[[Path], object]:
+    """A problem that is right, of so many bytes."""
+    count = size // len(again)
+    return lambda path: path.write_bytes(lzma.compress(head.replace(b"N", b"%d" % count) + again * count))
+
+
+def _different(path: Path) -> None:
+    """Tuples that are all different, in as few bytes as may be."""
+    lines = b"".join(b"0 %d %d %d\n" % (i, j, k) for i in range(1, 71) for j in range(1, 71) for k in range(1, 71))
+    head = b"assoc-problem 1\nsizes 70 70 70\ndummies no\ntuples %d\n" % 70**3
+    path.write_bytes(lzma.compress(head + lines))
+
+
+def _padded(path: Path) -> None:
+    """Equal rows beside three megabytes that cannot be packed, so that many are allowed."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    rows = 2_200_000
+    numbers, names = pa.array(np.zeros(rows)), pa.array(np.full(rows, "a"))
+    noise = pa.array([np.random.default_rng(0).bytes(3_000_000), *[b""] * (rows - 1)])
+    table = {"time": numbers, "id": names, "lat": numbers, "lon": numbers, "altitude": numbers, "noise": noise}
+    parquet.write_table(pa.table(table), path)
+
+
 def _asterix(path: Path) -> None:
     """Service messages of the least size: a north crossing of a few bytes, in many blocks."""
     record = bytes([0b11110000, 1, 2, 1, 0, 0, 1, 5])
     content = record * 8000
     block = bytes([34]) + (3 + len(content)).to_bytes(2, "big") + content
-    path.write_bytes(block * 60)
+    path.write_bytes(block * 4)
 
 
 def _scene_file(path: Path) -> None:
@@ -160,6 +185,28 @@ HOSTILE = [
     Hostile("flights.parquet", lambda path: _parquet(path, "a", 40_000_000), FLIGHTS),
     Hostile("long-names.parquet", lambda path: _parquet(path, "a" * 1_000_000, 5_000), FLIGHTS),
     Hostile("groups.parquet", lambda path: _parquet(path, "a", 20_000_000, 200), FLIGHTS),
+    # just within what is allowed
+    Hostile(
+        "within.txt.xz",
+        _counted(b"assoc-problem 1\nsizes 1\ndummies no\ntuples N\n", b"0 1\n", 15_900_000),
+        SOLVE,
+        code=0,
+    ),
+    Hostile("different.txt.xz", _different, CHECK),
+    Hostile(
+        "within.json.xz",
+        _counted(b'{"format": N, "trees": [', b"1e999,", 3_900_000),
+        "assoc.check {folder}/good.txt {}",
+    ),
+    Hostile("within.csv.xz", _counted(REPORTS, b",,,,\n", 15_900_000), FLIGHTS),
+    Hostile("within-named.csv.xz", _counted(REPORTS, b"0,a,1,2,3\n", 15_900_000), FLIGHTS, code=0),
+    Hostile("within.parquet", _padded, FLIGHTS, code=0),
+    Hostile(
+        "within.npz",
+        _npz("assoc.problem", _problem(2_500_000, tuples=np.ones((2_500_000, 2), np.uint8))),
+        SOLVE,
+        code=0,
+    ),
     Hostile("wide.npz", _npz("assoc.problem", _problem(40_000_000)), SOLVE),
     Hostile("format.npz", _npz("", {"format": ((), "<U500000000")}), SOLVE),
     Hostile("lzma.npz", _npz("assoc.problem", _problem(10), zipfile.ZIP_LZMA), SOLVE),

@@ -7,12 +7,15 @@ from pathlib import Path
 import pytest
 
 from tests.files.hostile import HOSTILE, MOST, Hostile, run
-from tests.sizes import sample
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the peak of memory")
 
 
-@sample("case", HOSTILE, every=7)
+FEW = ("one-line.txt.xz", "proof.xz", "long-names.parquet", "texts.npz", "config.toml", "study-without-end")
+CASES = [pytest.param(one, id=one.name, marks=() if one.name in FEW else pytest.mark.slow) for one in HOSTILE]
+
+
+@pytest.mark.parametrize("case", CASES)
 def test_memory_stays_small(case: Hostile, tmp_path: Path) -> None:
     found = run(case, tmp_path)
     assert found.peak < MOST, found
