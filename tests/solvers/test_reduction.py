@@ -7,6 +7,7 @@ import assoc
 from assoc import AssignmentProblem
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
+from assoc.solvers.exact.proof import prove
 from assoc.solvers.exact.reduction import Reduction, best_of_both
 
 
@@ -47,3 +48,10 @@ def test_two_covers_give_the_better_of_both_wherever_they_differ():
     weight = best_of_both(cols, weights, 0, 8, one, other, np.empty(8, dtype=np.int32), np.empty(8))
     assert weight == -14.0
     assert one.tolist() == [2, 3, 3, 2, 4, 5, 4, 5]
+
+
+def test_columns_are_dropped_by_reduced_costs_computed_anew():
+    """Those that the passes had updated were wrong beside 1e18: the optimum was dropped, 0.2 called optimal."""
+    tuples = [[1, 1, 1], [1, 2, 1], [2, 1, 1], [2, 2, 1], [3, 1, 1]]
+    problem = AssignmentProblem(tuples, [1e18, 1.0, 0.2, 0.4, 0.0], [3, 2, 1], dummy=False)
+    assert prove(prepare(problem).packing, 1000, 10, Run(0)).lower_bound <= 0.0

@@ -146,7 +146,7 @@ def component_bounds(packing: Packing, duals: Floats) -> Floats:
     for as many columns as a solution can have, so that the bound holds whatever ``duals`` are.
     ``inf`` means that a row without slack has no column: there is no solution.
     """
-    return bounds_by_component(packing.arrays, duals)
+    return bounds_by_component(packing.arrays, duals, np.empty(packing.num_columns))
 
 
 def certified_bound(packing: Packing, duals: Floats) -> float:
@@ -189,19 +189,23 @@ def fill_reduced(packing: PackingArrays, duals: Floats, reduced: Floats) -> None
 
 
 @njit
-def hard_sweeps(packing: PackingArrays, duals: Floats, reduced: Floats, sweeps: int) -> None:
-    """Fill ``reduced``; then passes with the hard minimum: each row takes the least reduced cost of its columns."""
-    fill_reduced(packing, duals, reduced)
+def hard_sweeps(packing: PackingArrays, duals: Floats, updated: Floats, sweeps: int) -> None:
+    """Passes with the hard minimum: each row takes the least reduced cost of its columns.
+
+    ``updated`` is left with the reduced costs as the passes have updated them. Beside large weights they are wrong by
+    as much as rounding has taken, so that they decide nothing: see `bounds_by_component`.
+    """
+    fill_reduced(packing, duals, updated)
     slack, row_ptr, row_cols = packing.slack, packing.row_ptr, packing.row_cols
     for _ in range(sweeps):
         for r in range(slack.size):
             least = -duals[r] if slack[r] else np.inf
             for k in range(row_ptr[r], row_ptr[r + 1]):
-                least = min(least, reduced[row_cols[k]])
+                least = min(least, updated[row_cols[k]])
             if least != 0.0 and least < np.inf:
                 duals[r] += least
                 for k in range(row_ptr[r], row_ptr[r + 1]):
-                    reduced[row_cols[k]] -= least
+                    updated[row_cols[k]] -= least
 
 
 @inner_njit
@@ -314,8 +318,11 @@ def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, l
 
 
 @njit
-def bounds_by_component(packing: PackingArrays, duals: Floats) -> Floats:
-    """The kernel of ``component_bounds``."""
+def bounds_by_component(packing: PackingArrays, duals: Floats, reduced: Floats) -> Floats:
+    """The kernel of ``component_bounds``; fills in the reduced costs with which the bounds hold.
+
+    A solution with column j weighs at least its component's bound and ``reduced[j]``: what columns are dropped by.
+    """
     cols, weights, slack, row_ptr = packing.cols, packing.weights, packing.slack, packing.row_ptr
     row_start, col_start = packing.row_start, packing.col_start
     num_sensors = cols.shape[1]
@@ -342,6 +349,7 @@ def bounds_by_component(packing: PackingArrays, duals: Floats) -> Floats:
                 r = cols[j, s]
                 if r >= 0:
                     value -= min(duals[r], 0.0) if slack[r] else duals[r]
+            reduced[j] = value
             least = min(least, value)
         # what is negative in the reduced costs, for as many columns as a solution can have, and what rounding hides
         bounds[c] = total + lost + least * (row_start[c + 1] - row_start[c]) - margin(size, num_sensors)

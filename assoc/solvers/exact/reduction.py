@@ -24,6 +24,7 @@ from assoc.packing.bounds.dual_ascent import (
     START,
     SmoothPoint,
     bounds_by_component,
+    certified_bound,
     hard_sweeps,
     smooth_passes,
     spread,
@@ -134,7 +135,7 @@ class Reduction:
         """
         duals = self._proof.copy()
         hard_sweeps(self._whole.arrays, duals, np.empty(self._whole.num_columns), 2)
-        loss = self.closed_bound - math.fsum(bounds_by_component(self._whole.arrays, duals))
+        loss = self.closed_bound - certified_bound(self._whole, duals)
         return duals if loss <= TOLERANCE * max(1.0, abs(self.closed_bound)) else None
 
     def reduce(self) -> list[Component]:
@@ -216,17 +217,18 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
     visits = 0
     while counts[0] < _PASSES.size and packing.weights.size > 0 and visits < _VISITS:
         num, num_rows = packing.weights.size, packing.slack.size
-        reduced = np.empty(num)
-        point = SmoothPoint(smooth, reduced, np.empty(num), np.empty(num_rows))
+        updated, reduced = np.empty(num), np.empty(num)
+        point = SmoothPoint(smooth, updated, np.empty(num), np.empty(num_rows))
         visits += smooth_passes(packing, point, temperature, _PASSES[counts[0]], deadline)
         # the first cover and the first bound are worth being late for
         if counts[0] > 0 and is_over(deadline):
             break
         duals = smooth.copy()
-        hard_sweeps(packing, duals, reduced, 2)
-        new_owner = _round(packing, reduced, temperature, deadline)
+        hard_sweeps(packing, duals, updated, 2)
+        new_owner = _round(packing, updated, temperature, deadline)
         best = _Incumbent(bound, hard, owner, weight)
-        new = _Incumbent(bounds_by_component(packing, duals), duals, new_owner, _cover_weights(packing, new_owner))
+        new_bound = bounds_by_component(packing, duals, reduced)
+        new = _Incumbent(new_bound, duals, new_owner, _cover_weights(packing, new_owner))
         keep, alive = _compare(packing, best, new, reduced, granularity)
         for c in range(temperature.size):
             temperature[c] *= COOLING
@@ -294,7 +296,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
             if weight[first[c]] == np.inf:
                 new_weight[c] = np.inf
         weight = new_weight
-        bound = bounds_by_component(packing, hard)
+        bound = bounds_by_component(packing, hard, reduced)
     if packing.slack.size == 0:
         return None
     return (

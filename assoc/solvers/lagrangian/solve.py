@@ -231,7 +231,7 @@ class Subgradient:
         room = self.weight - self.bound + 1e-9 * max(1.0, abs(self.weight))
         reduced = reduced_costs(self.packing, self.best)
         # the multipliers prove their own bound, which may be less than the best
-        slack = max(0.0, self.bound - float(self.best.sum()))
+        slack = max(0.0, self.bound - certified_bound(self.packing, self.best))
         keep = reduced <= room + slack
         if np.count_nonzero(keep) > 0.5 * keep.size:
             return False
