@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,41 @@ from numpy.typing import NDArray
 from assoc._system.compiled import inner_njit, njit
 from assoc.packing.packing import Packing, assembled
 from assoc.problem import AssignmentProblem
+from assoc.solution import Solution
+
+# how far beyond what counts costs are from which on large ones are lowered; what is smaller than tolerances mean
+_FAR, _SMALL = 2.0**20, 2.0**-10
+
+
+class Conditioned(NamedTuple):
+    """A problem whose costs have a range that doubles can order, in place of another one.
+
+    Attributes
+    ----------
+    problem : AssignmentProblem
+        The same tuples at costs that are no larger, in another unit.
+    unit : float
+        A power of two: a cost of 1 stands for so much.
+    lowered : bool array, shape (M,)
+        Tuples that cost less than in the other problem.
+    """
+
+    problem: AssignmentProblem
+    unit: float
+    lowered: NDArray[np.bool_]
+
+    def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
+        """The solution as one of the other problem: bounds hold for it, as nothing there costs less."""
+        if self.problem is problem:
+            return solution
+        cost = math.fsum(problem.costs[solution.indices].tolist())
+        bound = min(math.nextafter(solution.lower_bound * self.unit, -math.inf), cost)
+        duals = tuple(own * self.unit for own in solution.duals)
+        return replace(solution, cost=cost, lower_bound=bound, duals=duals)
+
+    def alters(self, solution: Solution) -> bool:
+        """Whether a solution has a tuple that costs less here."""
+        return bool(self.lowered[solution.indices].any())
 
 
 class PreparedArrays(NamedTuple):
@@ -54,6 +90,46 @@ class Prepared:
         one = self.packing
         own = one.cols, one.weights, one.slack, one.origin, one.row_origin
         return PreparedArrays(*own, self.single, one.row_ptr, one.row_cols)
+
+
+def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
+    """Yield the problem with costs that are far above what counts lowered, then with fewer of them, till none is.
+
+    A cost that is to rule a tuple out (a "big M") takes the digits of all that is added to it. A solution that is the
+    best, or the next, with lower costs and has none of these tuples is so in the problem itself.
+    """
+    costs = problem.costs
+    low, high = float(costs.min(initial=np.inf)), float(costs.max(initial=-np.inf))
+    if high <= _FAR * abs(low) and not 0.0 < max(-low, high) < _SMALL:
+        yield Conditioned(problem, 1.0, np.zeros(costs.size, dtype=np.bool_))
+        return
+    # every solution has a tuple that costs as much as the dearest of each measurement's cheapest
+    counts = max(-low, _dearest_need(problem)) or float(costs[costs > 0.0].min(initial=1.0))
+    while True:
+        shift = min(math.frexp(counts)[1], 0) if counts < _SMALL else 0
+        # more than solutions of costs that count differ by
+        ceiling = 8.0 * counts * float(problem.sizes.sum()) if high > _FAR * counts else np.inf
+        lowered = costs > ceiling
+        own = problem
+        if shift or lowered.any():
+            scaled = np.ldexp(np.minimum(costs, ceiling), -shift)
+            own = AssignmentProblem(problem.tuples, scaled, problem.sizes, dummy=problem.dummy)
+        yield Conditioned(own, math.ldexp(1.0, shift), lowered)
+        if not lowered.any():
+            return
+        counts = float(costs[costs <= max(_FAR * counts, float(costs[lowered].min()))].max())
+
+
+def _dearest_need(problem: AssignmentProblem) -> float:
+    """The largest of the least costs at which measurements that must be used can be; no less than 0."""
+    largest = 0.0
+    for s, size in enumerate(problem.sizes.tolist()):
+        if problem.dummy or size == problem.sizes.min():
+            least = np.full(size, np.inf)
+            there = problem.tuples[:, s] > 0
+            np.minimum.at(least, problem.tuples[there, s] - 1, problem.costs[there])
+            largest = max(largest, float(least.max(initial=0.0)))
+    return largest
 
 
 def prepare(problem: AssignmentProblem) -> Prepared:

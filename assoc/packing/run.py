@@ -42,6 +42,8 @@ class Run:
         Where ``rng`` comes from.
     offset : float
         Added to packing weights gives costs of the problem (the cost of all singletons).
+    unit : float
+        The trace has costs in the problem's own unit, of which 1 in the packing is so many.
     time_limit : float or None
         Seconds from ``started``.
     callback : callable or None
@@ -60,6 +62,7 @@ class Run:
 
     seed: int | np.random.SeedSequence | np.random.Generator
     offset: float = 0.0
+    unit: float = 1.0
     time_limit: float | None = None
     callback: Callback | None = None
     watch: Callable[[Any], object] | None = None
@@ -119,7 +122,8 @@ class Run:
 
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""
-        point = TracePoint(iteration, self.runtime(), weight + self.offset, bound + self.offset)
+        cost, lower_bound = (weight + self.offset) * self.unit, (bound + self.offset) * self.unit
+        point = TracePoint(iteration, self.runtime(), cost, lower_bound)
         self.trace.append(point)
         if len(self.trace) > _TRACE:
             # a search that improves for days: every second point is enough to see how, the first and last stay

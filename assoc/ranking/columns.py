@@ -6,6 +6,7 @@ or to count solutions they cannot; and a tuple that is listed twice must count o
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import dual_bound, hard_pass
+from assoc.packing.kernels.rounding import margin
 from assoc.packing.packing import Packing, assemble
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
@@ -40,7 +42,9 @@ class AllColumns:
     reduced, slack_reduced : float arrays, shapes (N,) and (R,)
         Reduced costs >= 0 of the columns and of leaving a row uncovered (``inf``: not allowed).
     bound : float
-        Sum of the multipliers: no solution weighs less.
+        Sum of the multipliers.
+    error : float
+        A solution weighs at least the bound and its reduced costs, less this: what rounding has taken.
     offset : float
         Weight plus this is the cost.
     single : int64 array
@@ -55,6 +59,7 @@ class AllColumns:
     reduced: Floats
     slack_reduced: Floats
     bound: float
+    error: float
     offset: float
     single: NDArray[np.int64]
 
@@ -126,33 +131,38 @@ def priced(
     offset: float,
     single: NDArray[np.int64],
 ) -> AllColumns:
-    """Put columns and multipliers together; what is negative in the reduced costs must be rounding."""
+    """Put columns and multipliers together."""
     duals = np.where(slack, np.minimum(duals, 0.0), duals)
+    reduced, least = _reduced(rows, weights, duals)
+    error = margin(float(np.abs(duals).sum()), rows.shape[1]) - slack.size * least
     return AllColumns(
         rows,
         weights,
         origin,
         slack,
         duals,
-        _reduced(rows, weights, duals),
+        reduced,
         np.where(slack, -duals, np.inf),
-        float(duals.sum()),
+        math.fsum(duals),
+        error,
         offset,
         single,
     )
 
 
 @njit
-def _reduced(rows: Any, weights: Floats, duals: Floats) -> Floats:
-    """Reduced costs; what is negative must be rounding."""
+def _reduced(rows: Any, weights: Floats, duals: Floats) -> Any:
+    """Reduced costs, 0 where they are negative, and the least that there was."""
     reduced = np.empty(weights.size)
+    least = 0.0
     for j in range(weights.size):
         total = 0.0
         for s in range(rows.shape[1]):
             if rows[j, s] >= 0:
                 total += duals[rows[j, s]]
         reduced[j] = max(weights[j] - total, 0.0)
-    return reduced
+        least = min(least, weights[j] - total)
+    return reduced, least
 
 
 @njit

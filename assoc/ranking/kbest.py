@@ -24,7 +24,7 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.prepare import Prepared, prepare
+from assoc.packing.prepare import Prepared, conditioned, prepare
 from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import AllColumns, price_all_columns
@@ -80,9 +80,29 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     K. G. Murty, "An algorithm for ranking all the assignments in order of increasing cost", Operations
     Research 16, 682-687 (1968).
     """
+    if not isinstance(problem, AssignmentProblem):
+        raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
+    started, k, limit = time.perf_counter(), checked_k(k), checked_time_limit(time_limit)
+    known: list[Solution] = []
     with interruptible():
-        ranking = rank(problem, k, time_limit)
-    return ranking.solutions
+        for own in conditioned(problem):
+            run = Run(0, time_limit=limit, started=started)
+            found = [own.restored(problem, one) for one in rank(own.problem, k, None, run).solutions]
+            places = {one.tuples.tobytes() for one in known}
+            new = [one for one in found if one.tuples.tobytes() not in places]
+            # up to the first that has a lowered cost; where time is over that one is better than none
+            sure = next((place for place, one in enumerate(new) if own.alters(one)), len(new))
+            count = max(sure, 1) if run.stopped_by and not known else sure
+            known += [_at_rank(one, len(known) + place + 1) for place, one in enumerate(new[:count])]
+            if sure == len(new) or run.stopped_by or len(known) >= k:
+                break
+    return known[:k]
+
+
+def _at_rank(solution: Solution, place: int) -> Solution:
+    """The solution with its place in the list."""
+    parameters = {**solution.parameters, "rank": place}
+    return solution if parameters == solution.parameters else replace(solution, parameters=parameters)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +127,6 @@ class Ranking:
 def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
     """Return the k best together with a bound on the rest; a run that is under way has its own time limit."""
     started = time.perf_counter()
-    if not isinstance(problem, AssignmentProblem):
-        raise InvalidInputError(f"problem: expected an AssignmentProblem, got {type(problem).__name__}")
-    k = checked_k(k)
     run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
     most = memory.at_most(k, each)
@@ -159,7 +176,7 @@ def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:
     if not math.isfinite(weight):
         return 0.0
     size = abs(weight) + 2.0 * float(np.abs(columns.duals).sum()) + float(np.abs(prepared.single_cost).sum())
-    return max(8.0, columns.slack.size) * sys.float_info.epsilon * size
+    return max(max(8.0, columns.slack.size) * sys.float_info.epsilon * size, columns.error)
 
 
 def checked_k(k: object) -> int:

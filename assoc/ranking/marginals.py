@@ -259,4 +259,4 @@ def _rounding(problem: AssignmentProblem, columns: AllColumns, excess: float) ->
     costs = problem.costs[columns.origin[near]]
     largest = np.abs(columns.weights[near]).max(initial=0.0) + np.abs(costs).max(initial=0.0)
     sums = rows * (largest + excess) + np.abs(columns.duals).sum() + np.abs(single).sum() + abs(columns.offset)
-    return 8.0 * float(np.finfo(float).eps * sums)
+    return max(8.0 * float(np.finfo(float).eps * sums), columns.error)

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._files.output import FilePath, check_writable
-from assoc._parameters import checked_time_limit, whole_seed
+from assoc._parameters import Parameters, checked_time_limit, whole_seed
 from assoc._system import memory
 from assoc._system.compile_time import compile_seconds
 from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc.errors import InfeasibleError, InvalidInputError, warn
 from assoc.packing.packing import Packing
-from assoc.packing.prepare import Prepared, prepare
-from assoc.packing.run import Callback, Outcome, Run
+from assoc.packing.prepare import Prepared, conditioned, prepare
+from assoc.packing.run import Callback, Outcome, Run, SolveFunction
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
@@ -27,6 +27,9 @@ from assoc.solvers.certificate import certify, cost_of
 from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.start import start_columns
+
+# what ends a call, however good its answer is
+_EARLY = ("time_limit", "callback", "interrupted", "memory_limit")
 
 
 @door
@@ -102,33 +105,14 @@ def assign(
             raise InvalidInputError(f"{name}: expected a function, got {type(function).__name__}")
     if proof is not None:
         check_writable(proof)
-    run = Run(_seed(seed), time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
+    source = _seed(seed)
     with interruptible():
-        prepared = prepare(problem)
-        run.offset = prepared.offset
-        packing = prepared.packing
-        if watch is not None:
-            run.watch = _by_tuple(watch, problem, packing)
-        if start is not None:
-            run.start = start_columns(problem, prepared, start, run)
-        estimate = chosen.memory(packing.num_columns, packing.num_rows)
-        if estimate is not None:
-            memory.require(*estimate)
-        if solver != "greedy":
-            prepare_fallback(packing, run)
-        try:
-            outcome = solve(packing, chosen, run)
-        except InfeasibleError:
-            known = run.start if run.fallback is None else run.fallback
-            if known is None:
-                raise
-            outcome = Outcome(known, 0)
-        others = [] if run.start is None else [run.start]
-        if run.stopped_by == "time_limit":
-            others.append(better_of(packing, np.asarray(outcome.columns, dtype=np.int64), run))
-        for other in others:
-            outcome = _cheaper(problem, prepared, outcome, other, run)
-        solution = certify(problem, prepared, outcome, run, solver, chosen)
+        for own in conditioned(problem):
+            run = Run(source, time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
+            run.unit = own.unit
+            solution = start = own.restored(problem, _answer(own.problem, (solver, solve), chosen, run, start))
+            if not own.alters(solution) or run.stopped_by in _EARLY:
+                break
         if proof is not None:
             from assoc.proofs import write_proof  # loads what few calls need
 
@@ -137,10 +121,42 @@ def assign(
             except ValueError as error:  # the answer comes first
                 warn(f"proof: not written: {error}")
     # only where nothing was found is it worth a look why: every column of a problem with dummies is a target
-    if advise and problem.dummy and not len(outcome.columns):
+    if advise and problem.dummy and len(solution.tuples) == problem.sizes.sum():
         for line in doubts_about_costs(problem):
             warn(line)
     return solution
+
+
+def _answer(
+    problem: AssignmentProblem, called: tuple[str, SolveFunction], chosen: Parameters, run: Run, start: Solution | None
+) -> Solution:
+    """Run a solver, given as its name and function, on a problem and certify its answer."""
+    solver, solve = called
+    prepared = prepare(problem)
+    run.offset = prepared.offset
+    packing = prepared.packing
+    if run.watch is not None:
+        run.watch = _by_tuple(run.watch, problem, packing)
+    if start is not None:
+        run.start = start_columns(problem, prepared, start, run)
+    estimate = chosen.memory(packing.num_columns, packing.num_rows)
+    if estimate is not None:
+        memory.require(*estimate)
+    if solver != "greedy":
+        prepare_fallback(packing, run)
+    try:
+        outcome = solve(packing, chosen, run)
+    except InfeasibleError:
+        known = run.start if run.fallback is None else run.fallback
+        if known is None:
+            raise
+        outcome = Outcome(known, 0)
+    others = [] if run.start is None else [run.start]
+    if run.stopped_by == "time_limit":
+        others.append(better_of(packing, np.asarray(outcome.columns, dtype=np.int64), run))
+    for other in others:
+        outcome = _cheaper(problem, prepared, outcome, other, run)
+    return certify(problem, prepared, outcome, run, solver, chosen)
 
 
 def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packing: Packing) -> Callable[[Any], object]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from fractions import Fraction
 
@@ -13,39 +14,44 @@ from assoc.problem import AssignmentProblem
 
 
 def exact_optimum(problem: AssignmentProblem) -> Fraction:
-    """Optimal cost in exact arithmetic, part by part, by recursion over the sets of covered measurements.
+    """Optimal cost in exact arithmetic; see `exact_ranks`."""
+    return exact_ranks(problem, 1)[0]
+
+
+def exact_ranks(problem: AssignmentProblem, k: int) -> list[Fraction]:
+    """Costs of the k best solutions in exact arithmetic, by recursion over the sets of covered measurements.
 
     Raises
     ------
     InfeasibleError
         The problem has no solution.
     """
-    return sum((optimum_of_part(part) for _, part in _parts(problem)), Fraction(0))
+    ranks = [Fraction(0)]
+    for _, part in _parts(problem):
+        own = ranks_of_part(part, k)
+        ranks = heapq.nsmallest(k, (one + other for one in ranks for other in own))
+    return ranks
 
 
-def optimum_of_part(problem: AssignmentProblem) -> Fraction:
-    """Optimal cost of a problem with few measurements."""
+def ranks_of_part(problem: AssignmentProblem, k: int) -> list[Fraction]:
+    """Costs of the k best solutions of a problem with few measurements."""
     covering, to_cover, unit = _coverings(problem)
-    memo: dict[int, int | None] = {}
+    memo: dict[int, list[int]] = {}
 
-    def rest(covered: int) -> int | None:
+    def rest(covered: int) -> list[int]:
         low = (~covered & -~covered).bit_length() - 1
         if low >= to_cover:
-            return 0
+            return [0]
         if covered not in memo:
-            least = None
-            for mask, price in covering[low]:
-                if not mask & covered:
-                    more = rest(covered | mask)
-                    if more is not None and (least is None or price + more < least):
-                        least = price + more
-            memo[covered] = least
+            ways = (
+                price + more for mask, price in covering[low] if not mask & covered for more in rest(covered | mask)
+            )
+            memo[covered] = heapq.nsmallest(k, ways)
         return memo[covered]
 
-    answer = rest(0)
-    if answer is None:
+    if not rest(0):
         raise InfeasibleError("no solution")
-    return Fraction(answer, unit)
+    return [Fraction(answer, unit) for answer in rest(0)]
 
 
 def exact_marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
