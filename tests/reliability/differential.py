@@ -29,12 +29,13 @@ from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
 from assoc.solvers.assign import assign
-from tests.reliability.exact import exact_cost, exact_marginals, exact_optimum
+from tests.reliability.exact import exact_cost, exact_marginals, exact_ranks
 from tests.reliability.problems import Case, draw
 
 Way = Callable[[AssignmentProblem], list[Solution]]
 
 
+_RANKS = 4
 _SLOW = 5.0  # seconds; problems of this size take milliseconds, but first calls compile
 _FIRST_CALLS = 20
 _PROGRESS = 60.0  # seconds between two lines that say how far one is
@@ -82,6 +83,31 @@ def _through_a_tensor(problem: AssignmentProblem) -> list[Solution]:
     ]
 
 
+def _from_a_start(solver: str, **parameters: object) -> Way:
+    """Begin with a solution, good, middling or bad: the answer costs no more."""
+
+    def way(problem: AssignmentProblem) -> list[Solution]:
+        starts = [assign(problem, "greedy"), *kbest(problem, 5)]
+        if problem.dummy:
+            # all measurements as false alarms
+            alone = AssignmentProblem(problem.tuples[:0], [], problem.sizes)
+            starts.append(assign(alone, "greedy", advise=False))
+        start = starts[problem.num_tuples % len(starts)]
+        answer = assign(problem, solver, start=start, **parameters)
+        if exact_start(problem, start) < exact_cost(problem, answer.indices):
+            raise AssertionError(f"costs {answer.cost!r}, its start {start.cost!r}")
+        return [answer]
+
+    return way
+
+
+def exact_start(problem: AssignmentProblem, start: Solution) -> Fraction:
+    """What the tuples of a start cost in a problem, in exact arithmetic."""
+    costs = sorted(zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True), reverse=True)
+    least = dict(costs)
+    return sum((Fraction(least[tuple(row)]) for row in start.tuples.tolist()), Fraction(0))
+
+
 WAYS: dict[str, Way] = {
     "exact": _by("exact"),
     "greedy": _by("greedy"),
@@ -95,47 +121,55 @@ WAYS: dict[str, Way] = {
     "milp scip": _by("milp"),
     "milp cp_sat": _by("milp", backend="cp_sat"),
     "milp highs": _by("milp", backend="highs"),
-    "kbest": lambda problem: kbest(problem, 4),
+    "kbest": lambda problem: kbest(problem, _RANKS),
     "file": _through_a_file,
     "tensor": _through_a_tensor,
+    **{f"{solver} from a start": _from_a_start(solver) for solver in ("exact", "aco", "tabu", "lagrangian", "milp")},
+    "genetic from a start": _from_a_start("genetic", iterations=20),
 }
 LISTED = {"marginals 1": 1, "marginals 2": 2}
 """Ways to probabilities: from how many solutions."""
-PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor")
+PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start")
 """Ways that promise the optimum on problems of this size."""
 
 
-def magnitude(problem: AssignmentProblem) -> Fraction:
-    """Sum of all costs' magnitudes: what rounding is measured by, however much of it cancels."""
-    return sum(map(Fraction, np.abs(problem.costs).tolist()), Fraction(0))
+def magnitude(problem: AssignmentProblem, worst: Fraction) -> Fraction:
+    """Sum of the magnitudes of costs that solutions of a cost can have: what rounding is measured by.
+
+    A tuple that costs more than all negative ones can make good is in none of them.
+    """
+    costs = list(map(Fraction, problem.costs.tolist()))
+    most = worst - sum(cost for cost in costs if cost < 0)
+    return sum((abs(cost) for cost in costs if cost <= most), Fraction(0))
 
 
-def faults(problem: AssignmentProblem, optimum: Fraction | None, name: str, way: Way) -> Iterator[str]:
-    """What is wrong with the answer that comes this way; ``optimum`` None: there is no solution."""
+def faults(problem: AssignmentProblem, truth: list[Fraction] | None, name: str, way: Way) -> Iterator[str]:
+    """What is wrong with the answer that comes this way; ``truth``: the best costs, None where there is no solution."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", "none of the .* tuples costs less", AssocWarning)
             answers = way(problem)
     except InfeasibleError:
-        if optimum is not None:
+        if truth is not None:
             yield "says infeasible"
         return
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         yield f"raises {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error}"
         return
-    if optimum is None:
+    if truth is None:
         yield "answers a problem that has no solution"
         return
-    for place, answer in enumerate(answers):
-        # bounds of later places hold for what is not before them
-        own = optimum if place == 0 else None
+    # bounds of later places hold for what is not before them
+    for place, (answer, own) in enumerate(zip(answers, truth, strict=False)):
         yield from (f"{text} (place {place})" for text in _faults_of(problem, own, answer))
-    first = answers[0]
+    if name == "kbest" and len(answers) != len(truth):
+        yield f"lists {len(answers)} solutions of {len(truth)}"
+    first, optimum = answers[0], truth[0]
     if name in PROVING:
         # solvers close their gaps to 1e-9 of the weights they see, which are differences of costs
-        room = magnitude(problem) * Fraction(1.01) / 10**9
+        room = magnitude(problem, optimum) * Fraction(1.01) / 10**9
         excess = exact_cost(problem, first.indices) - optimum
         if excess > Fraction(OPTIMALITY_TOLERANCE) * max(1, abs(optimum)) + room:
             yield f"is {float(excess):.3g} above the optimum {float(optimum):.6g}"
@@ -177,7 +211,7 @@ def interval_faults(problem: AssignmentProblem, truth: dict[tuple[int, ...], flo
             yield f"says {p!r} in [{low!r}, {high!r}] of {row}"
 
 
-def _faults_of(problem: AssignmentProblem, optimum: Fraction | None, answer: Solution) -> Iterator[str]:
+def _faults_of(problem: AssignmentProblem, optimum: Fraction, answer: Solution) -> Iterator[str]:
     if not np.array_equal(problem.tuples[answer.indices], answer.tuples):
         yield "names other tuples than it indexes"
     smallest = int(problem.sizes.min())
@@ -192,12 +226,10 @@ def _faults_of(problem: AssignmentProblem, optimum: Fraction | None, answer: Sol
     # nan fails every comparison; a bound may be -inf where nothing is known
     if not answer.lower_bound <= answer.cost:
         yield f"has the bound {answer.lower_bound!r} above its cost {answer.cost!r}"
-    if optimum is None:
-        return
     if answer.lower_bound > -math.inf:
         over = Fraction(answer.lower_bound) - optimum
         # a cost is the nearest float to the exact sum: half a unit in the last place may lie above it
-        if over > magnitude(problem) / 10**17 + abs(optimum) / 2**53:
+        if over > magnitude(problem, optimum) / 10**17 + abs(optimum) / 2**53:
             yield f"has a bound {float(over):.3g} above the optimum {float(optimum)!r}"
     if answer.status == "optimal":
         excess = cost - optimum
@@ -208,18 +240,18 @@ def _faults_of(problem: AssignmentProblem, optimum: Fraction | None, answer: Sol
 def judge(case: Case, names: list[str]) -> list[str]:
     """All faults on one case, as lines."""
     try:
-        optimum: Fraction | None = exact_optimum(case.problem)
+        ranks: list[Fraction] | None = exact_ranks(case.problem, _RANKS)
     except InfeasibleError:
-        optimum = None
+        ranks = None
     truth = None
-    if optimum is not None and not LISTED.keys().isdisjoint(names):
+    if ranks is not None and not LISTED.keys().isdisjoint(names):
         truth = exact_marginals(case.problem)
     lines = []
     for name in names:
         if name in LISTED:
             found = interval_faults(case.problem, truth, LISTED[name])
         else:
-            found = faults(case.problem, optimum, name, WAYS[name])
+            found = faults(case.problem, ranks, name, WAYS[name])
         lines += [f"{name} {text}" for text in found]
     return lines
 

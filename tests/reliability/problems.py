@@ -31,11 +31,11 @@ class Case:
     number: int
 
 
-def draw(seed: int, number: int, structures: Sequence[str] = ()) -> Case:
-    """Draw case ``number`` of a seed, of some structures or of all."""
+def draw(seed: int, number: int, structures: Sequence[str] = (), tempers: Sequence[str] = ()) -> Case:
+    """Draw case ``number`` of a seed, of some structures and tempers or of all."""
     rng = np.random.default_rng([seed, number])
     structure = str(rng.choice(list(structures or STRUCTURES)))
-    temper = str(rng.choice(list(TEMPERS)))
+    temper = str(rng.choice(list(tempers or TEMPERS)))
     return Case(make(rng, structure, temper), structure, temper, number)
 
 
@@ -208,6 +208,22 @@ def many_parts(rng: np.random.Generator, count: int) -> Structure:
     return np.concatenate(blocks), start, True
 
 
+def _nine_sensors_and_more(rng: np.random.Generator) -> Structure:
+    sensors = int(rng.integers(9, 15))
+    sizes = np.ones(sensors, np.int64)
+    sizes[rng.permutation(sensors)[: _MOST_ROWS - sensors]] = 2
+    tuples = rng.integers(0, sizes + 1, (int(rng.integers(10, 60)), sensors))
+    tuples[rng.random(tuples.shape) < rng.choice([0.0, 0.5, 0.7])] = 0
+    return _real(np.unique(tuples, axis=0)), sizes, True
+
+
+def _nine_sensors_axial(rng: np.random.Generator) -> Structure:
+    """Draw tuples over sensors of two or three measurements each; for each the one that begins with its complement."""
+    sizes = rng.integers(2, 4, int(rng.integers(9, 15)))
+    tuples = rng.integers(1, 3, (int(rng.integers(2, 20)), len(sizes)))
+    return np.unique(np.concatenate([tuples, 3 - tuples]), axis=0), sizes, False
+
+
 STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "gated": _gated,
     "listed singletons": _with_listed_singletons,
@@ -227,6 +243,8 @@ STRUCTURES: dict[str, Callable[[np.random.Generator], Structure]] = {
     "uneven": _uneven,
     "many sensors": _many_sensors,
     "many parts": _many_parts,
+    "9 to 14 sensors": _nine_sensors_and_more,
+    "9 to 14 sensors, axial": _nine_sensors_axial,
 }
 
 
@@ -312,6 +330,25 @@ def _zeros_of_both_signs(rng: np.random.Generator, tuples: Ints, sizes: Ints) ->
     return rng.choice([0.0, -0.0, 5e-324, -5e-324], len(tuples))
 
 
+def _big_m(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Near ties, of which some are ruled out by costs of 1e9 to 1e299, all alike or each its own."""
+    costs = rng.integers(-3, 4, len(tuples)) + rng.integers(0, 3, len(tuples)) * 10.0 ** -rng.integers(3, 16)
+    costs *= 10.0 ** float(rng.choice([0.0, 0.0, 3.0, -14.0]))
+    exponent = rng.uniform(9.0, 298.0, len(tuples) if rng.random() < 0.3 else 1)
+    dear = rng.random(len(tuples)) < rng.choice([0.05, 0.3, 0.7])
+    return np.where(dear, 10.0**exponent + costs, costs)
+
+
+def _units_in_the_last_place(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    """Costs that differ in their last bits only."""
+    base = float(rng.choice([1.0, -1.0, 0.1, -1 / 3, 1e6 + 1 / 7]))
+    return base + rng.integers(-2, 3, len(tuples)) * np.spacing(base)
+
+
+def _denormal(rng: np.random.Generator, tuples: Ints, sizes: Ints) -> Floats:
+    return rng.integers(-9, 10, len(tuples)) * 5e-324 * float(rng.choice([1.0, 1e5, 1e15]))
+
+
 TEMPERS: dict[str, Temper] = {
     "normal": _normal,
     "positive": _positive,
@@ -334,4 +371,7 @@ TEMPERS: dict[str, Temper] = {
     "18 decades": _eighteen_decades,
     "forbidden": _forbidden,
     "zeros": _zeros_of_both_signs,
+    "big M": _big_m,
+    "1 ulp": _units_in_the_last_place,
+    "denormal": _denormal,
 }
