@@ -28,17 +28,17 @@ class Conditioned(NamedTuple):
         The same tuples at costs that are no larger, in another unit.
     unit : float
         A power of two: a cost of 1 stands for so much.
-    lowered : bool array, shape (M,)
-        Tuples that cost less than in the other problem.
+    lowered : bool array, shape (M,), or None
+        Tuples that cost less than in the other problem; None: it is that problem.
     """
 
     problem: AssignmentProblem
     unit: float
-    lowered: NDArray[np.bool_]
+    lowered: NDArray[np.bool_] | None
 
     def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
         """The solution as one of the other problem: bounds hold for it, as nothing there costs less."""
-        if self.problem is problem:
+        if self.lowered is None:
             return solution
         cost = math.fsum(problem.costs[solution.indices].tolist())
         bound = min(math.nextafter(solution.lower_bound * self.unit, -math.inf), cost)
@@ -47,7 +47,7 @@ class Conditioned(NamedTuple):
 
     def alters(self, solution: Solution) -> bool:
         """Whether a solution has a tuple that costs less here."""
-        return bool(self.lowered[solution.indices].any())
+        return self.lowered is not None and bool(self.lowered[solution.indices].any())
 
 
 class PreparedArrays(NamedTuple):
@@ -99,22 +99,24 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
     best, or the next, with lower costs and has none of these tuples is so in the problem itself.
     """
     costs = problem.costs
-    low, high = float(costs.min(initial=np.inf)), float(costs.max(initial=-np.inf))
-    if high <= _FAR * abs(low) and not 0.0 < max(-low, high) < _SMALL:
-        yield Conditioned(problem, 1.0, np.zeros(costs.size, dtype=np.bool_))
+    low, high = (float(costs.min()), float(costs.max())) if costs.size else (0.0, 0.0)
+    least = abs(low) or float(np.min(costs, where=costs > 0.0, initial=1.0))
+    if high <= _FAR * least and not 0.0 < max(-low, high) < _SMALL:
+        yield Conditioned(problem, 1.0, None)
         return
     # every solution has a tuple that costs as much as the dearest of each measurement's cheapest
-    counts = max(-low, _dearest_need(problem)) or float(costs[costs > 0.0].min(initial=1.0))
+    counts = max(-low, _dearest_need(problem)) or least
     while True:
         shift = min(math.frexp(counts)[1], 0) if counts < _SMALL else 0
         # more than solutions of costs that count differ by
         ceiling = 8.0 * counts * float(problem.sizes.sum()) if high > _FAR * counts else np.inf
         lowered = costs > ceiling
-        own = problem
-        if shift or lowered.any():
-            scaled = np.ldexp(np.minimum(costs, ceiling), -shift)
-            own = AssignmentProblem(problem.tuples, scaled, problem.sizes, dummy=problem.dummy)
-        yield Conditioned(own, math.ldexp(1.0, shift), lowered)
+        if shift == 0 and not lowered.any():
+            yield Conditioned(problem, 1.0, None)
+            return
+        own = np.ldexp(np.minimum(costs, ceiling), -shift)
+        own_problem = AssignmentProblem(problem.tuples, own, problem.sizes, dummy=problem.dummy)
+        yield Conditioned(own_problem, math.ldexp(1.0, shift), lowered)
         if not lowered.any():
             return
         counts = float(costs[costs <= max(_FAR * counts, float(costs[lowered].min()))].max())
