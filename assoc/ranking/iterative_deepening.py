@@ -153,8 +153,9 @@ class Deepening:
         total, choice = merge(start, weights, self._k + 1)
         if total[0] < self._known_weight:
             self._known, self._known_weight = _origins(packing, lists, choice[0]), float(total[0])
-        # a full list excludes what is lighter than its last by more than a tie
-        proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance, side="right")), self._k)
+        # a full list excludes what is lighter than its last by more than a tie: where all in it tie, than its first
+        ties = float(np.minimum([own[0] for own in lists.weights] - lower, self._tolerance).sum())
+        proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance + ties, side="right")), self._k)
         if proved < total.size:
             rest = min(rest, float(total[proved]))
         return Found([_origins(packing, lists, pick) for pick in choice[:proved]], rest)

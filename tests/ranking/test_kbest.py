@@ -354,3 +354,13 @@ def test_bad_problem_and_time_limit():
         kbest([[1.0]], 3)
     with pytest.raises(InvalidInputError, match="time_limit: expected seconds > 0"):
         kbest(blackman_popoli(), 3, time_limit=0)
+
+
+def test_ties_in_many_components():
+    """With ties in more than four of them nothing seemed proved, and one solution was returned."""
+    n = 6
+    cycles = np.concatenate(
+        [[[2 * i + a, 2 * i + b, 2 * i + c] for a, b, c in itertools.product((1, 2), repeat=3)] for i in range(n)]
+    )
+    problem = AssignmentProblem(cycles, np.full(len(cycles), -1.0 / 3.0), [2 * n] * 3)
+    assert [one.cost for one in kbest(problem, 4)] == pytest.approx([-2.0 * n / 3.0] * 4)
