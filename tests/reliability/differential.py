@@ -8,6 +8,7 @@ prints the faults found (none, one hopes), each with the seed and number that ma
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import sys
 import time
@@ -22,13 +23,19 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from assoc._parameters import Parameters
 from assoc._system.processes import ordered_map
 from assoc.errors import AssocWarning, InfeasibleError
+from assoc.packing.packing import Packing
+from assoc.packing.run import Outcome, Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking.kbest import kbest
 from assoc.ranking.marginals import marginals
 from assoc.solution import OPTIMALITY_TOLERANCE, Solution
+from assoc.solvers import registry
 from assoc.solvers.assign import assign
+from assoc.solvers.greedy.parameters import GreedyParameters
+from assoc.solvers.greedy.solve import solve as greedy_solve
 from tests.reliability.exact import exact_cost, exact_marginals, exact_ranks
 from tests.reliability.problems import Case, draw
 
@@ -108,6 +115,41 @@ def exact_start(problem: AssignmentProblem, start: Solution) -> Fraction:
     return sum((Fraction(least[tuple(row)]) for row in start.tuples.tolist()), Fraction(0))
 
 
+@dataclass(frozen=True)
+class _NoParameters(Parameters):
+    """A liar has nothing to choose."""
+
+
+def _lie(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
+    """Choose greedily and lie about it: of the bound, of multipliers, or by changing the weights for all who follow."""
+    columns = greedy_solve(packing, GreedyParameters(), run).columns
+    weight = float(packing.weights[columns].sum())
+    kind = packing.num_columns % 4
+    if kind == 0:
+        with contextlib.suppress(ValueError):
+            packing.weights[:] = -packing.weights
+    return [
+        Outcome(columns, 1, -math.inf),
+        Outcome(columns, 1, math.inf),
+        Outcome(columns, 1, weight),
+        Outcome(columns, 1, weight, np.full(packing.num_rows, 1e3)),
+    ][kind]
+
+
+def _by_a_liar(problem: AssignmentProblem) -> list[Solution]:
+    registry.register("liar", _NoParameters, _lie)
+    try:
+        return [assign(problem, "liar")]
+    finally:
+        del registry._REGISTERED["liar"]
+
+
+def _after_a_liar(problem: AssignmentProblem) -> list[Solution]:
+    """What exact says once a liar has had the problem in its hands."""
+    _by_a_liar(problem)
+    return [assign(problem)]
+
+
 WAYS: dict[str, Way] = {
     "exact": _by("exact"),
     "greedy": _by("greedy"),
@@ -126,10 +168,12 @@ WAYS: dict[str, Way] = {
     "tensor": _through_a_tensor,
     **{f"{solver} from a start": _from_a_start(solver) for solver in ("exact", "aco", "tabu", "lagrangian", "milp")},
     "genetic from a start": _from_a_start("genetic", iterations=20),
+    "liar": _by_a_liar,
+    "after a liar": _after_a_liar,
 }
 LISTED = {"marginals 1": 1, "marginals 2": 2}
 """Ways to probabilities: from how many solutions."""
-PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start")
+PROVING = ("exact", "milp cp_sat", "kbest", "file", "tensor", "exact from a start", "after a liar")
 """Ways that promise the optimum on problems of this size."""
 
 
