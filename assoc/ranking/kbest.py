@@ -73,7 +73,8 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     Notes
     -----
     Costs that differ by rounding alone (relative 1e-12) count as equal; which of the solutions that tie for
-    the last place are returned is not defined.
+    the last place are returned is not defined. Where large costs cancel so that rounding hides the order, ranks
+    are "feasible": they may cost more than the true ones, by their gap at the most.
 
     References
     ----------
