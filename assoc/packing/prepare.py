@@ -30,11 +30,14 @@ class Conditioned(NamedTuple):
         A power of two: a cost of 1 stands for so much.
     lowered : bool array, shape (M,), or None
         Tuples that cost less than in the other problem; None: it is that problem.
+    known : float
+        Solutions that cost less than this, in the unit of the other problem, have no lowered tuple.
     """
 
     problem: AssignmentProblem
-    unit: float
-    lowered: NDArray[np.bool_] | None
+    unit: float = 1.0
+    lowered: NDArray[np.bool_] | None = None
+    known: float = math.inf
 
     def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
         """The solution as one of the other problem: bounds hold for it, as nothing there costs less."""
@@ -102,21 +105,22 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
     low, high = (float(costs.min()), float(costs.max())) if costs.size else (0.0, 0.0)
     least = abs(low) or float(np.min(costs, where=costs > 0.0, initial=1.0))
     if high <= _FAR * least and not 0.0 < max(-low, high) < _SMALL:
-        yield Conditioned(problem, 1.0, None)
+        yield Conditioned(problem)
         return
     # every solution has a tuple that costs as much as the dearest of each measurement's cheapest
     counts = max(-low, _dearest_need(problem)) or least
     while True:
         shift = min(math.frexp(counts)[1], 0) if counts < _SMALL else 0
-        # more than solutions of costs that count differ by
-        ceiling = 8.0 * counts * float(problem.sizes.sum()) if high > _FAR * counts else np.inf
+        # more than solutions of costs that count differ by: one of those costs at most `size`, and at least -size
+        size = counts * float(problem.sizes.sum())
+        ceiling = 8.0 * size if high > _FAR * counts else np.inf
         lowered = costs > ceiling
         if shift == 0 and not lowered.any():
-            yield Conditioned(problem, 1.0, None)
+            yield Conditioned(problem)
             return
         own = np.ldexp(np.minimum(costs, ceiling), -shift)
         own_problem = AssignmentProblem(problem.tuples, own, problem.sizes, dummy=problem.dummy)
-        yield Conditioned(own_problem, math.ldexp(1.0, shift), lowered)
+        yield Conditioned(own_problem, math.ldexp(1.0, shift), lowered, ceiling - size)
         if not lowered.any():
             return
         counts = float(costs[costs <= max(_FAR * counts, float(costs[lowered].min()))].max())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -44,6 +45,8 @@ class Run:
         Added to packing weights gives costs of the problem (the cost of all singletons).
     unit : float
         The trace has costs in the problem's own unit, of which 1 in the packing is so many.
+    known : float
+        From this cost on the trace says ``inf``: some costs were lowered (`assoc.packing.prepare.Conditioned`).
     time_limit : float or None
         Seconds from ``started``.
     callback : callable or None
@@ -63,6 +66,7 @@ class Run:
     seed: int | np.random.SeedSequence | np.random.Generator
     offset: float = 0.0
     unit: float = 1.0
+    known: float = math.inf
     time_limit: float | None = None
     callback: Callback | None = None
     watch: Callable[[Any], object] | None = None
@@ -123,7 +127,7 @@ class Run:
     def record(self, iteration: int, weight: float, bound: float) -> None:
         """Add a point to the trace; weight and bound are those of the packing, without the offset."""
         cost, lower_bound = (weight + self.offset) * self.unit, (bound + self.offset) * self.unit
-        point = TracePoint(iteration, self.runtime(), cost, lower_bound)
+        point = TracePoint(iteration, self.runtime(), cost if cost < self.known else math.inf, lower_bound)
         self.trace.append(point)
         if len(self.trace) > _TRACE:
             # a search that improves for days: every second point is enough to see how, the first and last stay

@@ -109,8 +109,8 @@ def assign(
     with interruptible():
         for own in conditioned(problem):
             run = Run(source, time_limit=limit, callback=callback, watch=watch, started=started, compiled=compiled)
-            run.unit = own.unit
-            solution = start = own.restored(problem, _answer(own.problem, (solver, solve), chosen, run, start))
+            run.unit, run.known = own.unit, own.known
+            solution = start = own.restored(problem, _answer(problem, own.problem, (solver, solve), chosen, run, start))
             if not own.alters(solution) or run.stopped_by in _EARLY:
                 break
         if proof is not None:
@@ -128,9 +128,17 @@ def assign(
 
 
 def _answer(
-    problem: AssignmentProblem, called: tuple[str, SolveFunction], chosen: Parameters, run: Run, start: Solution | None
+    given: AssignmentProblem,
+    problem: AssignmentProblem,
+    called: tuple[str, SolveFunction],
+    chosen: Parameters,
+    run: Run,
+    start: Solution | None,
 ) -> Solution:
-    """Run a solver, given as its name and function, on a problem and certify its answer."""
+    """Run a solver, given as its name and function, on a problem and certify its answer.
+
+    Where costs were lowered, what is better than a start is decided by those of the problem that was given.
+    """
     solver, solve = called
     prepared = prepare(problem)
     run.offset = prepared.offset
@@ -155,7 +163,7 @@ def _answer(
     if run.stopped_by == "time_limit":
         others.append(better_of(packing, np.asarray(outcome.columns, dtype=np.int64), run))
     for other in others:
-        outcome = _cheaper(problem, prepared, outcome, other, run)
+        outcome = _cheaper(given, prepared, outcome, other, run)
     return certify(problem, prepared, outcome, run, solver, chosen)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import assoc
 from assoc.ranking.kbest import rank
+from assoc.solution import TracePoint
 from tests.reliability.exact import exact_cost, exact_ranks
 
 
@@ -36,7 +37,10 @@ def test_answers_and_ranks_are_those_of_exact_arithmetic(sizes, dummy, change):
         problem = _problem(seed, sizes, dummy, CHANGES[change])
         truth = exact_ranks(problem, 4)
         for solver in ("exact", "tabu", "milp"):
-            answer = assoc.assign(problem, solver, advise=False)
+            points: list[TracePoint] = []
+            answer = assoc.assign(problem, solver, advise=False, callback=points.append)
+            near = 1e-9 * abs(float(truth[0])) + 1e-300
+            assert all(point.lower_bound - near <= truth[0] <= point.cost + near for point in points)
             assert answer.lower_bound <= truth[0] <= exact_cost(problem, answer.indices) == pytest.approx(answer.cost)
             assert answer.cost == pytest.approx(float(truth[0]), rel=1e-6, abs=0.0) and answer.status == "optimal"
         ranks = assoc.kbest(problem, 4)
@@ -52,3 +56,11 @@ def test_ranks_are_optimal_only_where_they_are():
     # without the conditioning
     for one, true in zip(rank(problem, 3, None).solutions, [-2.0, -1.0, -1.0], strict=True):
         assert one.lower_bound <= true and (one.status != "optimal" or one.cost == true)
+
+
+def test_a_search_that_is_cut_off_costs_no_more_than_its_start():
+    for seed in range(20):
+        problem = _problem(seed, (3, 3, 3), False, _some(lambda rng, n: 10.0 ** rng.uniform(9, 20, n)))
+        start = assoc.kbest(problem, 3)[-1]
+        answer = assoc.assign(problem, "aco", start=start, callback=lambda point: True, advise=False)
+        assert answer.cost <= start.cost
