@@ -27,8 +27,8 @@ from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
 from assoc.solution import Solution, TracePoint
 from assoc.solvers import registry
+from assoc.solvers.aco.pheromone_history import PheromoneHistory, pheromone
 from assoc.solvers.assign import assign
-from assoc.solvers.pheromone_history import PheromoneHistory, pheromone
 
 GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tuples")
 """What ``assoc.build_problem`` takes beside the scan."""

@@ -13,7 +13,7 @@ from assoc._text.shown import Shown
 from assoc.solution import Solution
 
 if TYPE_CHECKING:
-    from assoc.solvers.pheromone_history import PheromoneHistory
+    from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 
 @dataclass(frozen=True, eq=False, repr=False)

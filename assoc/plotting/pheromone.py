@@ -12,7 +12,7 @@ from assoc.plotting.axes import axes_or_new, legend
 from assoc.plotting.colours import VERMILION
 
 if TYPE_CHECKING:
-    from assoc.solvers.pheromone_history import PheromoneHistory
+    from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 _NAMED = 40
 _LABELS = {

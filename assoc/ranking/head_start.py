@@ -12,7 +12,7 @@ import numpy as np
 from assoc.errors import InfeasibleError
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
-from assoc.solvers.exact.proof import prove
+from assoc.solvers.exact.search import prove
 from assoc.solvers.greedy.fallback import better_of
 
 # share of the time that is left, where it is limited

@@ -17,7 +17,7 @@ from assoc.solvers.registry import names, parameters, register
 if TYPE_CHECKING:
     from assoc.packing.neighbourhoods.cover import Cover
     from assoc.packing.packing import Packing
-    from assoc.solvers.pheromone_history import pheromone
+    from assoc.solvers.aco.pheromone_history import pheromone
 
 __all__ = ["Cover", "Outcome", "Packing", "Parameters", "Run", "names", "parameters", "pheromone", "register"]
 
@@ -26,6 +26,6 @@ __getattr__, __dir__ = lazy_names(
     {
         "Cover": "assoc.packing.neighbourhoods.cover",
         "Packing": "assoc.packing.packing",
-        "pheromone": "pheromone_history",
+        "pheromone": "assoc.solvers.aco.pheromone_history",
     },
 )

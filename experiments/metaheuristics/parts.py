@@ -15,8 +15,8 @@ import numpy as np
 
 from assoc.packing.branching.root import Root, plain_root
 from assoc.packing.branching.short_search import ShortSearch
+from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
-from assoc.packing.components.proof import Branching
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise

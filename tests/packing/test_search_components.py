@@ -10,7 +10,7 @@ import pytest
 import assoc
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.search import BranchAndBound
-from assoc.packing.components import proof, search
+from assoc.packing.components import closing, search
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.search import search_components
 from assoc.packing.components.splitting import split_component, split_components
@@ -239,9 +239,9 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
         def run(self, nodes):
             pass
 
-    monkeypatch.setattr(proof, "_search", lambda *_: Ended())
+    monkeypatch.setattr(closing, "_search", lambda *_: Ended())
     one.weight = weight + 0.5 * one.tolerance
-    branching = proof.Branching(one, Run(0))
+    branching = closing.Branching(one, Run(0))
     branching.advance()
     assert one.closed and one.weight == weight
 
@@ -277,9 +277,9 @@ def test_few_nodes_at_a_time_where_each_takes_long(columns, most, ghosts, monkey
             asked.append(nodes)
             self.done = True
 
-    monkeypatch.setattr(proof, "_search", lambda *_: Counting())
+    monkeypatch.setattr(closing, "_search", lambda *_: Counting())
     monkeypatch.setattr(type(one.packing), "num_columns", columns)
-    proof.bound_of_component(one, Run(0))
+    closing.bound_of_component(one, Run(0))
     assert asked == [most]
 
 

@@ -82,7 +82,7 @@ class Component(Priced):
     refinement : str
         What improves covers (`SearchParameters`).
     proven : float
-        A lower bound by branch and bound (proof.py), where that was asked; the multipliers alone do not give it.
+        A lower bound by branch and bound (closing.py), where that was asked; the multipliers alone do not give it.
     worker : int
         Which of several workers searches it (team.py).
     iterations, stalled : int

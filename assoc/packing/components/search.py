@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.components.closing import bound_of_component
 from assoc.packing.components.component import Component
 from assoc.packing.components.parameters import SearchParameters
-from assoc.packing.components.proof import bound_of_component
 from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.components.team import Make, Team
 from assoc.packing.kernels.sorting import ascending

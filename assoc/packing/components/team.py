@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
+from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
-from assoc.packing.components.proof import Branching
 from assoc.packing.run import Run
 
 

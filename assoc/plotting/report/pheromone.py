@@ -11,7 +11,7 @@ import numpy as np
 from assoc._types import Array
 from assoc.association.scan import ScanAssociation
 from assoc.plotting.report.views import number
-from assoc.solvers.pheromone_history import PheromoneHistory
+from assoc.solvers.aco.pheromone_history import PheromoneHistory
 
 # cycles of a scan that are shown, and bytes of all scans together
 _CYCLES = 60

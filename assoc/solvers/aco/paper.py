@@ -22,7 +22,7 @@ from assoc._system.clock import now
 from assoc._system.compiled import njit
 from assoc._types import Floats
 from assoc.errors import InfeasibleError, InvalidInputError
-from assoc.packing.components.proof import bound_of_choice
+from assoc.packing.components.closing import bound_of_choice
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run

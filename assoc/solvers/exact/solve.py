@@ -12,7 +12,7 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.exact.parameters import ExactParameters
-from assoc.solvers.exact.proof import prove
+from assoc.solvers.exact.search import prove
 
 # column visits of the search that closes what is left where costs cancel
 _VISITS = 20_000_000
