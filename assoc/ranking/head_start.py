@@ -12,7 +12,7 @@ import numpy as np
 from assoc.errors import InfeasibleError
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
-from assoc.solvers.exact.search import prove
+from assoc.solvers.exact.search import search_to_the_end
 from assoc.solvers.greedy.fallback import better_of
 
 # share of the time that is left, where it is limited
@@ -51,7 +51,7 @@ class HeadStart:
         ahead = Run(0, time_limit=limit, started=run.started)
         ahead.fallback = run.fallback
         try:
-            outcome = prove(packing, _NODES, _PATIENCE, ahead)
+            outcome = search_to_the_end(packing, _NODES, _PATIENCE, ahead)
         except InfeasibleError:
             # none found in the share; whether there is none the ranking finds out
             return

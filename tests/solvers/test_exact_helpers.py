@@ -6,6 +6,7 @@ import pytest
 from assoc import assign
 from assoc.costs import build_problem
 from assoc.packing.branching import search
+from assoc.packing.components.turns import Turns
 from assoc.packing.run import Run
 from assoc.solvers.exact import search as exact
 from experiments.common.instances.scenes import ghost
@@ -15,16 +16,16 @@ from experiments.common.instances.scenes import ghost
 def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
     """After so many turns of branching, and not before; the optimum is the same."""
     joined = []
-    usual = exact._search_better
+    usual = exact._Task._search_better
 
-    def noted(task, run):
+    def noted(task):
         joined.append(task.age)
-        return usual(task, run)
+        return usual(task)
 
     monkeypatch.setattr(exact, "_ALONE", alone)
     # not split on counts: then it is over at once
     monkeypatch.setattr(search, "_HARD", 10**9)
-    monkeypatch.setattr(exact, "_search_better", noted)
+    monkeypatch.setattr(exact._Task, "_search_better", noted)
     solution = assign(build_problem(ghost(20, 2018), 0), "exact")
     assert solution.status == "optimal" and solution.cost == pytest.approx(-315.9909, abs=1e-4)
     assert bool(joined) == (alone == 3) and all(age >= alone for age in joined)
@@ -45,5 +46,5 @@ def test_a_long_search_says_from_the_beginning_what_it_knows():
 def test_bounds_of_many_components_are_added_up_exactly():
     run = Run(0)
     parts = [1e16, 1.0, -1e16, 1.0] * 500
-    exact._Done(parts, [-part for part in parts]).record(run, 3, [])
+    Turns(run=run, iterations=3, weights=parts, bounds=[-part for part in parts]).record()
     assert (run.trace[-1].cost, run.trace[-1].lower_bound) == (1000.0, -1000.0)

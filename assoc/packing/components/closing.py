@@ -60,20 +60,16 @@ class Branching:
         component.proven = max(component.proven, min(search.lower_bound, component.weight))
 
 
-def bound_of_component(component: Component, run: Run) -> float:
-    """Raise the bound of an open component by a short branch and bound."""
-    if component.closed:
-        # whole-numbered weights: nothing fits between the bound and the cover
-        known = max(component.bound, component.proven)
-        return component.weight if component.packing.granularity else min(known, component.weight)
-    if run.should_stop():
-        return max(component.bound, component.proven)
+def close(component: Component, run: Run) -> None:
+    """Raise what is proved of an open component by a short branch and bound; its cover stays."""
+    if component.closed or run.should_stop():
+        return
     search = _search(component, run)
     # kernels do not hear Ctrl-C: few nodes at a time where each takes long
     at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
     while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
         search.run(at_once)
-    return min(max(component.bound, component.proven, search.lower_bound), component.weight)
+    component.proven = max(component.proven, search.lower_bound)
 
 
 def _search(component: Component, run: Run) -> BranchAndBound:
@@ -108,4 +104,6 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
     duals = dual_bound(packing, run=run)
     components = split_components(packing, duals, np.arange(packing.num_columns))
     give_covers(components, packing, Cover.of(packing, columns).owner)
-    return math.fsum(bound_of_component(component, run) for component in components), duals
+    for component in components:
+        close(component, run)
+    return math.fsum(component.lower_bound for component in components), duals

@@ -82,7 +82,7 @@ class Component(Priced):
     refinement : str
         What improves covers (`SearchParameters`).
     proven : float
-        A lower bound by branch and bound (closing.py), where that was asked; the multipliers alone do not give it.
+        A lower bound by branch and bound, which the multipliers alone do not give.
     worker : int
         Which of several workers searches it (team.py).
     iterations, stalled : int
@@ -114,6 +114,14 @@ class Component(Priced):
     def closed(self) -> bool:
         """Whether the best cover is optimal."""
         return self.weight - max(self.bound, self.proven) <= self.tolerance
+
+    @property
+    def lower_bound(self) -> float:
+        """No cover weighs less, by the multipliers or by branch and bound."""
+        if self.closed and self.packing.granularity:
+            # nothing fits between the bound and the cover
+            return self.weight
+        return min(max(self.bound, self.proven), self.weight)
 
     @property
     def late(self) -> bool:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.components.closing import bound_of_component
+from assoc.packing.components.closing import close
 from assoc.packing.components.component import Component
 from assoc.packing.components.parameters import SearchParameters
 from assoc.packing.components.splitting import split_component, split_components
 from assoc.packing.components.team import Make, Team
-from assoc.packing.kernels.sorting import ascending
-from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.components.turns import Turns, complete_greedily
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 
@@ -74,86 +70,62 @@ def search_components(
                 component.settle(component.dive(number, run.rng), run.rng, parameters.clusters)
         # what no better cover can use is gone before the search begins
         parts.extend(split_component(component) or [component])
-    components = parts
-    columns: list[NDArray[np.int64]] = []
-    bounds: list[float] = []
-    weights: list[float] = []
-    done = len(components)
-    cut_off = False
-    root_bound = math.fsum(component.bound for component in components)
-    _record_all(run, done, weights, root_bound, components)
-    queue: list[tuple[Component, Team | None]] = [(component, None) for component in components]
     workers = parameters.workers
     pool = ThreadPoolExecutor(workers, "assoc-search") if workers > 1 else None
     with pool or nullcontext():
-        while queue:
-            component, team = queue.pop(0)
-            # who has a cover takes no turn after time is over, or thousands of components would take one each
-            over = component.closed or (component.best is not None and run.should_stop())
-            if not over:
-                if team is None:
-                    if component.packing.num_rows < _SMALL and component.best is not None:
-                        component.proven = bound_of_component(component, run)
-                    team = Team(make, component, run, parameters.clusters, workers, pool)
-                before, iterations_before = component.weight, component.iterations
-                over = _take_turn(component, team, run, parameters)
-                done += component.iterations - iterations_before
-                cut_off |= component.iterations >= parameters.iterations and not (
-                    component.closed or component.stalled >= parameters.patience
-                )
-                if component.best is None and over:
-                    complete_greedily(component, run)
-                if component.weight < before:
-                    waiting = [component, *(other for other, _ in queue)]
-                    _record_all(run, done, weights, root_bound, waiting)
-                smaller = None if over else split_component(component)
-                if smaller is not None:
-                    queue.extend((one, None) for one in smaller)
-                    continue
-            if over:
-                columns.append(component.origin[component.best_columns()])
-                bounds.append(bound_of_component(component, run))
-                weights.append(component.weight)
-            else:
-                queue.append((component, team))
-    chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    # thousands of parts: a plain sum can lose more than the bounds' margins for rounding
-    bound = math.fsum(bounds)
-    run.record(done, math.fsum(weights), bound)
-    if cut_off:
+        # the covers that components begin with count as iterations
+        searches = _Searches(run=run, iterations=len(parts), make=make, parameters=parameters, pool=pool)
+        tasks = [_Task(component, searches) for component in parts]
+        searches.record(tasks)
+        searches.take(tasks)
+    if searches.cut_off:
         # said only now: a run that is stopped neither searches other components nor raises their bounds
         run.stopped_by = run.stopped_by or "iterations"
-    return Outcome(chosen, done, bound, duals)
+    return searches.outcome(duals)
 
 
-def _take_turn(component: Component, team: Team, run: Run, limits: SearchParameters) -> bool:
-    """Give a component up to ten iterations, until one improves its cover; whether its search is over."""
-    for _ in range(10):
-        before = component.weight
-        team.iterate()
-        component.iterations += 1
-        component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
-        ended = component.stalled >= limits.patience or component.iterations >= limits.iterations
-        if component.closed or ended or run.should_stop():
-            return True
-        if component.stalled == 0:
-            # fewer columns may do now
-            return False
-    return False
+@dataclass(slots=True, kw_only=True)
+class _Searches(Turns):
+    make: Make
+    parameters: SearchParameters
+    pool: ThreadPoolExecutor | None
+    # whether one was ended by the number of iterations
+    cut_off: bool = False
 
 
-def _record_all(run: Run, iterations: int, weights: list[float], bound: float, components: list[Component]) -> None:
-    known = math.fsum([*weights, *(component.weight for component in components)])
-    if known < np.inf:
-        run.record(iterations, known, bound)
+@dataclass(slots=True)
+class _Task:
+    """A component that a team searches."""
 
+    component: Component
+    all: _Searches
+    team: Team | None = None
 
-def complete_greedily(component: Component, run: Run) -> None:
-    """Last resort for a component in which no iteration covered all that must be covered."""
-    cover = Cover.empty(component.packing)
-    cover.add_greedily(ascending(component.reduced))
-    if not cover.complete(run):
-        raise infeasible(component.packing, run)
-    component.offer(cover.owner, cover.weight)
-    if component.best is None:
-        raise InfeasibleError("no complete solution was found")
+    def turn(self) -> bool:
+        """Up to ten iterations, until one improves the cover; then the bound is raised by a short branch and bound."""
+        component, limits, run = self.component, self.all.parameters, self.all.run
+        if self.team is None:
+            if component.packing.num_rows < _SMALL and component.best is not None:
+                close(component, run)
+            self.team = Team(self.all.make, component, run, limits.clusters, limits.workers, self.all.pool)
+        for _ in range(10):
+            before = component.weight
+            self.team.iterate()
+            component.iterations += 1
+            self.all.iterations += 1
+            component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
+            in_vain, spent = component.stalled >= limits.patience, component.iterations >= limits.iterations
+            if component.closed or in_vain or spent or run.should_stop():
+                self.all.cut_off |= spent and not (component.closed or in_vain)
+                if component.best is None:
+                    complete_greedily(component, run)
+                close(component, run)
+                return True
+            if component.stalled == 0:
+                # fewer columns may do now
+                return False
+        return False
+
+    def split(self) -> list[_Task]:
+        """Tasks for what is left of the component."""
+        return [_Task(one, self.all) for one in split_component(self.component) or ()]

@@ -37,7 +37,8 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
 def split_component(whole: Component, share: float = 2 / 3) -> list[Component] | None:
     """Drop the columns that no better solution can use; None unless at most ``share`` of them are left.
 
-    What is left may fall apart: components, each with its share of the best cover.
+    What is left may fall apart: components, each with its share of the best cover and of what is proved. A cover of one
+    with the best covers of the others is a cover of the whole, and weighs no less than the whole's bound.
     """
     if whole.best is None:
         return None
@@ -56,12 +57,11 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
     owner = np.where(owner >= 0, place[owner], -1).astype(np.int32)
     components = split_components(smaller, duals, whole.origin[smaller.origin])
     give_covers(components, smaller, owner)
+    rounding = 1e-12 * (sum(abs(one.weight) for one in components) + abs(whole.weight))
     for one in components:
         one.iterations, one.stalled = whole.iterations, whole.stalled
         one.deadline, one.refinement = whole.deadline, whole.refinement
-    if len(components) == 1:
-        # no better cover went with the columns
-        components[0].proven = whole.proven
+        one.proven = whole.proven - (whole.weight - one.weight) - rounding
     return components
 
 

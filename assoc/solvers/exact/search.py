@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.compiling import compile_branching_ahead
 from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.components.component import Component
-from assoc.packing.components.search import complete_greedily
 from assoc.packing.components.splitting import split_component
+from assoc.packing.components.turns import Turns
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
@@ -30,8 +27,6 @@ _LARGE = 150
 _ALONE = 100
 # turns of branching between their iterations
 _TURNS = 3
-# share of a component's gap by which its bound has risen when the trace says so
-_WORTH = 0.02
 # columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 2000
 _SHORT = 20
@@ -41,27 +36,23 @@ _HARD = 500
 _DENSE = 15
 
 
-@dataclass(slots=True)
-class _Done:
-    """Weights and bounds of the components that are done.
+@dataclass(slots=True, kw_only=True)
+class _Searches(Turns):
+    node_limit: int
+    patience: int
+    out_of_memory: bool = False
 
-    They are added up exactly: over thousands of them a plain sum can lose more than the bounds' margins for rounding.
-    """
-
-    weights: list[float]
-    bounds: list[float]
-
-    def record(self, run: Run, nodes: int, tasks: list[_Task]) -> None:
-        """Add a point to the trace, with what is known of the components that are not done."""
-        weight = math.fsum([*self.weights, *(task.component.weight for task in tasks)])
-        run.record(nodes, weight, math.fsum([*self.bounds, *(task.bound for task in tasks)]))
+    @property
+    def nodes_left(self) -> int:
+        return self.node_limit - self.iterations
 
 
 @dataclass(slots=True)
 class _Task:
+    """A component: improved by metaheuristics where it is large, then branched on."""
+
     component: Component
-    # what the search of a larger one has proved before this was split off
-    floor: float = -np.inf
+    all: _Searches
     search: BranchAndBound | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
@@ -69,137 +60,136 @@ class _Task:
     turns: int = 0
     age: int = 0
 
-    @property
-    def bound(self) -> float:
+    def turn(self) -> bool:
+        """One iteration of a metaheuristic, or some nodes of branch and bound and now and then an iteration."""
         component = self.component
-        if component.closed and component.packing.granularity:
-            return component.weight
-        bound = max(component.bound, self.floor)
-        if self.search is not None:
-            bound = max(bound, self.search.lower_bound)
-        return min(bound, component.weight)
-
-    def take_over(self) -> bool:
-        """Take the branching's incumbent where it is better than the component's; whether it was."""
-        search, component = self.search, self.component
-        if search is None or search.columns is None or search.weight >= component.weight:
-            return False
-        component.weight = search.weight
-        component.best = Cover.of(component.packing, search.columns).owner
+        if not self.all.run.should_stop() and self.all.nodes_left > 0:
+            if self._improves:
+                self._search_better()
+                return False
+            if self.search is None:
+                self.search = self._branching()
+                component.stalled = 0
+            # some ten milliseconds of work between two looks at the clock
+            self._branch(max(1, 20_000 // max(component.packing.num_columns, 1)))
+            if not self.search.done:
+                self._join()
+                return False
+        if self.search is not None and self.search.done:
+            self.all.out_of_memory |= self.search.out_of_memory
+            if component.best is None and not self.search.out_of_memory:
+                raise infeasible(component.packing)
         return True
 
-    def parts(self, components: list[Component]) -> list[_Task]:
-        """Tasks for what the component fell apart into, each with what the bound says of it.
+    def split(self) -> list[_Task]:
+        """Tasks for what the component falls apart into: in one search the nodes of independent components multiply."""
+        # branching should start on as few columns as the incumbent allows
+        share = 0.9 if self.search is None and not self._improves else 2 / 3
+        return [_Task(one, self.all) for one in split_component(self.component, share) or ()]
 
-        A cover of one with the best covers of the others is a cover of the whole, and weighs no less than the bound.
+    def branch_shortly(self) -> bool:
+        """Branch at once; whether that was all: a small component is mostly done before its bound could be better."""
+        component, nodes = self.component, min(_SHORT, self.all.nodes_left)
+        if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
+            return component.closed
+        self.search = self._branching(to_the_end=False)
+        self._branch(nodes)
+        return component.closed or self.search.done
+
+    @property
+    def _improves(self) -> bool:
+        """Whether the incumbent is to be brought near the optimum before any branching."""
+        component, patience = self.component, self.all.patience
+        # small components are branched at once, and without an incumbent there is nothing to improve
+        large = self.search is None and component.best is not None and component.packing.num_rows >= _LARGE
+        return large and component.stalled * 60 < patience * component.packing.num_rows
+
+    def _branching(self, *, to_the_end: bool = True) -> BranchAndBound:
+        component, run = self.component, self.all.run
+        return BranchAndBound(
+            component.packing,
+            component.duals,
+            component.weight,
+            component.tolerance,
+            run.deadline(),
+            run.memory_allows,
+            to_the_end=to_the_end,
+            floor=component.proven,
+        )
+
+    def _branch(self, nodes: int) -> None:
+        """Search some nodes; a better incumbent is the component's then."""
+        search, component = self.search, self.component
+        assert search is not None
+        before = search.nodes
+        search.run(min(nodes, self.all.nodes_left))
+        self.all.iterations += search.nodes - before
+        if search.columns is not None and search.weight < component.weight:
+            component.weight = search.weight
+            component.best = Cover.of(component.packing, search.columns).owner
+        component.proven = max(component.proven, search.lower_bound)
+
+    def _join(self) -> None:
+        """Give metaheuristics half the time as long as they improve the incumbent; then less and less."""
+        component = self.component
+        self.turns += 1
+        self.age += 1
+        alone = component.packing.num_rows < _LARGE and self.age < _ALONE
+        if not alone and self.turns >= _TURNS * min(1 + component.stalled, 10):
+            self.turns = 0
+            if self._search_better():
+                assert self.search is not None
+                self.search.weight = component.weight
+
+    def _search_better(self) -> bool:
+        """One iteration of a metaheuristic and exact sub-steps on the incumbent; whether it became better.
+
+        Tabu search and breeding take turns: they get stuck in different places.
         """
-        whole = self.component.weight
-        rounding = 1e-12 * sum(abs(one.weight) for one in components) + 1e-12 * abs(whole)
-        return [_Task(one, self.bound - (whole - one.weight) - rounding) for one in components]
+        component, run = self.component, self.all.run
+        if component.best is None:
+            return False
+        if self.heuristics is None:
+            self.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
+        before = component.weight
+        self.heuristics[self.improvements % 2].iterate(component, run.rng)
+        self.improvements += 1
+        component.refine(run, TabuParameters.clusters)
+        component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
+        return component.stalled == 0
 
 
-def prove(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
+def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
     """Solve a packing to proven optimality or until the nodes or the time are used up."""
     if packing.num_columns > _HARD:
         compile_branching_ahead(surely=packing.num_columns > _DENSE * packing.num_rows)
+    searches = _Searches(run=run, node_limit=node_limit, patience=patience)
     reduction = Reduction(packing, run)
     components = reduction.reduce()
-    columns = reduction.closed_columns
-    done = _Done([reduction.closed_weight], [reduction.closed_bound])
-    if components:
+    searches.columns += reduction.closed_columns
+    searches.weights.append(reduction.closed_weight)
+    searches.bounds.append(reduction.closed_bound)
+    tasks = [_Task(component, searches) for component in components]
+    if tasks:
         # what is known before the search of hard ones: worth seeing where the search takes long
-        done.record(run, 0, [_Task(one) for one in components])
-    tasks: list[_Task] = []
-    settled: list[_Task] = []
-    nodes = 0
+        searches.record(tasks)
     deadline = run.deadline()
-    for component in components:
-        component.deadline = deadline
-        task = _branch_shortly(component, min(_SHORT, node_limit - nodes), run)
-        if task.search is not None:
-            nodes += task.search.nodes
-        if component.closed or (task.search is not None and task.search.done):
-            settled.append(task)
+    done: list[_Task] = []
+    left: list[_Task] = []
+    for task in tasks:
+        task.component.deadline = deadline
+        if task.branch_shortly():
+            done.append(task)
         else:
-            tasks.extend(_Task(one) for one in _sharpen(component, run))
-
-    def show(tasks: list[_Task]) -> None:
-        done.record(run, nodes, settled + tasks)
-
-    show(tasks)
-    tasks = settled + _improve(tasks, patience, run, show)
-    short = False
-    while tasks:
-        task = tasks.pop(0)
-        component = task.component
-        if not component.closed and not run.should_stop() and nodes < node_limit:
-            if task.search is None:
-                task.search = _branching(component, run, floor=task.floor)
-                component.stalled = 0
-            before, bound_before = task.search.nodes, task.bound
-            # some ten milliseconds of work between two looks at the clock
-            task.search.run(min(max(1, 20_000 // max(component.packing.num_columns, 1)), node_limit - nodes))
-            nodes += task.search.nodes - before
-            better = task.take_over()
-            if not task.search.done:
-                task.turns += 1
-                task.age += 1
-                alone = component.packing.num_rows < _LARGE and task.age < _ALONE
-                # as long as they improve it, metaheuristics get half the time; then less and less
-                if not alone and task.turns >= _TURNS * min(1 + component.stalled, 10):
-                    task.turns = 0
-                    if _search_better(task, run):
-                        task.search.weight = component.weight
-                        better = True
-                # a better incumbent rules columns out, and what falls apart is searched component by component:
-                # in one search the nodes of independent components multiply
-                smaller = split_component(component) if better else None
-                tasks.extend([task] if smaller is None else task.parts(smaller))
-                risen = task.bound > bound_before + _WORTH * (component.weight - bound_before)
-                if better or risen or run.is_silent():
-                    done.record(run, nodes, tasks)
-                continue
-            if better:
-                done.record(run, nodes, [task, *tasks])
-        if component.best is None:
-            if task.search is not None and task.search.done and not task.search.out_of_memory:
-                raise infeasible(component.packing)
-            complete_greedily(component, run)
-        assert component.best is not None
-        short = short or (task.search is not None and task.search.out_of_memory)
-        columns.append(component.origin[component.best_columns()])
-        done.weights.append(component.weight)
-        done.bounds.append(task.bound)
-    weight, bound = math.fsum(done.weights), math.fsum(done.bounds)
-    if (short or nodes >= node_limit) and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
-        run.stopped_by = "memory_limit" if short else "iterations"
-    run.record(nodes, weight, bound)
-    chosen = np.concatenate(columns) if columns else np.zeros(0, dtype=np.int64)
-    return Outcome(chosen, nodes, bound, None if components else reduction.proof)
-
-
-def _branching(component: Component, run: Run, *, to_the_end: bool = True, floor: float = -np.inf) -> BranchAndBound:
-    return BranchAndBound(
-        component.packing,
-        component.duals,
-        component.weight,
-        component.tolerance,
-        run.deadline(),
-        run.memory_allows,
-        to_the_end=to_the_end,
-        floor=floor,
-    )
-
-
-def _branch_shortly(component: Component, nodes: int, run: Run) -> _Task:
-    """Branch at once: a small component is mostly done before its bound could be made any better."""
-    task = _Task(component)
-    if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or run.should_stop():
-        return task
-    task.search = _branching(component, run, to_the_end=False)
-    task.search.run(nodes)
-    task.take_over()
-    return task
+            left.extend(_Task(one, searches) for one in _sharpen(task.component, run))
+    tasks = done + left
+    searches.record(tasks)
+    searches.take(tasks)
+    weight, bound = math.fsum(searches.weights), math.fsum(searches.bounds)
+    cut_off = searches.out_of_memory or searches.nodes_left <= 0
+    if cut_off and not run.stopped_by and bound < weight - 1e-6 * max(1.0, abs(weight)):
+        run.stopped_by = "memory_limit" if searches.out_of_memory else "iterations"
+    return searches.outcome(None if components else reduction.proof)
 
 
 def _sharpen(component: Component, run: Run) -> list[Component]:
@@ -211,57 +201,3 @@ def _sharpen(component: Component, run: Run) -> list[Component]:
     if not component.closed and not run.should_stop():
         component.sharpen(run)
     return (None if component.closed else split_component(component, share=0.9)) or [component]
-
-
-def _improve(tasks: list[_Task], patience: int, run: Run, show: Callable[[list[_Task]], None]) -> list[_Task]:
-    """Bring the incumbents of open components near the optimum before any branching, and split what that allows."""
-    result: list[_Task] = []
-    queue = [(task, 0) for task in tasks]
-    while queue:
-        task, stalled = queue.pop(0)
-        component = task.component
-        # small components are branched at once, and without an incumbent there is nothing to improve
-        if (
-            component.closed
-            or component.best is None
-            or component.packing.num_rows < _LARGE
-            or stalled * 60 >= patience * component.packing.num_rows
-        ):
-            result.append(task)
-            continue
-        if run.should_stop():
-            result.append(task)
-            continue
-        stalled = 0 if _search_better(task, run) else stalled + 1
-        if stalled == 0:
-            show([*result, task, *(other for other, _ in queue)])
-        smaller = split_component(component) if stalled == 0 else None
-        if smaller is None:
-            queue.append((task, stalled))
-        else:
-            queue.extend((_Task(one), 0) for one in smaller)
-    # whatever the patience, branching should start on as few columns as the incumbents allow
-    split: list[_Task] = []
-    for task in result:
-        done = task.component.closed or run.should_stop()
-        smaller = None if done else split_component(task.component, share=0.9)
-        split.extend([task] if smaller is None else [_Task(one) for one in smaller])
-    return split
-
-
-def _search_better(task: _Task, run: Run) -> bool:
-    """One iteration of a metaheuristic and exact sub-steps on the incumbent; whether it became better.
-
-    Tabu search and breeding take turns: they get stuck in different places.
-    """
-    component = task.component
-    if component.best is None:
-        return False
-    if task.heuristics is None:
-        task.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
-    before = component.weight
-    task.heuristics[task.improvements % 2].iterate(component, run.rng)
-    task.improvements += 1
-    component.refine(run, TabuParameters.clusters)
-    component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
-    return component.stalled == 0

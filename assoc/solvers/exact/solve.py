@@ -12,7 +12,7 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.exact.parameters import ExactParameters
-from assoc.solvers.exact.search import prove
+from assoc.solvers.exact.search import search_to_the_end
 
 # column visits of the search that closes what is left where costs cancel
 _VISITS = 20_000_000
@@ -28,7 +28,7 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
     InfeasibleError
         There is no solution (proved), or none was found in the time.
     """
-    outcome = prove(packing, parameters.nodes, parameters.patience, run)
+    outcome = search_to_the_end(packing, parameters.nodes, parameters.patience, run)
     return outcome if run.stopped_by else _where_costs_cancel(packing, outcome, run)
 
 

@@ -1,0 +1,113 @@
+"""Components that take turns at being searched, each until its search is over."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assoc._types import Floats
+from assoc.errors import InfeasibleError
+from assoc.packing.branching.feasibility import infeasible
+from assoc.packing.components.component import Component
+from assoc.packing.kernels.sorting import ascending
+from assoc.packing.neighbourhoods.cover import Cover
+from assoc.packing.run import Outcome, Run
+
+# share of a component's gap by which its bound has risen when the trace says so
+_WORTH = 0.02
+
+
+class Task(Protocol):
+    """The search of one component."""
+
+    component: Component
+
+    def turn(self) -> bool:
+        """Search for a moment; whether the search is over."""
+        ...
+
+    def split(self) -> Sequence[Task]:
+        """Tasks for what is left of the component, where that is much less by now; none: it stays as it is."""
+        ...
+
+
+@dataclass(slots=True, kw_only=True)
+class Turns:
+    """The searches of all components of a packing, and what is known of those that are over.
+
+    Weights and bounds are added up exactly: over thousands of components a plain sum can lose more than the bounds'
+    margins for rounding.
+
+    Attributes
+    ----------
+    run : Run
+    iterations : int
+        Of all searches.
+    columns, weights, bounds : lists
+        Of the components that are done.
+    """
+
+    run: Run
+    iterations: int = 0
+    columns: list[NDArray[np.integer]] = field(default_factory=list)
+    weights: list[float] = field(default_factory=list)
+    bounds: list[float] = field(default_factory=list)
+
+    def take(self, tasks: Iterable[Task]) -> None:
+        """Give each task its turn, again and again, until all searches are over.
+
+        Raises
+        ------
+        InfeasibleError
+            A component has no complete cover, or none was found.
+        """
+        waiting = deque(tasks)
+        while waiting:
+            task = waiting.popleft()
+            component = task.component
+            weight, bound = component.weight, component.lower_bound
+            # who has a cover takes no turn after time is over, or thousands of components would take one each
+            over = component.closed or (component.best is not None and self.run.should_stop()) or task.turn()
+            if over and component.best is None:
+                complete_greedily(component, self.run)
+            news = component.weight < weight
+            if not over:
+                risen = component.lower_bound > bound + _WORTH * (component.weight - bound)
+                news = news or risen or self.run.is_silent()
+                waiting.extend(task.split() or [task])
+            if news:
+                self.record([task, *waiting] if over else waiting)
+            if over:
+                self.columns.append(component.origin[component.best_columns()])
+                self.weights.append(component.weight)
+                self.bounds.append(component.lower_bound)
+
+    def record(self, tasks: Iterable[Task] = ()) -> None:
+        """Add a point to the trace, with what is known of the components that are not done."""
+        components = [task.component for task in tasks]
+        weight = math.fsum([*self.weights, *(component.weight for component in components)])
+        bound = math.fsum([*self.bounds, *(component.lower_bound for component in components)])
+        self.run.record(self.iterations, weight, bound)
+
+    def outcome(self, duals: Floats | None) -> Outcome:
+        """What all searches together have found; ``duals`` as in `Outcome`."""
+        self.record()
+        chosen = np.concatenate(self.columns) if self.columns else np.zeros(0, dtype=np.int64)
+        return Outcome(chosen, self.iterations, math.fsum(self.bounds), duals)
+
+
+def complete_greedily(component: Component, run: Run) -> None:
+    """Last resort for a component in which no iteration covered all that must be covered."""
+    cover = Cover.empty(component.packing)
+    cover.add_greedily(ascending(component.reduced))
+    if not cover.complete(run):
+        raise infeasible(component.packing, run)
+    component.offer(cover.owner, cover.weight)
+    if component.best is None:
+        raise InfeasibleError("no complete solution was found")
