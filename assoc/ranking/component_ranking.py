@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from assoc._system.clock import is_over
 from assoc._system.compiled import inner_njit, njit, search_njit
 from assoc._types import Floats
-from assoc.packing.branching.counts import Leaf, most_rows, split_on_counts
-from assoc.packing.branching.leaves import begin_leaf
+from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.node import (
     Work,
     allowed_at,

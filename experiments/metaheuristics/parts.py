@@ -14,13 +14,11 @@ import numba  # noqa: TID251  (a changed kernel is not kept)
 import numpy as np
 
 from assoc.packing.branching.root import Root, plain_root
-from assoc.packing.branching.short_search import ShortSearch
+from assoc.packing.components import component
 from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
-from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
-from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.packing import Packing
 from assoc.solvers.aco import max_min
 from assoc.solvers.genetic import population
@@ -57,8 +55,8 @@ class Part(NamedTuple):
     base: str = WHOLE
 
 
-def _unchanged(self: Any, priced: Any, owner: Any, weight: float, *_: Any) -> float:
-    """A neighbourhood that finds nothing."""
+def _unchanged(self: Any, owner: Any, weight: float, *_: Any) -> float:
+    """Cluster search that finds nothing."""
     return weight
 
 
@@ -69,16 +67,6 @@ def _never(*_: Any) -> bool:
 def _uncut(packing: Packing, duals: Any, *_: Any) -> Root:
     """The root of dives without cuts."""
     return plain_root(packing, duals)
-
-
-_searched = ShortSearch.run
-
-
-def _forgetful(self: ShortSearch, *words: Any) -> Any:
-    """A search at the end of a dive that knows nothing of pairs from those before."""
-    for known in (self.gain, self.tried):
-        known[:] = 0
-    return _searched(self, *words)
 
 
 def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextManager[Any]]:
@@ -198,12 +186,14 @@ OWN = (
 
 SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
-    Part("no dives in parts split on counts", SOLVERS, without=_replaced(Diver, "_split", lambda *_: [])),
     Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
-    Part("nothing kept of pairs from dive to dive", SOLVERS, without=_replaced(ShortSearch, "run", _forgetful)),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
-    Part("no cluster search", SOLVERS, without=_replaced(ClusterSearch, "improve", _unchanged)),
-    Part("no dimensionwise search", SOLVERS, without=_replaced(Dimensionwise, "improve", _unchanged)),
+    Part(
+        "no cluster search",
+        SOLVERS,
+        without=_replaced(ClusterSearch, "improve", lambda self, packing, owner, weight, *_: weight),
+    ),
+    Part("no dimensionwise search", SOLVERS, without=_replaced(component, "improve_dimensionwise", lambda *_: 0.0)),
     Part('refinement="local"', SOLVERS, {"refinement": "local"}),
     Part(ALONE, SOLVERS, {"refinement": "none"}),
 )

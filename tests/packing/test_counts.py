@@ -6,7 +6,7 @@ import pytest
 from assoc import AssignmentProblem, assign
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import counts, search
-from assoc.packing.branching.counts import split_on_counts, with_counts
+from assoc.packing.branching.counts import split_on_counts
 from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import assemble
@@ -169,7 +169,7 @@ def test_further_columns_have_no_rows_and_weigh_nothing():
     packing = random_packing(5)
     everything = counts._counts_of(packing)
     part = counts._Counted(plain_root(packing, dual_bound(packing)), everything, np.inf, np.inf).part(everything)
-    arrays = with_counts(packing.arrays, part.leaf.root.program)
+    arrays = counts._with_counts(packing.arrays, part.leaf.root.program)
     assert (arrays.cols[packing.num_columns :] == -1).all() and len(arrays.cols) == packing.num_columns + 4
     assert (arrays.weights[packing.num_columns :] == 0.0).all()
 

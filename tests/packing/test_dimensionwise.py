@@ -5,7 +5,7 @@ import pytest
 
 from assoc.errors import InfeasibleError
 from assoc.packing.neighbourhoods.cover import Cover
-from assoc.packing.neighbourhoods.dimensionwise import improve, splits
+from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise, splits
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
@@ -43,12 +43,12 @@ def test_never_worse_and_feasible_on_every_kind_of_problem():
         except InfeasibleError:
             continue
         before = cover.weight
-        change = improve(packing, cover.owner)
+        change = improve_dimensionwise(packing, cover.owner)
         _feasible(packing, cover.owner)
         assert cover.weight == pytest.approx(before + change, abs=1e-9)
         assert cover.weight + prepared.offset >= brute_force(problem) - 1e-9
         improved += change < 0
-        assert improve(packing, cover.owner) == 0.0
+        assert improve_dimensionwise(packing, cover.owner) == 0.0
     assert improved > 60
 
 
@@ -58,10 +58,10 @@ def test_two_sensors_are_solved_at_once():
         problem = gated_problem(rng, (5, 6), 0.5)
         prepared = prepare(problem)
         cover = Cover.empty(prepared.packing)
-        improve(prepared.packing, cover.owner)
+        improve_dimensionwise(prepared.packing, cover.owner)
         assert cover.weight + prepared.offset == pytest.approx(brute_force(problem), abs=1e-9)
     cover = _random_cover(prepare(planar_random(40, 100)).packing, rng)
-    improve(cover.packing, cover.owner)
+    improve_dimensionwise(cover.packing, cover.owner)
     from scipy.optimize import linear_sum_assignment
 
     dense = planar_random(40, 100).to_dense()
@@ -100,23 +100,11 @@ def test_no_split_leaves_anything_to_gain():
             problem = gated_problem(rng, [(5, 5, 5), (3, 3, 4, 3)][number % 2], 0.4, listed_singletons=0.4)
         prepared = prepare(problem)
         cover = _random_cover(prepared.packing, rng)
-        improve(prepared.packing, cover.owner)
+        improve_dimensionwise(prepared.packing, cover.owner)
         for mask in splits(problem.num_sensors).tolist():
             assert cover.weight + prepared.offset == pytest.approx(
                 _restricted(problem, cover.owner, prepared, mask), abs=1e-8
             )
-
-
-def test_noisy_weights_and_rounds():
-    rng = np.random.default_rng(4)
-    problem = gated_problem(rng, (8, 8, 8), 0.3)
-    packing = prepare(problem).packing
-    cover = _random_cover(packing, rng)
-    noisy = packing.weights + rng.normal(0, 3, packing.num_columns)
-    before = noisy[cover.columns()].sum()
-    change = improve(packing, cover.owner, noisy, rounds=1)
-    assert noisy[cover.columns()].sum() == pytest.approx(before + change, abs=1e-9)
-    _feasible(packing, cover.owner)
 
 
 def test_splits():

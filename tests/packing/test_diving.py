@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix
 import assoc
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import plain_root, root_with_cuts
+from assoc.packing.components import component as component_file
 from assoc.packing.components.component import Component
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.diving import Diver, _Descent
@@ -71,14 +72,14 @@ def test_dives_are_near_the_bound(priced):
 def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
     """Column after column: what was drawn stays whole in all programs that follow."""
     diver = plain
-    solve, masks = diver._all.program.solve, []
+    solve, masks = diver._program.solve, []
 
     def spy(**words):
         relaxed = solve(**words)
         masks.append((words["columns"].copy(), words["slack"].copy(), relaxed))
         return relaxed
 
-    monkeypatch.setattr(diver._all.program, "solve", spy)
+    monkeypatch.setattr(diver._program, "solve", spy)
     diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(1), np.inf, np.inf)
     assert masks
     core = diver._core
@@ -95,7 +96,7 @@ def test_what_is_drawn_is_fixed(priced, plain, monkeypatch):
 def test_pheromone_and_values_decide(priced, plain, monkeypatch):
     """The first draw has the probabilities of the docstring: counted over many dives."""
     diver = plain
-    core, primal = diver._core, diver._all.relaxed.primal
+    core, primal = diver._core, diver._relaxed.primal
     open_columns = np.flatnonzero((primal > 1e-6) & (primal < 1.0 - 1e-6))
     # halves all of them in this program: other values tell more
     primal[open_columns] = np.linspace(0.1, 0.9, open_columns.size)
@@ -128,9 +129,9 @@ def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
     for cutoff in (np.inf, priced.bound + 1e-6):
         diver = Diver(priced, NONE, np.inf)
         diver.share = diving._LOWEST
-        solve, count = diver._all.program.solve, []
+        solve, count = diver._program.solve, []
         monkeypatch.setattr(
-            diver._all.program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
+            diver._program, "solve", lambda solve=solve, count=count, **w: count.append(1) or solve(**w)
         )
         diver.dive(np.ones(priced.packing.num_columns), 4.0, np.random.default_rng(0), cutoff, np.inf)
         steps.append(len(count))
@@ -139,14 +140,14 @@ def test_a_dive_ends_at_its_cutoff(priced, plain, monkeypatch):
 
 def test_dives_begin_in_a_program_with_cuts(priced, plain):
     """Its bound is nearer to the optimum, and its solution to whole numbers."""
-    root = plain._all.relaxed
+    root = plain._relaxed
     diver = Diver.__new__(Diver)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diving, "root_with_cuts", root_with_cuts)
         diver.__init__(priced, NONE, np.inf)
     core = diver._core
     best = _milp(core, np.ones(core.num_columns, dtype=bool), [])
-    assert root.bound + 0.01 < diver._all.relaxed.bound <= best + 1e-7
+    assert root.bound + 0.01 < diver._relaxed.bound <= best + 1e-7
     assert len(diver._root.sets) > 0
 
 
@@ -174,29 +175,21 @@ def test_the_core_is_what_the_program_with_cuts_would_take(monkeypatch):
     for rounds in (1, 3):
         monkeypatch.setattr(diving, "_ROUNDS", rounds)
         diver = Diver(one, one.best_columns(), np.inf)
-        bounds.append(diver._all.relaxed.bound)
+        bounds.append(diver._relaxed.bound)
         least.append(diver._reduced_costs(one.duals).min())
     assert bounds == pytest.approx([one.weight, optimum], abs=1e-2)
     assert least[0] < -1.0 and least[1] > -1e-6
 
 
-def test_what_searches_learn_is_kept_from_dive_to_dive(priced, plain):
-    diver, rng = plain, np.random.default_rng(0)
-    known, tried = diver._search, []
-    for share in (1.0, 1.0, 0.6, 0.6):
-        diver.share = share
-        diver.dive(np.ones(priced.packing.num_columns), 4.0, rng, np.inf, np.inf)
-        tried.append(int(known.tried.sum()))
-    # what one has tried often enough no other one tries
-    assert 0 < tried[0] <= tried[1] <= tried[-1] and known.tried.max() <= 2
-
-
-def test_components_too_small_or_too_large_do_not_dive(monkeypatch):
+def test_components_too_small_or_too_large_for_memory_do_not_dive(monkeypatch):
     one = component(open_problem(), "full")
     assert one.packing.num_rows < 30 and not one.dives
     monkeypatch.setattr(diving, "_LEAST", 5)
     assert component(open_problem(), "full").dives
     assert not component(open_problem(), "local").dives
+    with monkeypatch.context() as short:
+        short.setattr(component_file, "memory_allows", lambda size: size < 1e3)
+        assert not component(open_problem(), "full").dives
     monkeypatch.setattr(diving, "_MOST", 5)
     assert not component(open_problem(), "full").dives
 
@@ -247,11 +240,11 @@ def test_others_dive_once_an_iteration(searcher, monkeypatch):
 def test_columns_are_fixed_in_their_order(plain):
     """Those that fit, until they cover enough rows; the program is then that of what is left."""
     diver = plain
-    root, core = diver._all.relaxed, diver._core
-    drawn = np.random.default_rng(0).permutation(_Descent(core, diver._all.program, root, np.inf).open_columns())
+    root, core = diver._relaxed, diver._core
+    drawn = np.random.default_rng(0).permutation(_Descent(core, diver._program, root, np.inf).open_columns())
     for rows in (0.0, 5.0, 100.0):
-        diver._all.program.back()
-        at = _Descent(core, diver._all.program, root, np.inf)
+        diver._program.back()
+        at = _Descent(core, diver._program, root, np.inf)
         assert at.fix(drawn, rows, np.inf)
         covered, fixed = set(), []
         for j in drawn:
@@ -271,17 +264,17 @@ def test_columns_are_fixed_in_their_order(plain):
 def test_what_leaves_nothing_better_is_not_fixed(plain):
     """Then all is as it was before, the basis too."""
     diver = plain
-    root, core = diver._all.relaxed, diver._core
+    root, core = diver._relaxed, diver._core
     fixed = refused = 0
-    for j in _Descent(core, diver._all.program, root, np.inf).open_columns()[:12]:
-        diver._all.program.back()
+    for j in _Descent(core, diver._program, root, np.inf).open_columns()[:12]:
+        diver._program.back()
         alone = LinearProgram(core).solve(columns=_left(core, j), slack=_covered(core, j)).bound
         for cutoff in (alone + 1.0, alone - 1e-6):
             # no cover below the cutoff has columns of larger reduced cost: they go, too
             light = root.reduced <= cutoff - root.bound
             least = LinearProgram(core).solve(columns=_left(core, j) & light, slack=_covered(core, j)).bound
-            diver._all.program.back()
-            at = _Descent(core, diver._all.program, root, cutoff)
+            diver._program.back()
+            at = _Descent(core, diver._program, root, cutoff)
             assert at.fix(np.array([j]), 1.0, np.inf) is (least < cutoff)
             if least < cutoff:
                 assert at._fixed == [j] and at.relaxed.bound == pytest.approx(least, abs=1e-7)
@@ -300,14 +293,14 @@ def test_the_rest_is_covered_as_well_as_can_be(priced):
     diver = Diver(priced, NONE, np.inf)
     core = diver._core
     for cutoff in (np.inf, -1.0):
-        diver._all.program.back()
-        at = _Descent(core, diver._all.program, diver._all.relaxed, np.inf)
+        diver._program.back()
+        at = _Descent(core, diver._program, diver._relaxed, np.inf)
         assert at.fix(at.open_columns()[::3], 15.0, np.inf)
         fixed = list(at._fixed)
         columns = np.logical_and.reduce([_left(core, j) for j in fixed])
         best = _milp(core, columns, fixed)
         at._cutoff = min(cutoff, best - 1e-6) if cutoff < 0.0 else cutoff
-        found, done = at.completed(diver._search, Limits(1e-9, np.inf, 10_000, np.inf))
+        found, done = at.completed(Limits(1e-9, np.inf, 10_000, np.inf))
         assert done and at.fixed.tolist() == fixed
         if cutoff < 0.0:
             assert found.tolist() == fixed

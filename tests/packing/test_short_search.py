@@ -9,7 +9,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import short_search
 from assoc.packing.branching.depth_first import Limits
-from assoc.packing.branching.short_search import Part, ShortSearch
+from assoc.packing.branching.short_search import Part, search_shortly
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.dual import OPTIMAL, bound_of
 from assoc.packing.simplex.linear_program import LinearProgram
@@ -21,11 +21,11 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 def begun(packing):
-    """Its program, solved, and searches of it."""
+    """Its program, solved."""
     linear = LinearProgram(packing)
-    relaxed = linear.solve(duals=dual_bound(packing))
+    linear.solve(duals=dual_bound(packing))
     linear.mark()
-    return linear, relaxed, ShortSearch(packing)
+    return linear
 
 
 def everything(packing):
@@ -62,17 +62,17 @@ def best_of(packing, part):
 
 
 def test_what_is_found_is_the_best_of_its_part():
-    """And nothing, where that is not below the cutoff; whatever was searched before."""
+    """And nothing, where that is not below the cutoff."""
     rng = np.random.default_rng(3)
     feasible = 0
     for packing in packings(12, 41):
-        linear, _, search = begun(packing)
+        linear = begun(packing)
         for share, most in ((1.0, 0), (1.0, 2), (0.8, 4), (0.6, 1), (1.0, 100)):
             part = part_of(packing, rng, share, most)
             linear.back()
             linear.solve(columns=part.columns, slack=part.slack)
             best = best_of(packing, part)
-            found, done = search.run(linear, part, np.inf, NO_LIMITS)
+            found, done = search_shortly(packing, linear, part, np.inf, NO_LIMITS)
             assert done
             if best == np.inf:
                 assert not found.size
@@ -83,7 +83,7 @@ def test_what_is_found_is_the_best_of_its_part():
             rows = rows[rows >= 0]
             assert np.unique(rows).size == rows.size and np.isin(np.flatnonzero(~packing.slack), rows).all()
             assert packing.weights[found].sum() == pytest.approx(best, abs=1e-8)
-            found, done = search.run(linear, part, best - 1e-6, NO_LIMITS)
+            found, done = search_shortly(packing, linear, part, best - 1e-6, NO_LIMITS)
             assert done and not found.size
     assert feasible > 25
 
@@ -95,10 +95,10 @@ def test_it_searches_what_is_left_alone(monkeypatch):
         short_search, "new_work", lambda arrays, *words: seen.append((arrays, words[0])) or new_work(arrays, *words)
     )
     for packing in packings(6, 42):
-        linear, _, search = begun(packing)
+        linear = begun(packing)
         part = part_of(packing, rng, 0.9, 2)
         linear.solve(columns=part.columns, slack=part.slack)
-        search.run(linear, part, np.inf, NO_LIMITS)
+        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
         arrays, program = seen.pop()
         covered = np.unique(packing.cols[part.fixed][packing.cols[part.fixed] >= 0]).size
         assert arrays.cols.shape[0] == program.weights.size == part.columns.sum() - part.fixed.size
@@ -110,12 +110,12 @@ def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
     rng, roots, open_nodes, warm = np.random.default_rng(6), [], short_search.OpenNodes, 0
     monkeypatch.setattr(short_search, "OpenNodes", lambda root: roots.append(root) or open_nodes(root))
     for packing in packings(6, 45):
-        linear, _, search = begun(packing)
+        linear = begun(packing)
         part = part_of(packing, rng, 1.0, 2)
         relaxed = linear.solve(columns=part.columns, slack=part.slack)
         if relaxed.status != OPTIMAL:
             continue
-        search.run(linear, part, np.inf, NO_LIMITS)
+        search_shortly(packing, linear, part, np.inf, NO_LIMITS)
         root = roots.pop()
         begin = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
         fixed = float(packing.weights[part.fixed].sum())
@@ -124,41 +124,13 @@ def test_it_begins_where_the_program_of_the_whole_is(monkeypatch):
     assert warm > 10
 
 
-def test_what_is_known_of_pairs_goes_to_the_next_search_and_is_added_to():
-    """By the numbers of the packing's own rows, wherever they are in what is left."""
-    rng, learnt = np.random.default_rng(7), 0
-    for packing in packings(10, 43):
-        linear, _, search = begun(packing)
-        search.run(linear, everything(packing), np.inf, NO_LIMITS)
-        gain, tried = search.gain.copy(), search.tried.copy()
-        if not tried.any():
-            continue
-        # a search without nodes leaves all as it was
-        part = part_of(packing, rng, 1.0, 2)
-        linear.back()
-        linear.solve(columns=part.columns, slack=part.slack)
-        search.run(linear, part, np.inf, NO_LIMITS._replace(nodes=0))
-        assert (search.gain == gain).all() and (search.tried == tried).all()
-        # pairs of rows that are gone stay as they were; others are added to where they belong
-        fresh = ShortSearch(packing)
-        fresh.run(linear, part, np.inf, NO_LIMITS)
-        _, first, second = np.nonzero(fresh.tried)
-        gone = np.unique(packing.cols[part.fixed])
-        assert not np.isin(first, gone).any() and not np.isin(second, gone).any()
-        together = np.zeros((packing.num_rows, packing.num_rows), dtype=bool)
-        for one in packing.cols:
-            rows = one[one >= 0]
-            together[np.ix_(rows, rows)] = True
-        assert together[first, second].all()
-        learnt += first.size
-    assert learnt
-
-
 def test_a_search_of_few_nodes_says_that_it_did_not_end():
     ended = []
     for packing in packings(8, 44):
-        linear, _, search = begun(packing)
+        linear = begun(packing)
         for nodes in (1, 100_000):
-            ended.append(search.run(linear, everything(packing), np.inf, NO_LIMITS._replace(nodes=nodes))[1])
+            ended.append(
+                search_shortly(packing, linear, everything(packing), np.inf, NO_LIMITS._replace(nodes=nodes))[1]
+            )
         assert ended[-1]
     assert not all(ended)

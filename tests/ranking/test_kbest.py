@@ -11,7 +11,7 @@ import assoc
 from assoc.costs import build_problem
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.packing.bounds.dual_ascent import dual_bound
-from assoc.packing.branching.leaves import begin_leaf
+from assoc.packing.branching.counts import begin_leaf
 from assoc.packing.run import Run
 from assoc.problem import AssignmentProblem
 from assoc.ranking import component_ranking, iterative_deepening

@@ -7,7 +7,7 @@ import pytest
 
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching import counts
-from assoc.packing.branching.leaves import begin_leaf
+from assoc.packing.branching.counts import begin_leaf
 from assoc.packing.branching.root import plain_root
 from assoc.packing.packing import assemble
 from assoc.ranking import component_ranking

@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import is_over
 from assoc._types import Floats
+from assoc.packing.branching.node import Work, knowing, new_work
+from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import MOST_ROWS, Root
 from assoc.packing.packing import Packing, PackingArrays
 from assoc.packing.simplex.basis import basis_of, primal_values
@@ -131,20 +133,33 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
     return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
 
 
-def are_whole(packing: Packing, primal: Floats) -> bool:
-    """Whether a linear program's solution has whole counts, so that there is nothing to split.
+def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None) -> tuple[OpenNodes, Work]:
+    """The open nodes of a leaf, which are its root alone, and room for its search.
 
     Parameters
     ----------
     packing : Packing
-    primal : float array, shape (N,)
-        How much of each column it takes.
+    leaf : Leaf
+    given_up : float
+        What the open nodes before say of nodes that were given up.
+    work : Work or None
+        The room of the search before, which is used again where it fits.
     """
-    values = _counts_of(packing).times @ primal
-    return bool((np.abs(values - np.round(values)) <= _WHOLE).all())
+    root, program = leaf.root, leaf.root.program
+    nodes = OpenNodes(root)
+    nodes.arrays.bound[0] = leaf.bound
+    nodes.given_up = given_up
+    if work is None or work.program.rows is not program.rows:
+        new = new_work(_with_counts(packing.arrays, program), program, root.slack)
+        if work is not None:
+            # what is known of pairs stays true
+            new = knowing(new, work.trials)
+        work = new
+    # the programs of one split differ in their right-hand sides alone
+    return nodes, work._replace(program=program)
 
 
-def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
+def _with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
     """The packing with the further columns of a program: they have no rows and weigh nothing."""
     more = program.weights.size - arrays.weights.size
     return arrays._replace(
@@ -153,14 +168,9 @@ def with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
     )
 
 
-def most_counts(packing: Packing) -> int:
-    """Counts at the most."""
-    return packing.num_sensors + 1
-
-
 def most_rows(packing: Packing) -> float:
     """Rows of a packing's program with all the cuts and counts that it may have."""
-    return MOST_ROWS * packing.num_rows + 2 * most_counts(packing)
+    return MOST_ROWS * packing.num_rows + 2 * (packing.num_sensors + 1)
 
 
 def _counts_of(packing: Packing) -> _Counts:

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from assoc._system.ahead import wait_for_kernels
 from assoc._system.clock import is_over
 from assoc._types import Floats
-from assoc.packing.branching.counts import Leaf, most_rows, split_on_counts
+from assoc.packing.branching.counts import Leaf, begin_leaf, most_rows, split_on_counts
 from assoc.packing.branching.depth_first import Limits, search_depth_first
-from assoc.packing.branching.leaves import begin_leaf
 from assoc.packing.branching.node import Work, new_work, work_memory
 from assoc.packing.branching.open_nodes import OpenNodes
 from assoc.packing.branching.root import plain_root, root_with_cuts
@@ -77,7 +76,6 @@ class BranchAndBound:
         to_the_end: bool = False,
         floor: float = -np.inf,
     ) -> None:
-        wait_for_kernels()
         self._packing = packing
         self.tolerance = tolerance
         self.weight = incumbent
@@ -150,6 +148,7 @@ class BranchAndBound:
         if not self._memory_allows(self._room()):
             self._open.give_up()
             return False
+        wait_for_kernels()
         root = self._root
         if self._to_the_end:
             root = root_with_cuts(self._packing, root.duals, self.weight - self.tolerance, self.deadline)

@@ -1,14 +1,9 @@
-"""A component of a packing with the best cover known, and the moves that improve covers.
-
-`NEIGHBOURHOODS` lists all moves and says how often each is tried.
-"""
+"""A component of a packing with the best cover known, and how covers are made and improved."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,45 +13,18 @@ from assoc.packing.bounds.priced import TOLERANCE, Priced
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.cover import Cover, chosen_columns, is_complete, weight_of
-from assoc.packing.neighbourhoods.dimensionwise import Dimensionwise
+from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.neighbourhoods.diving import Diver
 from assoc.packing.neighbourhoods.insertion import insert_and_eject, search_arrays
-from assoc.packing.neighbourhoods.neighbourhood import Neighbourhood
 from assoc.packing.neighbourhoods.random_cover import Trail, walk
 from assoc.packing.packing import PackingArrays
-from assoc.packing.run import Run
+from assoc.packing.run import Run, memory_allows
 
 Owner = NDArray[np.int32]
 
 
-class Move(NamedTuple):
-    """When a neighbourhood is tried, and how often.
-
-    Attributes
-    ----------
-    neighbourhood : type
-    on_new : callable
-        Tries on each new cover of a metaheuristic, from its parameter ``clusters``.
-    on_best : callable
-        Tries on the best cover after each iteration, from ``clusters`` and the number of rows.
-    at_once : int
-        Of those, tries between two looks at the gap and at the clock.
-    """
-
-    neighbourhood: type[Neighbourhood]
-    on_new: Callable[[int], int]
-    on_best: Callable[[int, int], int]
-    at_once: int = 1
-
-
-NEIGHBOURHOODS = (
-    # two halves of all tuples are matched anew, exactly
-    Move(Dimensionwise, on_new=lambda clusters: 1, on_best=lambda clusters, rows: 0),
-    # some twenty targets that lie close together are solved exactly
-    Move(ClusterSearch, lambda clusters: clusters, lambda clusters, rows: clusters * max(1, rows // 30), at_once=10),
-)
-"""The moves that improve covers, in the order in which they are tried. Insertion with ejection (insertion.py)
-is not among them: covers are built with it."""
+# cluster searches between two looks at the gap and at the clock
+_AT_ONCE = 10
 
 
 @dataclass(slots=True)
@@ -98,7 +66,7 @@ class Component(Priced):
     worker: int = 0
     iterations: int = 0
     stalled: int = 0
-    _searches: dict[type[Neighbourhood], Neighbourhood] = field(default_factory=dict)
+    _cluster_search: ClusterSearch | None = None
     _arrays: PackingArrays | None = None
     _diver: Diver | None = None
     _may_dive: bool = True
@@ -189,7 +157,8 @@ class Component(Priced):
     def dives(self) -> bool:
         """Whether covers are also built in the linear program."""
         if self._diver is None and self._may_dive:
-            self._may_dive = self.refinement == "full" and Diver.pays(self.packing)
+            pays = self.refinement == "full" and Diver.pays(self.packing)
+            self._may_dive = pays and memory_allows(Diver.memory(self.packing))
         return self._may_dive and not self.closed and not self.late
 
     def dive(self, number: int, rng: np.random.Generator, trail: Floats | None = None, beta: float = 1.0) -> Owner:
@@ -207,18 +176,24 @@ class Component(Priced):
         insert_and_eject(self.arrays, owner, np.arange(owner.size, dtype=np.int32), self.deadline)
         return owner
 
-    def improve(
-        self, owner: Owner, rng: np.random.Generator, clusters: int, moves: Sequence[Move] = NEIGHBOURHOODS
-    ) -> float:
-        """Improve a new cover in place by what the moves list for it; return its weight."""
+    def improve(self, owner: Owner, rng: np.random.Generator, clusters: int) -> float:
+        """Improve a new cover in place; return its weight."""
         weight = self.weight_of(owner)
-        if not self.is_complete(owner) or self.refinement == "none":
+        if self.refinement == "none" or not self.is_complete(owner) or self._has_nothing_to_gain(weight):
             return weight
-        for move in moves:
-            tries = move.on_new(clusters if self.refinement == "full" else 0)
-            if tries and weight - self.bound > self.tolerance and not self.late:
-                weight = self._search(move).improve(self, owner, weight, rng, tries, self.deadline)
-        return weight
+        improve_dimensionwise(self.packing, owner, self.deadline)
+        return self.search_clusters(owner, self.weight_of(owner), rng, clusters)
+
+    def search_clusters(self, owner: Owner, weight: float, rng: np.random.Generator, tries: int) -> float:
+        """Improve a complete cover of this weight in place by exact sub-steps (refinement full); return its weight."""
+        if self.refinement != "full" or not tries or self._has_nothing_to_gain(weight):
+            return weight
+        if self._cluster_search is None:
+            self._cluster_search = ClusterSearch(self)
+        return self._cluster_search.improve(self.packing, owner, weight, rng, tries, self.deadline)
+
+    def _has_nothing_to_gain(self, weight: float) -> bool:
+        return weight - self.bound <= self.tolerance or self.late
 
     def settle(self, owner: Owner, rng: np.random.Generator, clusters: int) -> float:
         """Improve a new cover in place and offer it; return its weight."""
@@ -227,21 +202,12 @@ class Component(Priced):
         return weight
 
     def refine(self, run: Run, clusters: int) -> None:
-        """Improve the best cover by the moves that `NEIGHBOURHOODS` lists for it."""
-        if self.best is None or self.refinement != "full":
-            return
-        for move in NEIGHBOURHOODS:
-            left = move.on_best(clusters, self.packing.num_rows)
-            while left > 0 and not self.closed and not run.should_stop():
-                tries = min(left, move.at_once)
-                self._search(move).improve(self, self.best, self.weight, run.rng, tries, self.deadline)
-                # summed anew: changes of the order of rounding would add up to an improvement that is none
-                self.weight = self.weight_of(self.best)
-                left -= move.at_once
-
-    def _search(self, move: Move) -> Neighbourhood:
-        """The neighbourhood of a move at work on this component."""
-        kind = move.neighbourhood
-        if kind not in self._searches:
-            self._searches[kind] = kind(self)
-        return self._searches[kind]
+        """Improve the best cover by exact sub-steps: so many for every 30 rows."""
+        left = clusters * max(1, self.packing.num_rows // 30)
+        while self.best is not None and self.refinement == "full" and left > 0:
+            if self.closed or run.should_stop():
+                return
+            self.search_clusters(self.best, self.weight, run.rng, min(left, _AT_ONCE))
+            # summed anew: changes of the order of rounding would add up to an improvement that is none
+            self.weight = self.weight_of(self.best)
+            left -= _AT_ONCE

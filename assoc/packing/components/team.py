@@ -66,7 +66,7 @@ class Team:
         for number, rng in enumerate(map(np.random.default_rng, seeds)):
             # a cover of its own, too: it is refined in place
             best = None if component.best is None else component.best.copy()
-            own = replace(component, best=best, worker=number, _searches={}, _diver=None)
+            own = replace(component, best=best, worker=number, _cluster_search=None, _diver=None)
             # a run of its own: the same clock, another generator
             aside = Run(rng, time_limit=run.time_limit, started=run.started, reserve=run.reserve)
             self._members.append((own, make(own, rng), aside))

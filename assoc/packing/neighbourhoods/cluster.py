@@ -27,7 +27,7 @@ from assoc.packing.bounds.priced import Priced, Prices
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.sorting import ascending, order_of
 from assoc.packing.neighbourhoods.cluster_optimum import ClusterColumns, Limits, Sweep, collect, depth_first, tighten
-from assoc.packing.packing import PackingArrays
+from assoc.packing.packing import Packing, PackingArrays
 
 _CAPACITY = 4000
 _REACH = 3.0
@@ -85,7 +85,7 @@ class ClusterSearch:
 
     def improve(
         self,
-        priced: Priced,
+        packing: Packing,
         owner: NDArray[np.int32],
         weight: float,
         rng: np.random.Generator,
@@ -93,7 +93,7 @@ class ClusterSearch:
         deadline: float = np.inf,
     ) -> float:
         """Improve a complete cover of this weight in place by some clusters; return its weight then."""
-        change, unfinished = self.search(priced.packing.arrays, owner, rng, tries, deadline)
+        change, unfinished = self.search(packing.arrays, owner, rng, tries, deadline)
         if unfinished > _TOO_LARGE:
             self.size = max(self.size - 6, min(_LEAST, self._most))
         elif change == 0.0:

@@ -21,47 +21,16 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import inner_njit, njit
-from assoc._types import Floats
-from assoc.packing.bounds.priced import Priced
 from assoc.packing.kernels.columns import first_row
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.matching import match_sparse
-from assoc.packing.neighbourhoods.cover import own, weight_of
+from assoc.packing.neighbourhoods.cover import own
 from assoc.packing.packing import Packing, PackingArrays
 
 _MOST_SPLITS_FOR = 6
-# rounds
-_NO_LIMIT = int(np.iinfo(np.int64).max)
 
 
-class Dimensionwise:
-    """The dimensionwise search of one component: every try goes on until no split improves."""
-
-    def __init__(self, priced: Priced) -> None:
-        self._splits = splits(priced.packing.cols.shape[1])
-
-    def improve(
-        self,
-        priced: Priced,
-        owner: NDArray[np.int32],
-        weight: float,
-        rng: np.random.Generator,
-        tries: int,
-        deadline: float = np.inf,
-    ) -> float:
-        """Improve a complete cover of this weight in place; return its weight then."""
-        _improve(priced.packing.arrays, owner, self._splits, _NO_LIMIT, deadline)
-        return weight_of(priced.packing, owner)
-
-
-def improve(
-    packing: Packing,
-    owner: NDArray[np.int32],
-    weights: Floats | None = None,
-    *,
-    rounds: int | None = None,
-    deadline: float = np.inf,
-) -> float:
+def improve_dimensionwise(packing: Packing, owner: NDArray[np.int32], deadline: float = np.inf) -> float:
     """Re-match halves until no split improves.
 
     Parameters
@@ -70,24 +39,15 @@ def improve(
         The problem, whole or one component.
     owner : int32 array, shape (R,)
         The chosen column of each row, or -1; every row without slack covered. Changed in place.
-    weights : float array, shape (N,), optional
-        Weights to search by instead of the packing's (noisy ones, say); the cover may then get worse by
-        the packing's own.
-    rounds : int, optional
-        Rounds over all splits at the most.
     deadline : float
         No split is begun after this (clock.py).
 
     Returns
     -------
     float
-        The change of total weight (<= 0), by ``weights``.
+        The change of weight (<= 0).
     """
-    arrays = packing.arrays
-    if weights is not None:
-        arrays = arrays._replace(weights=np.ascontiguousarray(weights, dtype=np.float64))
-    most = _NO_LIMIT if rounds is None else rounds
-    return float(_improve(arrays, owner, splits(packing.cols.shape[1]), most, deadline))
+    return float(_improve(packing.arrays, owner, splits(packing.cols.shape[1]), deadline))
 
 
 def splits(num_sensors: int) -> NDArray[np.int64]:
@@ -99,7 +59,7 @@ def splits(num_sensors: int) -> NDArray[np.int64]:
 
 
 @njit
-def _improve(packing: PackingArrays, owner: Any, masks: Any, rounds: int, deadline: float) -> float:
+def _improve(packing: PackingArrays, owner: Any, masks: Any, deadline: float) -> float:
     """Re-match by one split after the other; the change of weight."""
     cols, slack, row_ptr, row_cols = packing.cols, packing.slack, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
@@ -116,9 +76,9 @@ def _improve(packing: PackingArrays, owner: Any, masks: Any, rounds: int, deadli
             must |= 1 << sensor[r]
     everything = (1 << num_sensors) - 1
     total = 0.0
-    quiet, at, done = 0, 0, 0
+    quiet, at = 0, 0
     timed = deadline < np.inf
-    while quiet < masks.size and done < rounds * masks.size and not (timed and now() > deadline):
+    while quiet < masks.size and not (timed and now() > deadline):
         mask = masks[at]
         if must & mask == 0:
             mask = everything & ~mask
@@ -126,7 +86,6 @@ def _improve(packing: PackingArrays, owner: Any, masks: Any, rounds: int, deadli
         total += change
         quiet = 1 if change < 0.0 else quiet + 1
         at = (at + 1) % masks.size
-        done += 1
     return total
 
 

@@ -11,12 +11,7 @@ before it cost, and what is left can still bring. The first choices cost next to
 The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
 the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
 cover, and branch and bound (branching/short_search.py) covers what is left, as a problem of its own. The share grows
-while these searches end early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to
-dive.
-
-Where the program mixes solutions of different kinds (branching/counts.py), dives end in whichever kind fits what they
-fixed first, and hardly ever in another. So after some dives every second one begins in a part of the solutions, one
-after the other: those with at most so many triples, say, and those with more.
+while these searches end early, and shrinks when they do not end at all.
 
 References
 ----------
@@ -26,22 +21,18 @@ INFORMS Journal on Computing 11 (1999), 358-369 (ants guided by bounds).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from assoc._system.clock import is_over, now
+from assoc._system.clock import is_over
 from assoc._types import Floats
 from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced
-from assoc.packing.branching.counts import are_whole, most_counts, split_on_counts
 from assoc.packing.branching.depth_first import Limits
-from assoc.packing.branching.root import MOST_ROWS, Root, root_with_cuts
-from assoc.packing.branching.short_search import Part, ShortSearch
+from assoc.packing.branching.root import MOST_ROWS, root_with_cuts
+from assoc.packing.branching.short_search import Part, search_shortly, short_memory
 from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing
-from assoc.packing.run import memory_allows
 from assoc.packing.simplex.basis import basis_of
 from assoc.packing.simplex.cuts import with_cuts
 from assoc.packing.simplex.dual import OPTIMAL, STOPPED
@@ -63,19 +54,8 @@ _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
 # nodes of one such search
 _NODES = 24
-# dives before the first one that begins in a part of the solutions: a split is judged by the best cover
-_BEFORE_PARTS = 8
-# share of the time left that such a split may take: where programs are large it is long
-_SPLIT = 0.3
 # values this near to 0 and 1 are whole
 _WHOLE = 1e-6
-
-
-class _Start(NamedTuple):
-    """A linear program, marked where it is solved."""
-
-    program: LinearProgram
-    relaxed: Relaxation
 
 
 class Diver:
@@ -108,10 +88,11 @@ class Diver:
             reduced = priced.reduced if is_over(deadline) else self._reduced_costs(priced.duals)
             if reduced[~near].min(initial=0.0) >= -priced.tolerance:
                 break
-        self._all = self._start(self._root, deadline)
-        self._search = ShortSearch(self._core)
-        self._parts: list[_Start] = []
-        self._dives = 0
+        root = self._root
+        basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
+        self._program = LinearProgram.extended(self._core, root.program, root.slack, basis)
+        self._relaxed = self._program.solve(deadline=deadline)
+        self._program.mark()
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
@@ -132,23 +113,18 @@ class Diver:
         reduced[below] = all_reduced_costs(program, extended)
         return reduced
 
-    def _start(self, root: Root, deadline: float) -> _Start:
-        """Solve the program of a root."""
-        basis = basis_of(root.program, all_allowed(root.program, root.slack), root.variable, root.duals)
-        program = LinearProgram.extended(self._core, root.program, root.slack, basis)
-        relaxed = program.solve(deadline=deadline)
-        program.mark()
-        return _Start(program, relaxed)
-
     @staticmethod
     def pays(packing: Packing) -> bool:
-        """Whether a component has a size for dives, and there is memory for its program."""
-        if not _LEAST <= packing.num_rows <= _MOST:
-            return False
+        """Whether a component has a size for dives."""
+        return _LEAST <= packing.num_rows <= _MOST
+
+    @staticmethod
+    def memory(packing: Packing) -> float:
+        """Bytes that dives in a component take."""
         rows = MOST_ROWS * packing.num_rows
         # with the mark of its root
         program = 2.0 * LinearProgram.memory(packing, int(rows) - packing.num_rows)
-        return memory_allows(program + ShortSearch.memory(packing, rows))
+        return program + short_memory(packing, rows)
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
@@ -167,9 +143,8 @@ class Diver:
         deadline : float
             When time is over (clock.py).
         """
-        start = self._next_start(cutoff, deadline)
-        start.program.back()
-        at = _Descent(self._core, start.program, start.relaxed, cutoff)
+        self._program.back()
+        at = _Descent(self._core, self._program, self._relaxed, cutoff)
         left = self.share * self._core.num_rows
         while at.open_rows > left and at.relaxed.status == OPTIMAL:
             columns = at.open_columns()
@@ -178,38 +153,11 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-        found, done = at.completed(self._search, Limits(self._tolerance, np.inf, _NODES, deadline))
+        found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline))
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         own_all(self._packing.arrays.cols, self._core.origin[found], owner)
         return owner
-
-    def _next_start(self, cutoff: float, deadline: float) -> _Start:
-        """Where a dive begins: by turns in the program of all solutions and in those of its parts."""
-        if self._dives == _BEFORE_PARTS:
-            self._parts = self._split(cutoff, deadline)
-        self._parts = [part for part in self._parts if part.relaxed.bound < cutoff]
-        turn, whole = divmod(self._dives, 2)
-        self._dives += 1
-        return self._all if whole or not self._parts else self._parts[turn % len(self._parts)]
-
-    def _split(self, cutoff: float, deadline: float) -> list[_Start]:
-        """The programs of the parts of the solutions, where a split on counts pays and there is memory for them."""
-        core, relaxed, root = self._core, self._all.relaxed, self._root
-        each = 2.0 * LinearProgram.memory(core, root.slack.size + 2 * most_counts(core) - core.num_rows)
-        if relaxed.status != OPTIMAL or are_whole(core, relaxed.primal) or not memory_allows(each):
-            return []
-        leaves = split_on_counts(core, root, cutoff, cutoff, now() + _SPLIT * (deadline - now()))
-        # without rows of counts there is but the program of all solutions
-        leaves = [leaf for leaf in leaves if leaf.root.slack.size > root.slack.size]
-        if not memory_allows(each * len(leaves)):
-            return []
-        parts: list[_Start] = []
-        for leaf in leaves:
-            if is_over(deadline):
-                break
-            parts.append(self._start(leaf.root, deadline))
-        return parts
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -291,7 +239,7 @@ class _Descent:
         """Columns that are fixed."""
         return np.array(self._fixed, dtype=np.int64)
 
-    def completed(self, search: ShortSearch, limits: Limits) -> tuple[NDArray[np.int64], bool]:
+    def completed(self, limits: Limits) -> tuple[NDArray[np.int64], bool]:
         """Search a cover lighter than the cutoff with what is fixed; what is fixed alone where none was found.
 
         And whether the search came to its end.
@@ -299,5 +247,6 @@ class _Descent:
         relaxed = self.relaxed
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
         slack = self._packing.slack & ~self._covered
-        found, done = search.run(self._program, Part(columns, slack, self.fixed), self._cutoff, limits)
+        part = Part(columns, slack, self.fixed)
+        found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits)
         return (found if found.size else self.fixed), done

@@ -34,7 +34,7 @@ from assoc.packing.branching.feasibility import infeasible
 from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.neighbourhoods.cover import Cover
-from assoc.packing.neighbourhoods.dimensionwise import improve
+from assoc.packing.neighbourhoods.dimensionwise import improve_dimensionwise
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.lagrangian.arranged import arrange
@@ -212,7 +212,7 @@ class Subgradient:
             if self._gap_closed() or self.run.should_stop():
                 return
         cover.improve(self.run.deadline())
-        improve(self.packing, cover.owner, deadline=self.run.deadline())
+        improve_dimensionwise(self.packing, cover.owner, self.run.deadline())
         self._offer(cover)
 
     def _offer(self, cover: Cover) -> bool:

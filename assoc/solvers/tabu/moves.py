@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from assoc._system.clock import now
 from assoc._system.compiled import njit
-from assoc.packing.components.component import NEIGHBOURHOODS, Component
+from assoc.packing.components.component import Component
 from assoc.packing.kernels.columns import first_row, fits
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.neighbourhoods.cover import Cover
@@ -76,9 +76,8 @@ class TabuSearch:
         self.clock = _moves(component.arrays, self.owner, best, self.until, rules, rng, component.deadline)
         weight = component.improve(best, rng, 0)
         component.offer(best, weight)
-        if not component.closed:
-            # halves are matched already
-            weight = component.improve(best, rng, p.clusters, NEIGHBOURHOODS[1:])
+        if component.is_complete(best):
+            weight = component.search_clusters(best, weight, rng, p.clusters)
             if component.offer(best, weight):
                 self.owner = best
 
