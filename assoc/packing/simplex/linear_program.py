@@ -88,7 +88,7 @@ class LinearProgram:
         self.program = program_of(packing.arrays)
         self.slack = packing.slack
         self.basis: Basis = new_basis(self.program)
-        self._marked: dict[int, Basis] = {}
+        self._marked: Basis | None = None
         self._begun = False
 
     @classmethod
@@ -106,7 +106,7 @@ class LinearProgram:
         """
         self = cls.__new__(cls)
         self._packing, self.program, self.slack, self.basis = packing, program, slack, basis
-        self._marked, self._begun = {}, True
+        self._marked, self._begun = None, True
         return self
 
     @staticmethod
@@ -169,16 +169,16 @@ class LinearProgram:
         primal, reduced = primal[: packing.num_columns], all_reduced_costs(program, found)[: packing.num_columns]
         return Relaxation(status, np.inf if bound >= limit else bound, found, reduced, primal, done)
 
-    def mark(self, number: int = 0) -> None:
-        """Remember the basis, for `back`; takes as much memory again for each number."""
-        if number not in self._marked:
-            self._marked[number] = new_basis(self.program)
-        copy_basis(self.basis, self._marked[number])
+    def mark(self) -> None:
+        """Remember the basis, for `back`; takes as much memory again."""
+        if self._marked is None:
+            self._marked = new_basis(self.program)
+        copy_basis(self.basis, self._marked)
 
-    def back(self, number: int = 0) -> None:
-        """Return to the basis that was marked with this number."""
-        assert number in self._marked, "nothing was marked"
-        copy_basis(self._marked[number], self.basis)
+    def back(self) -> None:
+        """Return to the basis that was marked."""
+        assert self._marked is not None, "nothing was marked"
+        copy_basis(self._marked, self.basis)
 
     def _from_duals(self, allowed: Allowed, duals: Floats, effort: Effort) -> Any:
         """Solve from multipliers: first with the columns of small reduced cost, then with those that this leaves out.
