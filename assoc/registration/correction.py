@@ -1,4 +1,4 @@
-"""Measurements freed of biases, or given them: of one sensor, of a scene."""
+"""Biases taken off measurements, or added: of one sensor, of a scene."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from assoc.sensors import BearingSensor, PositionSensor, Sensor
 from assoc.sensors.base import wrap_angle
 
 
-def own_biases(terms: Sequence[Term], biases: Array, sensor: int) -> dict[str, float]:
+def sensor_biases(terms: Sequence[Term], biases: Array, sensor: int) -> dict[str, float]:
     """Biases of one sensor by component."""
     pairs = zip(terms, biases.tolist(), strict=True)
     return {term.component: value for term, value in pairs if term.sensor == sensor}
 
 
 def corrected_sensor(sensor: Sensor, biases: Mapping[str, float]) -> Sensor:
-    """The sensor at its true place; one that reports positions stays where it is."""
+    """The sensor at its true position; a `PositionSensor` stays unchanged."""
     if isinstance(sensor, PositionSensor):
         return sensor
     offset = np.array([biases.get(axis, 0.0) for axis in AXES])
@@ -37,9 +37,9 @@ def corrected_measurements(
     biases: Mapping[str, float],
     velocities: Array | None = None,
     late: Array | float = 0.0,
-    places: Array | None = None,
+    positions: Array | None = None,
 ) -> Array:
-    """Measurements without the sensor's biases, and at the time at which they are wanted.
+    """Measurements without the sensor's biases, moved to the time wanted.
 
     Parameters
     ----------
@@ -48,11 +48,11 @@ def corrected_measurements(
     biases : mapping of component to value
         Metres, radians, seconds.
     velocities : array (n, 3), optional
-        Of the targets, m/s; NaN where they are not known: the clock's bias is then left in.
+        Of the targets, m/s; NaN where unknown: the clock's bias then stays.
     late : array (n,) or float
-        By how much a measurement's own time is before the time wanted, seconds.
-    places : array (n, 3), optional
-        Where the targets are at the time wanted, metres: a bearing does not tell, and stays of its own time without.
+        Time wanted less time of each measurement, seconds.
+    positions : array (n, 3), optional
+        Of the targets at the time wanted, metres; without them bearings are not moved.
 
     Returns
     -------
@@ -66,15 +66,15 @@ def corrected_measurements(
             z[:, i] = wrap_angle(z[:, i])
     shift = np.broadcast_to(np.asarray(late, dtype=np.float64) + biases.get("time", 0.0), (len(z),))
     blind = isinstance(sensor, BearingSensor)
-    if velocities is None or not len(z) or not shift.any() or (blind and places is None):
+    if velocities is None or not len(z) or not shift.any() or (blind and positions is None):
         return z
     known = ~np.isnan(velocities[:, 0]) & (shift != 0.0)
     if known.any():
         located = corrected_sensor(sensor, biases).position_part
         d = located.dim
         path = shift[known, None] * velocities[known]
-        if blind and places is not None:
-            there = places[known]
+        if blind and positions is not None:
+            there = positions[known]
             here = there - path
         else:
             here = pointed_at(located, z[known, :d])
@@ -89,7 +89,7 @@ def corrected_measurements(
 
 
 def pointed_at(sensor: Sensor, z: Array) -> Array:
-    """Positions (n, 3) that measurements point at; on the sensor's own height where they leave it open."""
+    """Positions (n, 3) that measurements point at; at the sensor's height where they leave it open."""
     if isinstance(sensor, PositionSensor):
         heights = z[:, 2] if sensor.dim == 3 else np.zeros(len(z))
         return np.stack([z[:, 0], z[:, 1], heights], axis=1)
@@ -101,13 +101,13 @@ def pointed_at(sensor: Sensor, z: Array) -> Array:
 
 @door
 def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
-    """Give the measurements of a scene biases, for experiments and tests; those of clocks are not known here.
+    """Add biases to the measurements of a scene, for experiments and tests; clocks have none here.
 
     Parameters
     ----------
     scene : Scene
     biases : sequence over sensors of mappings of component to value
-        range, azimuth, elevation, and x, y, z of the stated place; metres and radians.
+        range, azimuth, elevation, and x, y, z of the stated position; metres and radians.
 
     Returns
     -------
@@ -116,39 +116,32 @@ def with_biases(scene: Scene, biases: Sequence[Mapping[str, float]]) -> Scene:
     Raises
     ------
     InvalidInputError
-        There is not one mapping for each sensor, or one has what its sensor does not measure.
+        The number of mappings is wrong, or one names what its sensor does not measure.
     """
     count = len(scene.sensors)
     if len(biases) != count:
         raise InvalidInputError(f"biases: expected one mapping for each of {count} sensors, got {len(biases)}")
-    for s, (sensor, own) in enumerate(zip(scene.sensors, biases, strict=True)):
+    for s, (sensor, values) in enumerate(zip(scene.sensors, biases, strict=True)):
         known = (*AXES, *sensor.components[: sensor.dim])
-        for name, value in own.items():
+        for name, value in values.items():
             if name not in known or not is_number(value):
                 raise InvalidInputError(
                     f"biases of sensor {s}: expected numbers for any of {', '.join(dict.fromkeys(known))}, "
                     f"got {name!r}: {value!r}"
                 )
-    negative = [{name: -value for name, value in own.items()} for own in biases]
-    return _changed(scene, negative, scene.name)
+    return without_biases(scene, [{name: -value for name, value in values.items()} for values in biases])
 
 
 def without_biases(
     scene: Scene, biases: Sequence[Mapping[str, float]], velocities: Sequence[Sequence[Array]] | None = None
 ) -> Scene:
-    """Free the measurements of a scene of biases; see `with_biases`."""
-    return _changed(scene, biases, scene.name, velocities)
-
-
-def _changed(
-    scene: Scene, biases: Sequence[Mapping[str, float]], name: str, velocities: Sequence[Sequence[Array]] | None = None
-) -> Scene:
-    sensors = [corrected_sensor(sensor, own) for sensor, own in zip(scene.sensors, biases, strict=True)]
+    """Take biases off the measurements of a scene; see `with_biases`."""
+    sensors = [corrected_sensor(sensor, values) for sensor, values in zip(scene.sensors, biases, strict=True)]
     measurements = [
         [
-            corrected_measurements(sensor, z, own, None if velocities is None else velocities[k][s])
-            for s, (sensor, z, own) in enumerate(zip(scene.sensors, scan, biases, strict=True))
+            corrected_measurements(sensor, z, values, None if velocities is None else velocities[k][s])
+            for s, (sensor, z, values) in enumerate(zip(scene.sensors, scan, biases, strict=True))
         ]
         for k, scan in enumerate(scene.measurements)
     ]
-    return replace(scene, sensors=sensors, measurements=measurements, name=name)
+    return replace(scene, sensors=sensors, measurements=measurements)

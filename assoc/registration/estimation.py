@@ -1,4 +1,4 @@
-"""Biases from looks of several sensors: associate, estimate, and again, with gates that close in on the truth."""
+"""Biases from epochs of several sensors: associate, estimate, and again, with gates that close in on the truth."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.arrays import sensor_arrays
 from assoc.costs.gating import chi_square_quantiles
-from assoc.registration.correction import own_biases
+from assoc.registration.correction import sensor_biases
 from assoc.registration.normal_equations import NormalEquations, normal_equations
 from assoc.registration.pairing import (
     Chosen,
-    Looks,
+    Epoch,
     choose_tuples,
     corrected_scene,
-    places_of,
     tuple_arrays,
     widened,
 )
@@ -26,12 +26,12 @@ from assoc.scene.scene import Scene
 from assoc.sensors import Sensor
 
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.05, 0.0, 0.0, 0.0)
-"""How much of the spread the gates still allow for in each round of association and estimation."""
+"""Share of the spread by which gates are widened in each round of association and estimation."""
 
 _STEPS = 4
 # the widest tuples that count fully
 _LIMIT = 0.95
-# rounds with wide gates need no more plots than this
+# rounds with wide gates use about so many plots
 _EARLY_PLOTS = 4_000
 
 
@@ -44,7 +44,7 @@ class Estimate:
     biases : array (n,)
     covariance : array (n, n)
     information : array (n, n)
-        What the measurements alone tell.
+        That of the measurements alone.
     chosen : Chosen
         The tuples of the last round.
     """
@@ -57,7 +57,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is estimated from what: sensors, biases with their prior, measurements."""
+    """Sensors, the biases to estimate, and their prior."""
 
     sensors: tuple[Sensor, ...]
     terms: tuple[Term, ...]
@@ -65,33 +65,33 @@ class Problem:
     region: Array
     parameters: RegistrationParameters
 
-    def scene(self, looks: Sequence[Looks], biases: Array) -> Scene:
-        """The looks without these biases."""
-        return corrected_scene(self.sensors, looks, self.terms, biases, self.region)
+    def scene(self, epochs: Sequence[Epoch], biases: Array) -> Scene:
+        """The epochs without these biases."""
+        return corrected_scene(self.sensors, epochs, self.terms, biases, self.region)
 
     def equations(
-        self, looks: Sequence[Looks], chosen: Chosen, biases: Array, noise: Scene | None = None
+        self, epochs: Sequence[Epoch], chosen: Chosen, biases: Array, noise: Scene | None = None
     ) -> NormalEquations:
         """Normal equations of chosen tuples around biases, with the sensors' own noise or that of another scene."""
         limits = chi_square_quantiles(_LIMIT, 3 * len(self.sensors))
-        scene = self.scene(looks, biases)
-        clocks = np.array([own_biases(self.terms, biases, s).get("time", 0.0) for s in range(len(self.sensors))])
-        tuples = tuple_arrays(scene, looks, chosen, clocks)
-        places = places_of(scene.sensors)
+        scene = self.scene(epochs, biases)
+        clocks = np.array([sensor_biases(self.terms, biases, s).get("time", 0.0) for s in range(len(self.sensors))])
+        tuples = tuple_arrays(scene, epochs, chosen, clocks)
+        sensors = sensor_arrays(scene)
         if noise is not None:
-            places = places._replace(weight=places_of(noise.sensors).weight)
-        return normal_equations(places, tuples, term_arrays(self.terms, self.sensors), limits)
+            sensors = sensors._replace(weight=sensor_arrays(noise).weight)
+        return normal_equations(sensors, tuples, term_arrays(self.terms, self.sensors), limits)
 
 
-def estimate(problem: Problem, looks: Sequence[Looks], start: Estimate | None = None) -> Estimate:
+def estimate(problem: Problem, epochs: Sequence[Epoch], start: Estimate | None = None) -> Estimate:
     """Find the biases.
 
     Parameters
     ----------
     problem : Problem
-    looks : sequence of Looks
+    epochs : sequence of Epoch
     start : Estimate, optional
-        What is known; without it biases are taken for zero, give or take their spreads.
+        The estimate so far; without it biases are zero, with their spreads as standard deviations.
 
     Returns
     -------
@@ -100,10 +100,10 @@ def estimate(problem: Problem, looks: Sequence[Looks], start: Estimate | None = 
     n = len(problem.terms)
     biases = np.zeros(n) if start is None else start.biases
     covariance = np.diag(problem.spreads**2) if start is None else start.covariance
-    sample = _sample(looks)
+    sample = _sample(epochs)
     first, found = np.sqrt(np.diagonal(covariance)), None
     for share in SHARES:
-        used = sample if share > 0.0 else looks
+        used = sample if share > 0.0 else epochs
         left = share * first if share > 0.0 else np.sqrt(np.diagonal(covariance))
         wide = widened(problem.scene(used, biases), problem.terms, left)
         chosen = choose_tuples(wide, problem.parameters)
@@ -114,24 +114,24 @@ def estimate(problem: Problem, looks: Sequence[Looks], start: Estimate | None = 
     return found
 
 
-def _sample(looks: Sequence[Looks]) -> Sequence[Looks]:
-    """Every so many looks, as long as they have plots enough."""
-    plots = sum(len(z) for one in looks for z in one.measurements)
-    return looks[:: max(1, plots // _EARLY_PLOTS)]
+def _sample(epochs: Sequence[Epoch]) -> Sequence[Epoch]:
+    """Every k-th epoch, k as large as enough plots remain."""
+    plots = sum(len(z) for epoch in epochs for z in epoch.measurements)
+    return epochs[:: max(1, plots // _EARLY_PLOTS)]
 
 
 def _solve(
-    problem: Problem, looks: Sequence[Looks], chosen: Chosen, biases: Array, noise: Scene | None
+    problem: Problem, epochs: Sequence[Epoch], chosen: Chosen, biases: Array, noise: Scene | None
 ) -> tuple[Array, Array, Array]:
     """Gauss-Newton on fixed tuples: biases, their covariance, and the information of the measurements."""
     prior = np.diag(problem.spreads**-2.0)
     for step in range(_STEPS):
-        sums = problem.equations(looks, chosen, biases, noise)
+        sums = problem.equations(epochs, chosen, biases, noise)
         inverse = np.linalg.inv(sums.information + prior)
         change = inverse @ (sums.gradient - prior @ biases)
         biases = biases + change
         if step and (np.abs(change) < 1e-3 * np.sqrt(np.diagonal(inverse))).all():
             break
-    # the sandwich: right also where the noise is not what the sensors say
+    # the sandwich estimator holds even if the sensors' stated noise is wrong
     covariance = inverse @ (sums.scatter + prior) @ inverse
     return biases, 0.5 * (covariance + covariance.T), sums.information

@@ -1,10 +1,10 @@
-"""What tuples say of biases: normal equations from which the targets' positions are eliminated, compiled.
+"""Normal equations of biases, from which the targets' positions are eliminated, compiled.
 
-A measurement is z = h(p) + B b + noise, with p the target's position and b the biases; B is one for a component's own
-bias, H for that of the sensor's place, and -H v for that of its clock, with H = dh/dp and v the target's velocity. Each
-tuple has a position of its own, of which nothing else is known. Eliminated from the least squares (Schur complement) it
-leaves the weight W = R^-1 - R^-1 H (H' R^-1 H)^-1 H' R^-1 on the residuals of the tuple: what all targets say
-together of the biases is the sum of B' W B and B' W nu. A bias that another position explains as well gets nothing.
+A measurement is z = h(p) + B b + noise, with p the target's position and b the biases; B is 1 for a component's own
+bias, H for that of the sensor's position, and -H v for that of its clock, with H = dh/dp and v the target's velocity.
+Each tuple has an unknown position. Eliminating it from the least squares (Schur complement) leaves the weight
+W = R^-1 - R^-1 H (H' R^-1 H)^-1 H' R^-1 on the residuals of the tuple; the information of all targets on the biases is
+the sum of B' W B and B' W nu. Biases that another position explains as well get no information.
 """
 
 from __future__ import annotations
@@ -14,49 +14,37 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assoc._system.compiled import njit
+from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
+from assoc.costs.arrays import SensorArrays
 from assoc.costs.symmetric import inverse
 from assoc.registration.terms import MEASURED, PLACE, TermArrays
 from assoc.sensors.codes import BEARING, POSITION
 from assoc.sensors.kernels.dispatch import linearise, wrap
 
 
-class Places(NamedTuple):
-    """The S sensors as kernels take them."""
-
-    code: Array
-    """Kind of each, int64 (S,); see `assoc.sensors.codes`."""
-    dim: Array
-    """Components of a measurement, int64 (S,)."""
-    place: Array
-    """(S, 3), metres."""
-    weight: Array
-    """Inverse measurement covariances padded with zeros, (S, 3, 3)."""
-
-
 class Tuples(NamedTuple):
-    """T tuples of measurements that are taken for one target each."""
+    """T tuples of measurements, each taken for one target."""
 
     z: Array
     """Measurements, corrected by the biases known so far, (T, S, 3)."""
     seen: Array
     """Which sensors measured it, bool (T, S)."""
     at: Array
-    """Where the target is, near enough to linearise, (T, 3), metres."""
+    """Position of the target, near enough to linearise, (T, 3), metres."""
     velocity: Array
-    """Its velocity, (T, 3), m/s; NaN where it is not known: the tuple then says nothing of clocks."""
+    """Its velocity, (T, 3), m/s; NaN where unknown: the tuple then has no information on clocks."""
 
 
 class NormalEquations(NamedTuple):
-    """What T tuples say of n biases."""
+    """Normal equations of n biases from T tuples."""
 
     information: Array
     """Sum of w B' W B, (n, n)."""
     gradient: Array
     """Sum of w B' W nu, (n,)."""
     scatter: Array
-    """Sum of the outer products of the tuples' gradients, (n, n): for a covariance that holds whatever the noise."""
+    """Sum of the outer products of the tuples' gradients, (n, n), for a covariance that holds for any noise."""
     chi: Array
     """Chi-square value of each tuple at the position that fits it best, (T,)."""
     freedom: Array
@@ -65,7 +53,7 @@ class NormalEquations(NamedTuple):
     """Residuals there, (T, S, 3), NaN where nothing was measured."""
 
 
-@njit
+@inner_njit
 def _bias_column(kind: int, index: int, H: Array, v: Array, d: int, column: Array) -> None:
     """Write the derivative of a measurement by a bias into `column` (3,)."""
     column[:] = 0.0
@@ -78,59 +66,85 @@ def _bias_column(kind: int, index: int, H: Array, v: Array, d: int, column: Arra
             column[i] = -(H[i, 0] * v[0] + H[i, 1] * v[1] + H[i, 2] * v[2])
 
 
+@inner_njit
+def _linearise_tuple(
+    sensors: SensorArrays, z: Array, seen: Array, at: Array, H: Array, nu: Array, a: Array, u: Array
+) -> tuple[float, int]:
+    """Linearise the measurements of one tuple: H (S, 3, 3), residuals nu (S, 3), a = H' W H, u = H' W nu.
+
+    Returns nu' W nu and the degrees of freedom.
+    """
+    a[:], u[:] = 0.0, 0.0
+    h = np.empty(3)
+    squares, measured, tall = 0.0, 0, 0
+    for s in range(len(seen)):
+        if not seen[s]:
+            continue
+        code, d, W = sensors.code[s], sensors.dim[s], sensors.weight[s]
+        linearise(code, d, sensors.place[s], at[0], at[1], at[2], h, H[s])
+        for i in range(d):
+            nu[s, i] = z[s, i] - h[i]
+        wrap(code, nu[s])
+        measured += d
+        tall += 0 if code == BEARING or (code == POSITION and d == 2) else 1
+        for i in range(d):
+            for j in range(d):
+                squares += nu[s, i] * W[i, j] * nu[s, j]
+                for k in range(3):
+                    u[k] += H[s, i, k] * W[i, j] * nu[s, j]
+                    for m in range(3):
+                        a[k, m] += H[s, i, k] * W[i, j] * H[s, j, m]
+    return squares, max(measured - 3 if tall else measured - 2, 0)
+
+
+@inner_njit
+def _weigh_bias(W: Array, H: Array, d: int, column: Array, left: Array, WB: Array, Y: Array) -> float:
+    """Write W B and B' W H of one bias with derivatives `column`; return its gradient B' W left."""
+    pull = 0.0
+    for i in range(3):
+        WB[i], Y[i] = 0.0, 0.0
+    for i in range(d):
+        for k in range(d):
+            WB[i] += W[i, k] * column[k]
+    for i in range(d):
+        pull += WB[i] * left[i]
+        for k in range(3):
+            Y[k] += WB[i] * H[i, k]
+    return pull
+
+
 @njit
-def normal_equations(places: Places, tuples: Tuples, terms: TermArrays, limits: Array) -> NormalEquations:
-    """Sum up what tuples say of biases.
+def normal_equations(sensors: SensorArrays, tuples: Tuples, terms: TermArrays, limits: Array) -> NormalEquations:
+    """Sum up the information of tuples on biases.
 
     Parameters
     ----------
-    places : Places
+    sensors : SensorArrays
     tuples : Tuples
     terms : TermArrays
         The n biases.
     limits : array (3 S + 1,)
-        By degrees of freedom: chi-square values up to which a tuple counts fully; beyond, it counts limit / chi-square
-        of it, so that what is too wrong to be noise has no more say than what is at the limit.
+        By degrees of freedom: chi-square values up to which a tuple counts fully; above, its weight is
+        limit / chi-square, so that outliers count no more than a tuple at the limit.
 
     Returns
     -------
     NormalEquations
     """
-    total, count, n = len(tuples.z), len(places.dim), len(terms.sensor)
+    total, count, n = len(tuples.z), len(sensors.dim), len(terms.sensor)
     information, scatter, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     chi, freedom = np.zeros(total), np.zeros(total, np.int64)
     left = np.full((total, count, 3), np.nan)
-    h, columns = np.zeros(3), np.zeros((n, 3))
-    H, nu = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    WB, Y, own = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    columns, H, nu = np.zeros((n, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
+    WB, Y, pull = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
     a, u = np.zeros((3, 3)), np.zeros(3)
     for t in range(total):
-        a[:], u[:] = 0.0, 0.0
-        squares, measured, tall = 0.0, 0, 0
-        x, y, z = tuples.at[t, 0], tuples.at[t, 1], tuples.at[t, 2]
-        for s in range(count):
-            if not tuples.seen[t, s]:
-                continue
-            code, d = places.code[s], places.dim[s]
-            linearise(code, d, places.place[s], x, y, z, h, H[s])
-            for i in range(d):
-                nu[s, i] = tuples.z[t, s, i] - h[i]
-            wrap(code, nu[s])
-            measured += d
-            tall += 0 if code == BEARING or (code == POSITION and d == 2) else 1
-            W = places.weight[s]
-            for i in range(d):
-                for j in range(d):
-                    squares += nu[s, i] * W[i, j] * nu[s, j]
-                    for k in range(3):
-                        u[k] += H[s, i, k] * W[i, j] * nu[s, j]
-                        for m in range(3):
-                            a[k, m] += H[s, i, k] * W[i, j] * H[s, j, m]
-        # what no measurement tells of the position must not make the matrix singular, nor tell of biases
+        seen = tuples.seen[t]
+        squares, freedom[t] = _linearise_tuple(sensors, tuples.z[t], seen, tuples.at[t], H, nu, a, u)
+        # directions that no measurement determines must not make the matrix singular, nor add information
         least = 1e-12 * (a[0, 0] + a[1, 1] + a[2, 2])
         A = (a[0, 0] + least, a[0, 1], a[0, 2], a[1, 1] + least, a[1, 2], a[2, 2] + least)
         ok, c0, c1, c2, c3, c4, c5 = inverse(A)
-        freedom[t] = max(measured - 3 if tall else measured - 2, 0)
         if not ok or freedom[t] == 0:
             continue
         step = (
@@ -142,41 +156,31 @@ def normal_equations(places: Places, tuples: Tuples, terms: TermArrays, limits: 
         limit = limits[freedom[t]]
         share = 1.0 if chi[t] <= limit else limit / chi[t]
         for s in range(count):
-            if tuples.seen[t, s]:
-                for i in range(places.dim[s]):
+            if seen[s]:
+                for i in range(sensors.dim[s]):
                     moved = H[s, i, 0] * step[0] + H[s, i, 1] * step[1] + H[s, i, 2] * step[2]
                     left[t, s, i] = nu[s, i] - moved
         for j in range(n):
             s = terms.sensor[j]
-            own[j] = 0.0
-            if not tuples.seen[t, s]:
-                continue
-            d = places.dim[s]
-            _bias_column(terms.kind[j], terms.entry[j], H[s], tuples.velocity[t], d, columns[j])
-            for i in range(3):
-                WB[j, i], Y[j, i] = 0.0, 0.0
-            for i in range(d):
-                for k in range(d):
-                    WB[j, i] += places.weight[s, i, k] * columns[j, k]
-            for i in range(d):
-                own[j] += WB[j, i] * left[t, s, i]
-                for k in range(3):
-                    Y[j, k] += WB[j, i] * H[s, i, k]
+            if seen[s]:
+                d = sensors.dim[s]
+                _bias_column(terms.kind[j], terms.entry[j], H[s], tuples.velocity[t], d, columns[j])
+                pull[j] = _weigh_bias(sensors.weight[s], H[s], d, columns[j], left[t, s], WB[j], Y[j])
         for j in range(n):
             s = terms.sensor[j]
-            if not tuples.seen[t, s]:
+            if not seen[s]:
                 continue
-            gradient[j] += share * own[j]
+            gradient[j] += share * pull[j]
             p0 = c0 * Y[j, 0] + c1 * Y[j, 1] + c2 * Y[j, 2]
             p1 = c1 * Y[j, 0] + c3 * Y[j, 1] + c4 * Y[j, 2]
             p2 = c2 * Y[j, 0] + c4 * Y[j, 1] + c5 * Y[j, 2]
             for k in range(n):
-                if not tuples.seen[t, terms.sensor[k]]:
+                if not seen[terms.sensor[k]]:
                     continue
                 value = -(p0 * Y[k, 0] + p1 * Y[k, 1] + p2 * Y[k, 2])
                 if terms.sensor[k] == s:
-                    for i in range(places.dim[s]):
+                    for i in range(sensors.dim[s]):
                         value += WB[j, i] * columns[k, i]
                 information[j, k] += share * value
-                scatter[j, k] += share * share * own[j] * own[k]
+                scatter[j, k] += share * share * pull[j] * pull[k]
     return NormalEquations(information, gradient, scatter, chi, freedom, left)

@@ -1,4 +1,4 @@
-"""Which biases the measurements tell of, and which they leave open, by the information matrix.
+"""Which biases are observable, by the information matrix.
 
 References
 ----------
@@ -23,20 +23,20 @@ _MOST_NAMED = 4
 
 
 def observed_shares(information: Array, spreads: Array) -> Array:
-    """What is left of each bias's spread after the measurements, (n,): 1 is nothing learned, 0 is all."""
+    """Share of each bias's spread that is left after the measurements, (n,): 1 if they have no information on it."""
     scaled = information * np.outer(spreads, spreads)
     left: Array = np.sqrt(np.diagonal(np.linalg.inv(scaled + np.eye(len(spreads)))))
     return left
 
 
 def open_directions(information: Array, spreads: Array) -> Array:
-    """Sums of biases that the measurements do not tell, (m, n) with rows of length one, in spreads of each bias."""
+    """Sums of biases that are not observable, (m, n) with rows of length one, in spreads of each bias."""
     scaled = information * np.outer(spreads, spreads)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     found: Array = vectors[:, 1.0 / np.sqrt(1.0 + np.maximum(values, 0.0)) > OPEN].T
     if len(found) < 2:
         return found
-    # any mixture of open sums is open too: those that name few biases say most
+    # any combination of them is open too: those of few biases are easiest to read
     from scipy.linalg import qr
 
     _, upper, order = qr(found, pivoting=True)
@@ -47,7 +47,7 @@ def open_directions(information: Array, spreads: Array) -> Array:
 
 
 def describe(direction: Array, terms: Sequence[Term], sensors: Sequence[Sensor]) -> str:
-    """Say in words which biases move together in a direction that nothing tells of."""
+    """Name the biases that move together in a direction that is not observable."""
     order = np.argsort(-np.abs(direction), kind="stable")
     # the shift of very many sensors together has small parts only
     share = min(_SHARE, 0.5 * float(np.abs(direction).max()))

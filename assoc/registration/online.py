@@ -1,4 +1,4 @@
-"""Registration scan by scan, with biases that drift: what a live tracker corrects its measurements by."""
+"""Registration scan by scan, with biases that drift, for live trackers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.registration.correction import corrected_measurements, own_biases
+from assoc.registration.correction import corrected_measurements, sensor_biases
+from assoc.registration.epochs import epoch_of
 from assoc.registration.estimation import Estimate, estimate
-from assoc.registration.looks import one_look
-from assoc.registration.pairing import Chosen, Looks, choose_tuples, widened
+from assoc.registration.pairing import Chosen, Epoch, choose_tuples, widened
 from assoc.registration.parameters import RegistrationParameters
 from assoc.registration.register import make_problem
 from assoc.registration.result import is_significant
@@ -47,7 +47,7 @@ class OnlineRegistration:
     region : array_like (3, 2), optional
         See `assoc.Scene`.
     parameters : RegistrationParameters, optional
-        Clocks' biases cannot be found scan by scan and are refused; so are those of places, which correct the
+        Clocks' biases cannot be found scan by scan and are refused; so are those of positions, which correct the
         sensors and not the measurements.
     """
 
@@ -55,16 +55,16 @@ class OnlineRegistration:
         self, sensors: Sequence[Sensor], region: Array | None = None, parameters: RegistrationParameters | None = None
     ) -> None:
         self.parameters = parameters or RegistrationParameters()
-        for one in ("time", "position"):
-            if one in self.parameters.components:
-                raise InvalidInputError(f"components: {one!r} is not estimated online; register a recording for it")
+        for component in ("time", "position"):
+            if component in self.parameters.components:
+                raise InvalidInputError(f"components: {component!r} is not estimated online, register a recording")
         empty = [[np.zeros((0, sensor.dim)) for sensor in sensors if isinstance(sensor, Sensor)]]
-        place = Scene(sensors, np.zeros(1), empty, region)  # type: ignore[arg-type]
-        self._problem = make_problem(place, self.parameters)
+        scene = Scene(sensors, np.zeros(1), empty, region)  # type: ignore[arg-type]
+        self._problem = make_problem(scene, self.parameters)
         n = len(self._problem.terms)
-        nothing = Chosen(np.zeros(0, dtype=np.int64), np.zeros((0, len(place.sensors)), dtype=np.int64))
+        nothing = Chosen(np.zeros(0, dtype=np.int64), np.zeros((0, len(scene.sensors)), dtype=np.int64))
         self._now = Estimate(np.zeros(n), np.diag(self._problem.spreads**2), np.zeros((n, n)), nothing)
-        self._kept: tuple[Looks, ...] = ()
+        self._kept: tuple[Epoch, ...] = ()
         self._time: float | None = None
         self._scans = 0
 
@@ -99,12 +99,12 @@ class OnlineRegistration:
         if not self.significant:
             return list(measurements)
         return [
-            corrected_measurements(sensor, z, own_biases(self.terms, self.biases, s))
+            corrected_measurements(sensor, z, sensor_biases(self.terms, self.biases, s))
             for s, (sensor, z) in enumerate(zip(self.sensors, checked, strict=True))
         ]
 
     def after(self, time: float, measurements: Sequence[Array]) -> OnlineRegistration:
-        """What is known after one more scan; this object stays as it is.
+        """Return the registration after one more scan; this object stays unchanged.
 
         Parameters
         ----------
@@ -119,18 +119,18 @@ class OnlineRegistration:
             Measurements have the wrong shape, or are not finite.
         """
         later = copy.copy(self)
-        looks = one_look(Scan(self._scans, time, self._checked(measurements)))
+        epoch = epoch_of(Scan(self._scans, time, self._checked(measurements)))
         apart = 0.0 if self._time is None else max(time - self._time, 0.0)
         drift = (self.parameters.drift * self._problem.spreads) ** 2 * apart / HOUR
         later._now = replace(self._now, covariance=self._now.covariance + np.diag(drift))
         later._time, later._scans = time, self._scans + 1
         if later._scans > _MOST_KEPT:
-            later._now = later._corrected(looks)
+            later._now = later._corrected(epoch)
             return later
-        kept = (*self._kept, looks)
+        kept = (*self._kept, epoch)
         # together after 1, 2, 4, 8 ... scans
         together = later._scans & (later._scans - 1) == 0
-        later._now = estimate(self._problem, kept) if together else later._corrected(looks)
+        later._now = estimate(self._problem, kept) if together else later._corrected(epoch)
         later._kept = () if later._scans == _MOST_KEPT else kept
         return later
 
@@ -147,14 +147,14 @@ class OnlineRegistration:
             found.append(array)
         return tuple(found)
 
-    def _corrected(self, looks: Looks) -> Estimate:
+    def _corrected(self, epoch: Epoch) -> Estimate:
         """The biases after one more scan: one step of a filter in information form."""
         now, problem = self._now, self._problem
-        wide = widened(problem.scene([looks], now.biases), problem.terms, np.sqrt(np.diagonal(now.covariance)))
+        wide = widened(problem.scene([epoch], now.biases), problem.terms, np.sqrt(np.diagonal(now.covariance)))
         chosen = choose_tuples(wide, problem.parameters)
         if not len(chosen):
             return now
-        sums = problem.equations([looks], chosen, now.biases)
+        sums = problem.equations([epoch], chosen, now.biases)
         covariance = np.linalg.inv(np.linalg.inv(now.covariance) + sums.information)
         covariance = 0.5 * (covariance + covariance.T)
         found = now.biases + covariance @ sums.gradient
@@ -162,15 +162,15 @@ class OnlineRegistration:
 
     def arrays(self) -> dict[str, Array]:
         """The state as arrays; `restored` reads it."""
-        sizes = [[len(z) for z in looks.measurements] for looks in self._kept]
-        values = [np.asarray(z).ravel() for looks in self._kept for z in looks.measurements]
+        sizes = [[len(z) for z in epoch.measurements] for epoch in self._kept]
+        values = [np.asarray(z).ravel() for epoch in self._kept for z in epoch.measurements]
         state = {
             "biases": self.biases,
             "covariance": self.covariance,
             "information": self._now.information,
             "time": np.array(math.nan if self._time is None else self._time),
             "scans": np.array(self._scans),
-            "kept_times": np.array([looks.time for looks in self._kept]),
+            "kept_times": np.array([epoch.time for epoch in self._kept]),
             "kept_sizes": np.array(sizes, dtype=np.int64).reshape(-1, len(self._problem.sensors)),
             "kept_values": np.concatenate([np.zeros(0), *values]),
         }
@@ -184,32 +184,30 @@ class OnlineRegistration:
         InvalidInputError
             The arrays are of no such state.
         """
-        own = {name: arrays[f"{PREFIX}{name}"] for name in _STATE}
+        state = {name: arrays[f"{PREFIX}{name}"] for name in _STATE}
         n, sensors = len(self._problem.terms), self._problem.sensors
         shapes = {"biases": (n,), "covariance": (n, n), "information": (n, n), "time": (), "scans": ()}
-        shapes["kept_sizes"] = (len(own["kept_times"]), len(sensors))
+        shapes["kept_sizes"] = (len(state["kept_times"]), len(sensors))
         for name, shape in shapes.items():
-            if own[name].shape != shape:
-                raise InvalidInputError(f"the field '{PREFIX}{name}' has shape {own[name].shape}, expected {shape}")
-        dims = np.array([sensor.dim for sensor in sensors])
-        numbers = [own[name] for name in ("biases", "covariance", "information", "kept_times", "kept_values")]
-        sizes, scans = own["kept_sizes"], int(own["scans"])
-        good = all(np.isfinite(value).all() for value in numbers) and not math.isinf(float(own["time"]))
-        good &= bool((sizes >= 0).all()) and int((sizes.astype(object) * dims).sum()) == own["kept_values"].size
+            if state[name].shape != shape:
+                raise InvalidInputError(f"the field '{PREFIX}{name}' has shape {state[name].shape}, expected {shape}")
+        dims, covariance = np.array([sensor.dim for sensor in sensors]), state["covariance"]
+        numbers = [state[name] for name in ("biases", "covariance", "information", "kept_times", "kept_values")]
+        sizes, scans = state["kept_sizes"], int(state["scans"])
+        good = all(np.isfinite(value).all() for value in numbers) and not math.isinf(float(state["time"]))
+        good &= bool((sizes >= 0).all()) and int((sizes.astype(object) * dims).sum()) == state["kept_values"].size
         good &= len(sizes) == (scans if scans < _MOST_KEPT else 0) and scans >= 0
-        good &= bool((np.linalg.eigvalsh(0.5 * (own["covariance"] + own["covariance"].T)) > 0).all()) if good else False
+        good = good and bool((np.linalg.eigvalsh(0.5 * (covariance + covariance.T)) > 0).all())
         if not good:
-            raise InvalidInputError(f"the fields '{PREFIX}...' are no state of a registration")
+            raise InvalidInputError(f"the fields '{PREFIX}...' are not the state of a registration")
         later = copy.copy(self)
-        later._now = replace(
-            self._now, biases=own["biases"], covariance=own["covariance"], information=own["information"]
-        )
-        later._time = None if math.isnan(float(own["time"])) else float(own["time"])
+        later._now = replace(self._now, biases=state["biases"], covariance=covariance, information=state["information"])
+        later._time = None if math.isnan(float(state["time"])) else float(state["time"])
         later._scans = scans
-        blocks = np.split(own["kept_values"], np.cumsum((sizes * dims).ravel())[:-1]) if sizes.size else []
+        blocks = np.split(state["kept_values"], np.cumsum((sizes * dims).ravel())[:-1]) if sizes.size else []
         each = len(sensors)
         later._kept = tuple(
-            one_look(Scan(k, time, tuple(blocks[k * each + s].reshape(-1, dims[s]) for s in range(each))))
-            for k, time in enumerate(own["kept_times"].tolist())
+            epoch_of(Scan(k, time, tuple(blocks[k * each + s].reshape(-1, dims[s]) for s in range(each))))
+            for k, time in enumerate(state["kept_times"].tolist())
         )
         return later

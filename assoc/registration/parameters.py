@@ -1,4 +1,4 @@
-"""What registration may assume of the biases that it looks for."""
+"""Parameters of registration."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ COMPONENTS = ("range", "azimuth", "elevation", "time", "position")
 class RegistrationParameters(Parameters):
     """Which biases are estimated, and how large they may be.
 
-    Spreads are the standard deviations of biases before anything was measured: biases of up to about two of them are
-    found. Wider ones find larger biases, and confuse targets that fly closer together.
+    Spreads are prior standard deviations: biases of up to about two of them are found. Wider ones find larger biases,
+    and confuse targets that fly close together.
 
     Attributes
     ----------
     components : tuple of str
-        Of `COMPONENTS`; those that a sensor does not measure are passed over. "position" is an error of a sensor's
-        stated place; sensors that report positions are always estimated in x, y (and z).
+        Of `COMPONENTS`; those that a sensor does not measure are ignored. "position" is an error of a sensor's
+        stated position; sensors that report positions are always estimated in x, y (and z).
     reference : tuple of str
-        Names of sensors (where it has none: its number from 1) that are taken for free of bias.
+        Names of sensors without bias (or their numbers from 1).
     range_spread, angle_spread, time_spread, position_spread : float
         Metres, radians, seconds, metres.
     drift : float
-        Of biases while time goes on, only online: their change in an hour, as a share of their spread.
+        Only online: change of biases in an hour, as a share of their spread.
     max_tuples : int
         Scans with more candidate tuples are passed over.
     seed : int
@@ -51,12 +51,12 @@ class RegistrationParameters(Parameters):
         for name in ("components", "reference"):
             value = getattr(self, name)
             many = isinstance(value, Iterable) and not isinstance(value, str)
-            if not many or not all(isinstance(one, str) for one in value):
+            if not many or not all(isinstance(entry, str) for entry in value):
                 raise InvalidInputError(f"{name}: expected names, got {value!r}")
             object.__setattr__(self, name, tuple(value))
-        for one in self.components:
-            if one not in COMPONENTS:
-                raise InvalidInputError(f"components: unknown {one!r}; known: {', '.join(COMPONENTS)}")
+        for component in self.components:
+            if component not in COMPONENTS:
+                raise InvalidInputError(f"components: unknown {component!r}; known: {', '.join(COMPONENTS)}")
         self._number("range_spread", "angle_spread", "time_spread", "position_spread", above=0.0)
         self._number("drift", least=0.0)
         self._whole("max_tuples")

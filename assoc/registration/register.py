@@ -11,9 +11,9 @@ from assoc._system.door import door
 from assoc._system.interrupts import interruptible
 from assoc._types import Array
 from assoc.errors import InvalidInputError
+from assoc.registration.epochs import scene_epochs
 from assoc.registration.estimation import Estimate, Problem, estimate
-from assoc.registration.looks import scene_looks
-from assoc.registration.pairing import Looks
+from assoc.registration.pairing import Epoch
 from assoc.registration.parameters import RegistrationParameters
 from assoc.registration.result import Registration, Residuals, noise_factor
 from assoc.registration.terms import make_terms
@@ -25,16 +25,16 @@ from assoc.scene.scene import Scene
 def register(scene: Scene, parameters: RegistrationParameters | None = None, **values: Any) -> Registration:
     """Estimate the biases of the sensors of a scene from the targets that they have in common.
 
-    No truth is needed. Scans are associated with gates as wide as the biases may be, the biases are estimated from the
+    No truth is needed. Scans are associated with gates as wide as the biases may be, biases are estimated from the
     tuples found, and both again with narrower gates, until the gates are those of the noise. Tuples that do not fit
-    count little. Parameters that the measurements leave open are named, and stay near zero.
+    have little weight. Biases that are not observable are named, and stay near zero.
 
     Parameters
     ----------
     scene : Scene
     parameters : RegistrationParameters, optional
     **values
-        Fields of `RegistrationParameters`, in the place of those of `parameters`.
+        Fields of `RegistrationParameters`, in place of those of `parameters`.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def register(scene: Scene, parameters: RegistrationParameters | None = None, **v
     Raises
     ------
     InvalidInputError
-        A parameter is not as described, or a sensor is of a kind of the user's own.
+        A parameter is not as described, or a sensor is of a user's class.
 
     References
     ----------
@@ -56,26 +56,26 @@ def register(scene: Scene, parameters: RegistrationParameters | None = None, **v
     except TypeError as error:
         raise InvalidInputError(f"registration: {str(error).split('__init__() ')[-1]}") from None
     problem = make_problem(scene, chosen)
-    looks = scene_looks(scene, moving=any(term.component == "time" for term in problem.terms))
-    return result_of(problem, looks, estimate(problem, looks))
+    epochs = scene_epochs(scene, moving=any(term.component == "time" for term in problem.terms))
+    return result_of(problem, epochs, estimate(problem, epochs))
 
 
 def make_problem(scene: Scene, parameters: RegistrationParameters) -> Problem:
-    """Which biases of a scene's sensors are to be found, and how large they may be."""
+    """The biases of a scene's sensors, and their prior."""
     terms = make_terms(scene.sensors, parameters)
     spreads = np.array([parameters.spread(term.component) for term in terms])
     return Problem(tuple(scene.sensors), terms, spreads, scene.region, parameters)
 
 
-def result_of(problem: Problem, looks: list[Looks], found: Estimate) -> Registration:
-    """What was found, with the residuals of the same tuples before and after."""
+def result_of(problem: Problem, epochs: list[Epoch], found: Estimate) -> Registration:
+    """The result, with the residuals of the same tuples before and after."""
     left: list[Array] = []
     noise = 0.0
     for biases in (np.zeros(len(problem.terms)), found.biases):
-        sums = problem.equations(looks, found.chosen, biases)
+        sums = problem.equations(epochs, found.chosen, biases)
         left.append(sums.left)
         noise = noise_factor(sums.chi, sums.freedom)
-    times = np.array([looks[k].time for k in found.chosen.look.tolist()])
+    times = np.array([epochs[k].time for k in found.chosen.epoch.tolist()])
     residuals = []
     for s, sensor in enumerate(problem.sensors):
         d = sensor.position_part.dim

@@ -1,4 +1,4 @@
-"""What registration found: biases, how sure they are, which are open, and what they leave of the residuals."""
+"""Results of registration: biases, their covariance and observability, and residuals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from assoc._system.door import doors
 from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.registration.correction import own_biases, without_biases
+from assoc.registration.correction import sensor_biases, without_biases
 from assoc.registration.observability import describe, observed_shares, open_directions
 from assoc.registration.terms import Term, label_of
 from assoc.scene.scene import Scene
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 OBSERVED = 0.5
 """A bias is observed when its standard deviation is below this share of its spread."""
 SIGNIFICANCE = 0.01
-"""Without biases measurements seem to have some with this probability."""
+"""Probability of finding biases where there are none."""
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """What is left of the measurements of one sensor beside the positions of their tuples.
+    """Residuals of the measurements of one sensor from the positions of their tuples.
 
     Attributes
     ----------
     time : array (n,)
         Seconds.
     before, after : arrays (n, d)
-        Metres and radians, with the measurements as they came, and without the biases.
+        Metres and radians, with and without the biases.
     """
 
     time: Array
@@ -61,17 +61,17 @@ class Registration(Shown):
     biases : array (n,)
         Metres, radians, seconds.
     covariance : array (n, n)
-        Of the biases; it holds also where the noise is not what the sensors say.
+        Of the biases; valid even if the sensors' stated noise is wrong.
     spreads : array (n,)
         Standard deviations assumed before.
     information : array (n, n)
-        What the measurements alone tell.
+        That of the measurements alone.
     tuples : int
         Targets found in single scans by two or more sensors, all scans together.
     skipped : int
         Scans passed over because they had too many candidate tuples.
     noise : float
-        Residuals after, as a multiple of what the sensors' noise makes expect; NaN without tuples.
+        Residuals after, as a multiple of those expected from the sensors' noise; NaN without tuples.
     residuals : tuple over sensors of Residuals
     """
 
@@ -93,28 +93,28 @@ class Registration(Shown):
 
     @cached_property
     def observed(self) -> Array:
-        """Which biases the measurements tell of, bool (n,)."""
+        """Which biases are observed, bool (n,)."""
         return np.asarray(observed_shares(self.information, self.spreads) < OBSERVED)
 
     @cached_property
     def open(self) -> tuple[str, ...]:
-        """Sums of biases that the measurements leave open, in words."""
+        """Sums of biases that are not observable, in words."""
         directions = open_directions(self.information, self.spreads)
-        return tuple(describe(one, self.terms, self.sensors) for one in directions)
+        return tuple(describe(direction, self.terms, self.sensors) for direction in directions)
 
     @property
     def significant(self) -> bool:
-        """Whether there is a bias at all: without any, chance says so with a probability of 0.01."""
+        """Whether any bias is significant: a false positive has probability 0.01."""
         return is_significant(self.biases, self.covariance)
 
     def of(self, sensor: int) -> dict[str, float]:
         """Biases of one sensor by component; metres, radians, seconds."""
         if not 0 <= sensor < len(self.sensors):
             raise InvalidInputError(f"sensor {sensor} does not exist, there are 0 to {len(self.sensors) - 1}")
-        return own_biases(self.terms, self.biases, sensor)
+        return sensor_biases(self.terms, self.biases, sensor)
 
     def correct(self, scene: Scene) -> Scene:
-        """Free a scene of the same sensors of the biases; where none is significant it stays as it is.
+        """Take the biases off a scene of the same sensors; unchanged if none is significant.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Registration(Shown):
             return scene
         velocities = None
         if any(term.component == "time" for term in self.terms):
-            from assoc.registration.looks import scene_velocities
+            from assoc.registration.epochs import scene_velocities
 
             velocities = scene_velocities(scene)
         return without_biases(scene, [self.of(s) for s in range(len(self.sensors))], velocities)
@@ -154,7 +154,7 @@ class Registration(Shown):
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what a JSON file holds."""
+        """Return the content of a JSON file."""
         scales = np.array([term.scale for term in self.terms])
         return {
             "format": "assoc.registration",
@@ -173,16 +173,16 @@ class Registration(Shown):
         write_json(path, self.to_dict())
 
     def summary(self) -> str:
-        """Say in a few lines what was found."""
+        """Return the results in a few lines."""
         lines = [
-            f"{len(self.terms)} biases from {self.tuples} tuples; what is left of the residuals is {self.noise:.3g} "
-            "times what the sensors' noise says"
+            f"{len(self.terms)} biases from {self.tuples} tuples; residuals are {self.noise:.3g} times those expected "
+            "from the sensors' noise"
         ]
         if not self.tuples:
-            lines = ["no two sensors have a target in common: no bias can be observed"]
+            lines = ["no two sensors have a target in common: no bias is observable"]
         elif not self.significant:
-            lines.append("no bias is significant: measurements stay as they are")
-        lines += [f"not observable: {one}" for one in self.open] if self.tuples else []
+            lines.append("no bias is significant: measurements stay unchanged")
+        lines += [f"not observable: {names}" for names in self.open] if self.tuples else []
         if self.skipped:
             lines.append(f"{self.skipped} scans had too many candidate tuples and were passed over")
         if self.tuples and self.noise > 1.5:

@@ -17,11 +17,11 @@ from assoc.sensors.codes import CODES
 
 AXES = ("x", "y", "z")
 MEASURED, PLACE, TIME = 0, 1, 2
-"""Kinds of terms in kernels: of a component that is measured, of a place along an axis, of the clock."""
+"""Kinds of terms in kernels: a measured component, the position along an axis, the clock."""
 
 
 class Term(NamedTuple):
-    """One bias: what a sensor states, less what is true."""
+    """One bias: stated less true value."""
 
     sensor: int
     """Number of the sensor, from 0."""
@@ -40,7 +40,7 @@ class Term(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """What values are multiplied by to be shown."""
+        """Factor from `unit` to `shown_unit`."""
         return math.degrees(1.0) if self.component in ANGLES else 1.0
 
 
@@ -58,14 +58,14 @@ def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) ->
         A reference is no sensor, or nothing is left to estimate.
     """
     known = [{sensor.name, str(s + 1)} - {""} for s, sensor in enumerate(sensors)]
-    for one in parameters.reference:
-        if not any(one in names for names in known):
+    for name in parameters.reference:
+        if not any(name in names for names in known):
             every = ", ".join(label_of(sensors, s) for s in range(len(sensors)))
-            raise InvalidInputError(f"reference: no sensor {one!r}; there are {every}")
+            raise InvalidInputError(f"reference: no sensor {name!r}; there are {every}")
     terms = []
     for s, sensor in enumerate(sensors):
         if type(sensor) not in CODES:
-            raise InvalidInputError(f"sensor {s}: biases of a {type(sensor).__name__} are not known to registration")
+            raise InvalidInputError(f"sensor {s}: biases of a {type(sensor).__name__} cannot be registered")
         if not known[s] & {*parameters.reference}:
             terms += [Term(s, component) for component in _components(sensor, parameters.components)]
     if not terms:
@@ -80,7 +80,7 @@ def _components(sensor: Sensor, wanted: Sequence[str]) -> list[str]:
         found = [name for name in sensor.components[:3] if name in wanted]
         if "position" in wanted:
             found += AXES if isinstance(sensor, Radar3D) else AXES[:2]
-    # a bearing alone tells of no motion
+    # bearings have no information on motion
     if "time" in wanted and not isinstance(sensor, BearingSensor):
         found.append("time")
     return found

@@ -1,7 +1,7 @@
-"""Velocities of targets from one sensor's own measurements: three looks in a row that a straight line explains.
+"""Velocities of targets from the measurements of one sensor: three dwells in a row on a straight line.
 
-A sensor's own bias moves all its plots alike, so that differences between them are nearly free of it. What fits into
-no line, or into several, has no velocity: false alarms are of this kind.
+A sensor's bias moves all its plots alike, so that differences between them are nearly free of it. Measurements on no
+line, or on several, have no velocity: most false alarms are such.
 """
 
 from __future__ import annotations
@@ -16,54 +16,54 @@ from assoc.registration.correction import pointed_at
 from assoc.sensors import BearingSensor, Sensor
 
 FASTEST = 700.0
-"""Targets are taken to fly no faster, m/s."""
+"""Largest speed of a target, m/s."""
 _SIGMAS = 4.0
 _NEIGHBOURS = ((-1, 1), (-1, 2), (1, -2), (1, 2), (-1, -2), (2, -2))
 _ACCELERATION = 20.0
-"""And to change their speed by no more, m/s^2."""
+"""Largest acceleration, m/s^2."""
 
 
-def look_velocities(sensor: Sensor, times: Sequence[Array], measurements: Sequence[Array]) -> list[Array]:
+def target_velocities(sensor: Sensor, times: Sequence[Array], measurements: Sequence[Array]) -> list[Array]:
     """Velocity of the target of each measurement of a sensor.
 
     Parameters
     ----------
     sensor : Sensor
-    times : sequence over looks of arrays (n,)
+    times : sequence over epochs of arrays (n,)
         Seconds.
-    measurements : sequence over looks of arrays (n, d)
+    measurements : sequence over epochs of arrays (n, d)
 
     Returns
     -------
-    list over looks of arrays (n, 3)
-        m/s, NaN where it is not known. Sensors that leave the height open tell of no vertical speed: it is 0.
+    list over epochs of arrays (n, 3)
+        m/s, NaN where unknown; the vertical speed is 0 for sensors that leave the height open.
     """
     unknown = [np.full((len(z), 3), np.nan) for z in measurements]
     if isinstance(sensor, BearingSensor) or len(measurements) < 2:
         return unknown
     located = sensor.position_part
-    places = [pointed_at(located, np.asarray(z)[:, : located.dim]) for z in measurements]
-    sigma = _sigma(located, places)
+    positions = [pointed_at(located, np.asarray(z)[:, : located.dim]) for z in measurements]
+    sigma = _sigma(located, positions)
     found = unknown
-    for k in range(len(places)):
-        own = (places[k], times[k])
-        # looks before and after, nearer ones first: a target is now and then missed, and scenes have ends
-        for one, other in _NEIGHBOURS:
-            open_ones = np.isnan(found[k][:, 0])
-            if not open_ones.any():
+    for k in range(len(positions)):
+        here = (positions[k], times[k])
+        # epochs before and after, nearer ones first: targets are missed at times, and scenes have ends
+        for first, second in _NEIGHBOURS:
+            unknown_yet = np.isnan(found[k][:, 0])
+            if not unknown_yet.any():
                 break
-            near, far = k + one, k + other
-            if not (0 <= min(near, far) and max(near, far) < len(places)):
+            near, far = k + first, k + second
+            if not (0 <= min(near, far) and max(near, far) < len(positions)):
                 continue
-            fresh = np.full((len(places[k]), 3), np.nan)
-            _fill(fresh, own, (places[near], times[near]), (places[far], times[far]), sigma)
-            found[k][open_ones] = fresh[open_ones]
+            fresh = np.full((len(positions[k]), 3), np.nan)
+            _fill(fresh, here, (positions[near], times[near]), (positions[far], times[far]), sigma)
+            found[k][unknown_yet] = fresh[unknown_yet]
     return found
 
 
-def _sigma(sensor: Sensor, places: Sequence[Array]) -> float:
+def _sigma(sensor: Sensor, positions: Sequence[Array]) -> float:
     """Standard deviation of a position along its worst axis, at the farthest usual distance, metres."""
-    every = np.concatenate(places)
+    every = np.concatenate(positions)
     if not len(every):
         return 0.0
     deviations = np.sqrt(np.diagonal(sensor.covariance))
@@ -74,36 +74,36 @@ def _sigma(sensor: Sensor, places: Sequence[Array]) -> float:
 
 
 def _fill(
-    velocity: Array, own: tuple[Array, Array], near: tuple[Array, Array], far: tuple[Array, Array], sigma: float
+    velocity: Array, here: tuple[Array, Array], near: tuple[Array, Array], far: tuple[Array, Array], sigma: float
 ) -> None:
-    """Write velocities at the looks `own` from those in `near` and `far` that lie on a line with them."""
-    if not (len(own[0]) and len(near[0]) and len(far[0])):
+    """Write velocities of the measurements `here` from those in `near` and `far` on a line with them."""
+    if not (len(here[0]) and len(near[0]) and len(far[0])):
         return
-    longest = float(max(np.abs(near[1].max() - own[1].min()), np.abs(own[1].max() - near[1].min())))
-    pairs = cKDTree(own[0]).sparse_distance_matrix(
+    longest = float(max(np.abs(near[1].max() - here[1].min()), np.abs(here[1].max() - near[1].min())))
+    pairs = cKDTree(here[0]).sparse_distance_matrix(
         cKDTree(near[0]), FASTEST * longest + _SIGMAS * sigma, output_type="ndarray"
     )
     i, j = pairs["i"], pairs["j"]
-    dt = near[1][j] - own[1][i]
+    dt = near[1][j] - here[1][i]
     good = (np.abs(dt) > 1e-6) & (pairs["v"] <= FASTEST * np.abs(dt) + _SIGMAS * sigma)
     i, j, dt = i[good], j[good], dt[good]
     if not len(i):
         return
-    rate = (near[0][j] - own[0][i]) / dt[:, None]
-    # each look has nearly the same time as its neighbours far away: a first guess, then the time of the one found
-    there = own[0][i] + rate * (np.median(far[1]) - own[1][i])[:, None]
+    rate = (near[0][j] - here[0][i]) / dt[:, None]
+    # a first guess with the median time of the far epoch, then the time of the measurement found
+    there = here[0][i] + rate * (np.median(far[1]) - here[1][i])[:, None]
     tree = cKDTree(far[0])
     for _ in range(2):
         m = np.asarray(tree.query(there)[1])
-        ahead = far[1][m] - own[1][i]
-        there = own[0][i] + rate * ahead[:, None]
+        ahead = far[1][m] - here[1][i]
+        there = here[0][i] + rate * ahead[:, None]
     apart = np.linalg.norm(far[0][m] - there, axis=1)
     share = np.abs(ahead / dt)
     allowed = _SIGMAS * sigma * np.sqrt(1.0 + share**2 + (1.0 + share) ** 2)
     allowed += 0.5 * _ACCELERATION * np.abs(ahead * (ahead - dt))
     good = (apart <= allowed) & (np.abs(ahead - dt) > 1e-6)
     i, j, m, dt, apart = i[good], j[good], m[good], dt[good], apart[good]
-    # of several lines through a look the straightest, if it is much straighter than the next
+    # of several lines through a measurement the straightest, if it is much straighter than the next
     order = np.lexsort((apart, i))
     i, j, m, dt, apart = (x[order] for x in (i, j, m, dt, apart))
     first = np.ones(len(i), dtype=np.bool_)

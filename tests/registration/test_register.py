@@ -12,7 +12,7 @@ from assoc import Scene, build_problem
 from assoc.errors import InvalidInputError
 from assoc.registration import RegistrationParameters, Term, register, with_biases
 from assoc.registration.correction import corrected_measurements
-from assoc.registration.looks import scene_looks
+from assoc.registration.epochs import scene_epochs
 from assoc.registration.observability import describe
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D
 from assoc.simulation import simulate
@@ -106,7 +106,7 @@ def test_unbiased_scenes_stay_as_they_are():
     scene = scene_of(radars(), 5)
     result = register(scene)
     assert not result.significant and result.correct(scene) is scene
-    assert "stay as they are" in result.summary()
+    assert "stay unchanged" in result.summary()
 
 
 def test_registered_scene_is_the_unbiased_one(found):
@@ -144,7 +144,7 @@ def _leads(result):
 def test_a_radar_alone():
     result = register(scene_of(radars(1), 1, 5))
     assert result.tuples == 0 and not result.observed.any() and not result.significant
-    assert (result.biases == 0).all() and "no bias can be observed" in result.summary()
+    assert (result.biases == 0).all() and "no bias is observable" in result.summary()
     # nothing is known of the residuals
     assert np.isnan(result.noise) and result.to_dict()["noise"] is None
 
@@ -341,7 +341,7 @@ def test_late_measurements_are_left_out():
             rows[k + 3][0] = np.concatenate([rows[k + 3][0], rows[k][0][:cut]])
             rows[k][0] = rows[k][0][cut:]
     late = Scene(scene.sensors, scene.times, measurements, REGION, measurement_times=times)
-    looks = scene_looks(late, moving=False)
+    looks = scene_epochs(late, moving=False)
     assert [one.time for one in looks] == scene.times.tolist()
     assert all((own == look.time).all() for look in looks for own in look.times)
     assert np.isfinite(register(late).biases).all()
