@@ -213,7 +213,7 @@ class AssignmentProblem:
             raise InvalidInputError(f"array: expected a sparse array (scipy.sparse), got {type(array).__name__}")
         if hasattr(entries, "sum_duplicates"):
             entries.sum_duplicates()
-        index = _integers(np.stack([np.asarray(one) for one in entries.coords], axis=1), "array: coords", 2)
+        index = _integers(np.stack([np.asarray(axis) for axis in entries.coords], axis=1), "array: coords", 2)
         costs = _numbers(entries.data, "array")
         if dummy and min(entries.shape) == 0:
             raise InvalidInputError(f"array: each dimension needs its dummy at index 0, got {entries.shape}")
@@ -453,7 +453,7 @@ def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _with_singletons(
     tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64], alone: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Append the singletons that are not listed, at cost 0; ``alone`` says which tuples are singletons."""
+    """Append the singletons that are not listed, at cost 0; ``alone`` marks tuples that are singletons."""
     offsets = np.cumsum(sizes) - sizes
     present = np.zeros(int(sizes.sum()), dtype=np.bool_)
     listed = tuples[alone]

@@ -21,7 +21,7 @@ class TracePoint(NamedTuple):
     """One line of a solver's history: when, after how much work, and what was known then."""
 
     iteration: int
-    """Iterations done so far (what one iteration is, each solver's documentation says)."""
+    """Iterations done so far; for their meaning see each solver's documentation."""
     seconds: float
     """Seconds since the solver started, without compiling."""
     cost: float

@@ -23,7 +23,7 @@ FORMAT = "assoc.result"
 VERSION = 1
 
 _SHOWN = 10
-# seconds of compiling that the summary speaks of
+# seconds of compiling that the summary mentions
 _WORTH_A_LINE = 0.1
 
 
@@ -81,7 +81,7 @@ class Association:
         }
 
     def summary(self) -> str:
-        """Say in a few lines what was found, at what cost, and how far from optimal that can be."""
+        """Return the results in a few lines: targets, cost, and gap to the optimum."""
         total = self.totals()
         median = 1e3 * float(np.median([s.runtime for s in self.solutions])) if self.scans else 0.0
         lines = [
@@ -120,14 +120,14 @@ class Association:
         parts = []
         for scan in self.scans:
             number = len(scan.targets)
-            place, sigma = np.full((number, 3), np.nan), np.full((number, 3), np.nan)
+            position, sigma = np.full((number, 3), np.nan), np.full((number, 3), np.nan)
             if scan.positions is not None and scan.covariances is not None:
-                place, sigma = scan.positions, np.sqrt(np.diagonal(scan.covariances, axis1=1, axis2=2))
+                position, sigma = scan.positions, np.sqrt(np.diagonal(scan.covariances, axis1=1, axis2=2))
             part = pd.DataFrame({"scan": scan.scan, "time": scan.time, "target": np.arange(number)})
             values = [
                 *scan.targets.T,
                 *[np.zeros(number, np.int32)] * (count - len(scan.sizes)),
-                *place.T,
+                *position.T,
                 *sigma.T,
             ]
             parts.append(part.assign(**dict(zip(names, values, strict=True))))

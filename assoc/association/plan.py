@@ -79,13 +79,13 @@ class Plan:
                 raise InvalidInputError(f"gating: unknown name {name!r}; {near or 'known: ' + ', '.join(GATING)}")
         if self.kbest is not None:
             checked_k(self.kbest)
-        self.all_parameters  # noqa: B018  (refuses what is wrong now, not in the first scan)
+        self.all_parameters  # noqa: B018  (checks parameters now, not in the first scan)
 
     def __reduce__(self) -> Any:
-        # another process knows solvers from elsewhere only if it is told
+        # another process must be given solvers that were registered in this one
         names = () if self.kbest is not None else (self.solver,)
         alone = replace(self, watch=None)
-        return _received, (registry.own(names), tuple(getattr(alone, one.name) for one in fields(self)))
+        return _received, (registry.own(names), tuple(getattr(alone, field.name) for field in fields(self)))
 
     @property
     def all_parameters(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class Plan:
         if self.kbest is not None:
             return {"k": self.kbest}
         chosen: Any = registry.make_parameters(self.solver, self.parameters)
-        return {one.name: getattr(chosen, one.name) for one in fields(chosen)}
+        return {field.name: getattr(chosen, field.name) for field in fields(chosen)}
 
     def __call__(self, item: tuple[int, int]) -> ScanAssociation:
         """Associate scan ``item[1]`` of source ``item[0]``."""
@@ -101,22 +101,22 @@ class Plan:
         if isinstance(source, AssignmentProblem):
             compiled = compile_seconds()
             solutions, history = self._solve(source, self.seed, 0)
-            return self._best([_of_problem(source, one) for one in solutions], history, compiled)
+            return self._best([_of_problem(source, solution) for solution in solutions], history, compiled)
         return self.associate(source, source.scan(item[1]))
 
     def associate(self, scene: Scene, scan: Scan) -> ScanAssociation:
         """Associate a scan of the sensors of a scene."""
         compiled = compile_seconds()
-        # a seed of its own for each scan, whichever process solves it and whatever was solved before
+        # a seed for each scan that depends on neither the process nor the scans before
         seed = np.random.SeedSequence(entropy=self.seed, spawn_key=(scan.index,))
         problem = build_problem(scene, scan, **self.gating)
         solutions, history = self._solve(problem, seed, scan.index)
         # a position at another time than the measurements' depends on how fast targets usually fly
         speed = self.gating.get("speed", SPEED)
-        scans = [_of_scan(scene, scan, problem, one, speed) for one in solutions]
+        scans = [_of_scan(scene, scan, problem, solution, speed) for solution in solutions]
         if self.gate_loss:
             bound = bound_without_gates(scene, scan, self.gating, self.time_limit)
-            scans = [replace(one, gate_loss=max(0.0, one.solution.cost - bound)) for one in scans]
+            scans = [replace(ranked, gate_loss=max(0.0, ranked.solution.cost - bound)) for ranked in scans]
         return self._best(scans, history, compiled)
 
     def problem(self, item: tuple[int, int]) -> AssignmentProblem:
@@ -131,20 +131,20 @@ class Plan:
     ) -> tuple[list[Solution], PheromoneHistory | None]:
         if self.kbest is not None:
             return kbest(problem, self.kbest, time_limit=self.time_limit), None
-        tell: Any = {"seed": seed, "time_limit": self.time_limit, "callback": self._tell(scan)}
+        common: Any = {"seed": seed, "time_limit": self.time_limit, "callback": self._callback(scan)}
         if self.pheromone and self.solver == "aco":
-            history = pheromone(problem, **tell, **self.parameters).top(_NODES)
+            history = pheromone(problem, **common, **self.parameters).top(_NODES)
             return [history.solution], history
-        return [assign(problem, self.solver, **tell, **self.parameters)], None
+        return [assign(problem, self.solver, **common, **self.parameters)], None
 
-    def _tell(self, scan: int) -> Callback | None:
+    def _callback(self, scan: int) -> Callback | None:
         """Return what hears of each TracePoint of a scan; its answer, nothing, stops no solver."""
         watch = self.watch
         return None if watch is None else lambda point: watch(scan, point) and None
 
     def _best(self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float) -> ScanAssociation:
         """Return the first of ranked associations, which carries all of them where they were asked for."""
-        scans = [replace(one, pheromone=history, compile_time=compile_seconds() - compiled) for one in scans]
+        scans = [replace(ranked, pheromone=history, compile_time=compile_seconds() - compiled) for ranked in scans]
         return scans[0] if self.kbest is None else replace(scans[0], ranked=tuple(scans))
 
     def items(self) -> list[tuple[int, int]]:

@@ -45,7 +45,7 @@ class ScanAssociation(Shown):
     ranked : tuple of ScanAssociation
         The k best associations of the scan, this one first; empty where they were not asked for.
     pheromone : PheromoneHistory or None
-        What the ants left on the tuples with the most of it, where that was asked for (solver aco).
+        Largest pheromone values, if requested (solver aco).
     compile_time : float
         Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
         no part of ``solution.runtime``.
@@ -89,8 +89,8 @@ class ScanAssociation(Shown):
             {"tuple": row.tolist(), "position": None, "covariance": None} for row in self.targets
         ]
         if self.positions is not None and self.covariances is not None:
-            for entry, place, spread in zip(targets, self.positions, self.covariances, strict=True):
-                entry.update(position=place.tolist(), covariance=spread.tolist())
+            for entry, position, spread in zip(targets, self.positions, self.covariances, strict=True):
+                entry.update(position=position.tolist(), covariance=spread.tolist())
         content = {
             "scan": self.scan,
             "time": self.time,
@@ -107,7 +107,7 @@ class ScanAssociation(Shown):
         if self.gate_loss is not None:
             content["gate_loss"] = plain(self.gate_loss)
         if self.ranked:
-            content["ranked"] = [{"rank": place, **one.to_dict()} for place, one in enumerate(self.ranked, start=1)]
+            content["ranked"] = [{"rank": rank, **scan.to_dict()} for rank, scan in enumerate(self.ranked, start=1)]
         return content
 
     def __repr__(self) -> str:
@@ -119,7 +119,7 @@ class ScanAssociation(Shown):
 
 
 def plain(value: Any) -> Any:
-    """Return what JSON can hold: no infinities, and names of what is neither number nor text."""
+    """Return a value that JSON can hold: no infinities, and text for anything but numbers and text."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
@@ -127,5 +127,5 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, (tuple, list)):
-        return [plain(one) for one in value]
+        return [plain(entry) for entry in value]
     return str(value)

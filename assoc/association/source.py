@@ -17,7 +17,7 @@ Source = Scene | AssignmentProblem
 
 @door
 def load(path: str | os.PathLike[str]) -> Source:
-    """Load a scene or a problem, whichever the file says it is.
+    """Load a scene or a problem, by the format that the file names.
 
     Parameters
     ----------
@@ -65,5 +65,5 @@ def _is_table(path: str) -> bool:
 
 
 def warnings_of(source: Source) -> tuple[str, ...]:
-    """What is almost surely a mistake in a scene or a problem, one line each."""
+    """Probable mistakes in a scene or a problem, one line each."""
     return source.warnings if isinstance(source, Scene) else doubts_about_costs(source)

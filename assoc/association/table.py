@@ -11,7 +11,7 @@ from assoc._text.plain import printable, spreadsheet_text
 from assoc.association.scan import ScanAssociation
 
 KEYS = ("file", "scan", "rank")
-"""Columns that say which row it is."""
+"""Columns that identify a row."""
 
 WIDTHS = {"cost": 10, "status": 11, "ms": 8, "correct": 7}
 """By header: what most cells need."""
@@ -41,7 +41,7 @@ def rows(
         Whether there is a column of correct tuples; by default if the truth of one of the scans is known.
     brief : bool, default False
         For a terminal: leave out the folders of files and the lower bound, and say the gap only of scans that are
-        not certified optimal, in the place of their status.
+        not certified optimal, in place of their status.
     """
     if brief:
         files = _short_names(files)
@@ -84,14 +84,14 @@ def rows(
 
 
 def _loss(scan: ScanAssociation) -> str:
-    """What the gates may have cost; 0 where that is no more than the tolerance of a certificate."""
+    """Bound of the loss by gating; 0 within the tolerance of a certificate."""
     if scan.gate_loss is None:
         return ""
     return "0" if scan.gate_loss <= 1e-6 * max(1.0, abs(scan.solution.cost)) else f"{scan.gate_loss:.2g}"
 
 
 def _short_names(files: Sequence[str]) -> list[str]:
-    """The last parts of paths, where these tell them apart."""
+    """The last parts of paths, if these differ."""
     short = {file: os.path.basename(file) for file in files}
     return [short[file] for file in files] if len({*short.values()}) == len(short) else list(files)
 
@@ -99,8 +99,8 @@ def _short_names(files: Sequence[str]) -> list[str]:
 def _lines(scans: Sequence[ScanAssociation], files: Sequence[str]) -> Iterator[tuple[ScanAssociation, str, int]]:
     """One line for each scan, or for each of its ranked associations: association, file, rank."""
     for scan, file in zip(scans, files, strict=True):
-        for place, one in enumerate(scan.ranked or (scan,), start=1):
-            yield one, file, place
+        for rank, ranked in enumerate(scan.ranked or (scan,), start=1):
+            yield ranked, file, rank
 
 
 def to_csv(scans: Sequence[ScanAssociation], files: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""Sensors and scans as flat arrays: what the compiled kernels see of a scene."""
+"""Sensors and scans as flat arrays, for kernels; measurements converted to positions."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class SensorArrays(NamedTuple):
     code: Array
     """Kind of each, int64 (S,); see `assoc.sensors.codes`."""
     dim: Array
-    """Components of a measurement that tell of the position, int64 (S,)."""
-    place: Array
+    """Components of a measurement that depend on the position, int64 (S,)."""
+    position: Array
     """(S, 3), metres."""
     covariance: Array
     """Measurement covariances padded with zeros, (S, 3, 3)."""
@@ -42,7 +42,7 @@ class SensorArrays(NamedTuple):
     half: Array
     """Half widths of the region, (3,): the standard deviations of the prior."""
     gain: Array
-    """By how much the cost falls when the sensor is counted as detecting, before the residual, (S,)."""
+    """What a detection takes off the cost, before the residual, (S,)."""
     base: float
     """The cost of a target that every sensor misses."""
 
@@ -95,12 +95,12 @@ def _sensor_arrays(scene: Scene) -> SensorArrays:
         worst = int(np.argmax(~(np.isfinite(weight).all(axis=(1, 2)) & np.isfinite(gain))))
         raise InvalidInputError(f"sensor {worst}: its noise or field of view is too extreme to compute a cost")
     half = 0.5 * (scene.region[:, 1] - scene.region[:, 0])
-    # a flat region says where the targets are, it must not overrule what the sensors measure
+    # the prior of a flat region must not overrule measurements
     half = np.maximum(half, 0.1 * half.max())
     return SensorArrays(
         code=np.array([CODES[type(sensor)] for sensor in scene.sensors], dtype=np.int64),
         dim=np.array([sensor.position_part.dim for sensor in scene.sensors], dtype=np.int64),
-        place=np.array([sensor.position for sensor in scene.sensors]),
+        position=np.array([sensor.position for sensor in scene.sensors]),
         covariance=covariance,
         weight=weight,
         full=np.array([sensor.dim >= 3 for sensor in scene.sensors]),
@@ -120,7 +120,7 @@ def scan_arrays(sensors: SensorArrays, scan: Scan, reach: float, least: float) -
     if len(scan.measurements) != count:
         raise InvalidInputError(f"scan has measurements of {len(scan.measurements)} sensors, the scene has {count}")
     start = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum([len(one) for one in scan.measurements], out=start[1:])
+    np.cumsum([len(z) for z in scan.measurements], out=start[1:])
     z = np.zeros((int(start[-1]), 3))
     index = np.empty(len(z), dtype=np.int32)
     owner = np.repeat(np.arange(count), np.diff(start))
@@ -154,7 +154,7 @@ def convert(sensors: SensorArrays, z: Array, owner: Array, reach: float, least: 
         leave the height open.
     """
     # out of the record first: a field read in the loop costs a reference count each time
-    code, dim, place, covariance = sensors.code, sensors.dim, sensors.place, sensors.covariance
+    code, dim, position, covariance = sensors.code, sensors.dim, sensors.position, sensors.covariance
     middle, half = sensors.middle[2], sensors.half[2]
     count = len(z)
     centre, spread, information = np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6))
@@ -165,7 +165,7 @@ def convert(sensors: SensorArrays, z: Array, owner: Array, reach: float, least: 
             continue
         R = covariance[s]
         U = R[0, 0], R[0, 1], R[0, 2], R[1, 1], R[1, 2], R[2, 2]
-        measured, at = (z[n, 0], z[n, 1], z[n, 2]), (place[s, 0], place[s, 1], place[s, 2])
+        measured, at = (z[n, 0], z[n, 1], z[n, 2]), (position[s, 0], position[s, 1], position[s, 2])
         # as wide as the gate asks, then as for any start
         _, wide = convert_one(code[s], dim[s], measured, at, U, heights, reach, least)
         there, c = convert_one(code[s], dim[s], measured, at, U, heights, START_REACH, START_REACH)

@@ -1,4 +1,4 @@
-"""From a scan of a scene to the assignment problem, and the costs and positions of single tuples."""
+"""From a scan of a scene to the assignment problem; costs and positions of given tuples."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def build_problem(
     target_density: float | str | None = None,
     all_tuples: bool = False,
 ) -> AssignmentProblem:
-    """Write down which measurements of a scan may be one target, and at what cost.
+    """Make the assignment problem of a scan: candidate tuples of measurements and their costs.
 
     A tuple of two or more measurements is a candidate if
 
@@ -50,8 +50,8 @@ def build_problem(
     * all of them together pass the gate of their degrees of freedom,
     * its cost is negative: otherwise its measurements are better declared false alarms, at cost 0 each.
 
-    Measurements that have times of their own are compared through the target's predicted motion: it flies straight,
-    with a velocity of which only the usual `speed` is known; the gates are those of a measurement given those before.
+    Measurements with their own times are compared through the target's predicted motion: straight flight, velocities of
+    the prior `speed`; gates are those of a measurement given the previous ones.
 
     Degrees of freedom are the components measured less the coordinates estimated (three with a sensor that
     measures full positions, else two), at least one. Where no sensor of a tuple measures full positions,
@@ -68,8 +68,8 @@ def build_problem(
     max_tuples : int
         The most candidate tuples that may be made.
     speed : float or sequence of float
-        Standard deviation of a target's velocity along each axis, m/s, the prior that range rates are held
-        against, and what a target may fly between measurements of different times; without either it has no effect.
+        Prior standard deviation of a target's velocity along each axis, m/s, for range rates and for measurements of
+        different times; without these it has no effect.
     target_density : float or "auto", optional
         None is equation 5: the likelihood at the best position. A number is the density of targets in the region,
         per m^3 (per m^2 if no sensor measures full positions): positions are integrated out under it, and a cost gains
@@ -87,13 +87,13 @@ def build_problem(
     Raises
     ------
     LimitExceededError
-        There are more tuples than `max_tuples`; the message says how many, or estimates it.
+        There are more tuples than `max_tuples`; the message has their number, or an estimate.
     InvalidInputError
         An argument is out of range.
 
     References
     ----------
-    The ant colony paper, equations 1-5; with clutter density r / V in the place of 1 / V.
+    The ant colony paper, equations 1-5; with clutter density r / V in place of 1 / V.
     """
     if isinstance(max_tuples, bool) or not isinstance(max_tuples, (int, np.integer)) or max_tuples < 1:
         raise InvalidInputError(f"max_tuples must be a whole number above 0, got {max_tuples!r}")
@@ -103,39 +103,39 @@ def build_problem(
         probability = math.nan
     if not 0.0 < probability <= 1.0:
         raise InvalidInputError(f"gate_probability must be above 0 and at most 1, got {gate_probability!r}")
-    one = scan_of(scene, scan)
+    chosen = scan_of(scene, scan)
     if all_tuples:
-        return _whole_grid(scene, one, int(max_tuples), speed, target_density)
-    if not one.at_once:
+        return _whole_grid(scene, chosen, int(max_tuples), speed, target_density)
+    if not chosen.at_once:
         _refuse_prior(target_density)
-        return timed_problem(scene, one, probability, int(max_tuples), speed)
+        return timed_problem(scene, chosen, probability, int(max_tuples), speed)
     bare = sensor_arrays(scene)
     prior = position_prior(scene, bare, target_density)
     sensors = with_prior(bare, prior)
     gates = _gates(scene, sensors, probability)
     limited = gates.pair[~np.eye(len(scene.sensors), dtype=np.bool_)]
     reach, least = (float(limited.max()), float(limited.min())) if limited.size else (1.0, 1.0)
-    measured, index = scan_arrays(sensors, one, reach, least)
-    limits = {"number": one.index, "max_tuples": int(max_tuples)}
+    measured, index = scan_arrays(sensors, chosen, reach, least)
+    limits = {"number": chosen.index, "max_tuples": int(max_tuples)}
     pairs = compatible_pairs(sensors, measured, gates, **limits)
-    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, one, speed), prior=prior, **limits)
+    rows, costs = grow(sensors, measured, pairs, gates, rates=range_rates(scene, chosen, speed), prior=prior, **limits)
     padded = np.append(index, np.int32(0))  # row -1, a missed detection, becomes index 0
-    return AssignmentProblem(padded[rows], costs, one.sizes)
+    return AssignmentProblem(padded[rows], costs, chosen.sizes)
 
 
 def _whole_grid(
-    scene: Scene, one: Scan, most: int, speed: float | Sequence[float], density: float | str | None
+    scene: Scene, chosen: Scan, most: int, speed: float | Sequence[float], density: float | str | None
 ) -> AssignmentProblem:
-    shape = [int(size) + 1 for size in one.sizes]
+    shape = [int(size) + 1 for size in chosen.sizes]
     count = math.prod(shape) - 1
     if count > most:
         raise LimitExceededError(
-            f"scan {one.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
+            f"scan {chosen.index}: {count:.3g} tuples, more than max_tuples = {most}; leave out all_tuples, or raise it"
         )
     # the first of the grid is the tuple without measurements, which no problem has
     tuples = np.indices(shape, dtype=np.int32).reshape(len(shape), -1).T[1:]
-    costs = tuple_costs(scene, one, tuples, speed=speed, target_density=density)
-    return AssignmentProblem(tuples, costs, one.sizes)
+    costs = tuple_costs(scene, chosen, tuples, speed=speed, target_density=density)
+    return AssignmentProblem(tuples, costs, chosen.sizes)
 
 
 @door
@@ -167,11 +167,11 @@ def tuple_costs(
     InvalidInputError
         The tuples have the wrong shape, an index out of range, or no measurement.
     """
-    one = scan_of(scene, scan)
-    if one.at_once:
-        return positions.tuple_costs(scene, one, tuples, speed=speed, target_density=target_density)
+    chosen = scan_of(scene, scan)
+    if chosen.at_once:
+        return positions.tuple_costs(scene, chosen, tuples, speed=speed, target_density=target_density)
     _refuse_prior(target_density)
-    return timed_costs(scene, one, tuples, speed)
+    return timed_costs(scene, chosen, tuples, speed)
 
 
 @door
@@ -181,7 +181,7 @@ def positions_and_covariances(
     """Positions of tuples at the scan's time, and their covariances.
 
     Where all measurements are of that time, they are the maximum-likelihood positions (equation 4), and the speed has
-    no effect. What the measurements leave open is taken from the scene's region: mean in its middle, standard
+    no effect. Directions that the measurements leave open are those of the scene's region: mean in its middle, standard
     deviation half its width. So a position always exists.
 
     Parameters
@@ -199,17 +199,15 @@ def positions_and_covariances(
     InvalidInputError
         As `tuple_costs`.
     """
-    one = scan_of(scene, scan)
-    if one.at_once:
-        return positions.positions_and_covariances(scene, one, tuples)
-    return timed_positions(scene, one, tuples, speed)
+    chosen = scan_of(scene, scan)
+    if chosen.at_once:
+        return positions.positions_and_covariances(scene, chosen, tuples)
+    return timed_positions(scene, chosen, tuples, speed)
 
 
 def _refuse_prior(target_density: float | str | None) -> None:
     if target_density is not None:
-        raise InvalidInputError(
-            "target_density: measurements with times of their own have costs without a prior only; leave it out"
-        )
+        raise InvalidInputError("target_density: not supported for measurements with their own times; leave it out")
 
 
 _known_gates: weakref.WeakKeyDictionary[Scene, dict[tuple[float, float], Gates]] = weakref.WeakKeyDictionary()

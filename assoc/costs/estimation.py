@@ -6,7 +6,7 @@ above and below range-azimuth radars, the one on the side of the region's middle
 
 The region's prior enters only where the measurements leave a position open, so that one always exists. A
 tuple with a sensor that measures full positions never sees it. For other tuples it acts along those
-directions only in which the measurements tell less than the prior does (standard deviation: half the
+directions only in which the measurements are less exact than the prior (standard deviation: half the
 region's width). The chi-square value is that of the measurements at the position found; the prior's own
 term is not part of it. So the cost of a determined tuple is exactly equation 5 at the maximum-likelihood
 position, and an undetermined one pays only where its measurements pull away from the region.
@@ -28,8 +28,8 @@ from assoc.costs.residuals import (
     FULL,
     INFORMATION,
     MEASURED,
-    PLACE,
     RISE,
+    SITE,
     WEIGHT,
     WIDTH,
     normal,
@@ -39,7 +39,7 @@ from assoc.costs.symmetric import inverse, solve
 from assoc.sensors.codes import BEARING, RADAR2D
 from assoc.sensors.kernels.records import Six, Three
 
-# a position is undetermined along a direction if the measurements tell less of it than this times the prior
+# a position is undetermined along a direction if its information is less than this times the prior's
 _WEAK = 1.0
 _MAX_STEPS = 100
 # residuals above this make a second start worthwhile (bearings that seem to meet behind a sensor)
@@ -247,10 +247,10 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
     """
     total = len(rows)
     kept = 0 if gating else total
-    chis, places, covariances = np.zeros(total), np.zeros((kept, 3)), np.zeros((kept, 3, 3))
+    chis, positions, covariances = np.zeros(total), np.zeros((kept, 3)), np.zeros((kept, 3, 3))
     middle = (sensors.middle[0], sensors.middle[1], sensors.middle[2])
     half = (sensors.half[0], sensors.half[1], sensors.half[2])
-    code, dim, full, place = sensors.code, sensors.dim, sensors.full, sensors.place
+    code, dim, full, position = sensors.code, sensors.dim, sensors.full, sensors.position
     weight, covariance = sensors.weight, sensors.covariance
     measured, centre, information = scan.z, scan.centre, scan.information
     members = np.empty((len(dim), WIDTH))
@@ -264,7 +264,7 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
             members[count, CODE], members[count, DIM], members[count, FULL] = code[s], dim[s], full[s]
             entry = WEIGHT
             for i in range(3):
-                members[count, PLACE + i] = place[s, i]
+                members[count, SITE + i] = position[s, i]
                 members[count, MEASURED + i] = measured[n, i]
                 members[count, CENTRE + i] = centre[n, i]
                 for j in range(i, 3):
@@ -281,14 +281,14 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
             if full_ones == 0 and abs(z - middle[2]) > HEIGHTS * half[2]:
                 chis[t] = math.inf
             continue
-        places[t, 0], places[t, 1], places[t, 2] = x, y, z
+        positions[t, 0], positions[t, 1], positions[t, 2] = x, y, z
         B = (
             A[0] + prior[0], A[1] + prior[1], A[2] + prior[2],
             A[3] + prior[3], A[4] + prior[4], A[5] + prior[5],
         )  # fmt: skip
         ok, c0, c1, c2, c3, c4, c5 = inverse(B)
         if not ok:
-            # numerically singular: the region's width is all that can be said
+            # numerically singular: the region's width is the best estimate
             c0, c3, c5 = half[0] ** 2, half[1] ** 2, half[2] ** 2
             c1 = c2 = c4 = 0.0
         elif not solve((c0, c1, c2, c3, c4, c5), 0.0, 0.0, 0.0)[0]:
@@ -300,4 +300,4 @@ def fit(sensors: SensorArrays, scan: ScanArrays, rows: Array, gating: bool) -> t
         C[0, 1] = C[1, 0] = c1
         C[0, 2] = C[2, 0] = c2
         C[1, 2] = C[2, 1] = c4
-    return chis, places, covariances
+    return chis, positions, covariances

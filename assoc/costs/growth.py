@@ -83,7 +83,7 @@ def _windows(
 ) -> tuple[Array, Array]:
     """Azimuths at bearing sensor t for each tuple: middle and half width; pi where all must be tried."""
     _, position, covariance = fit(sensors, scan, rows, False)
-    dx, dy = position[:, 0] - sensors.place[t, 0], position[:, 1] - sensors.place[t, 1]
+    dx, dy = position[:, 0] - sensors.position[t, 0], position[:, 1] - sensors.position[t, 1]
     away = np.maximum(dx * dx + dy * dy, 1e-12)
     u, v = -dy / away, dx / away
     variance = u * u * covariance[:, 0, 0] + 2 * u * v * covariance[:, 0, 1] + v * v * covariance[:, 1, 1]

@@ -14,7 +14,7 @@ def too_many(found: int, share: float, limit: int) -> bool:
 
 
 def refuse(scan: int, expected: float, limit: int) -> LimitExceededError:
-    """Make the error that says how many tuples were to be expected and what to change."""
+    """Make the error with the expected number of tuples and what to change."""
     return LimitExceededError(
         f"scan {scan}: about {expected:.3g} candidate tuples, more than max_tuples = {limit}; "
         "lower gate_probability, split the scan, or raise max_tuples"

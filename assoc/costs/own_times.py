@@ -1,8 +1,7 @@
-"""Scans whose measurements have times of their own: tuples, costs and positions through predicted motion.
+"""Scans whose measurements have their own times: tuples, costs and positions through predicted motion.
 
-A target flies straight but for a little noise, with a velocity of which only the usual speed is known. The cost
-is that of equation 5 with the velocity integrated out: where all measurements are of one time, the cost of a linear
-scene is that of `assoc.build_problem` for simultaneous measurements.
+A target flies straight with little noise and a velocity of known prior. The cost is that of equation 5 with the
+velocity integrated out; for simultaneous measurements of linear sensors it equals theirs.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def timed_problem(
 ) -> AssignmentProblem:
     """Candidate tuples of a scan with own times; see `assoc.build_problem`.
 
-    A tuple has at least one measurement that tells a position: bearings alone are not compared over time.
+    A tuple has at least one measurement that determines a position: bearings alone are not compared over time.
     """
     timed = _timed_scan(scene, scan, gate_probability, speed)
     looked = timed.looked()
@@ -73,15 +72,15 @@ def _timed_scan(scene: Scene, scan: Scan, gate_probability: float, speed: float 
     def start(positions: Array, covariances: Array, lag: Array) -> Any:
         return gaussian(*beginning(positions, covariances, prior, lag))
 
-    nobody = start(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
+    none = start(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
     return TimedScan(
-        filter, nobody, scan.time, scan.measurements, scan.own_times(), scene.sensors, _places(scene, scan), start,
+        filter, none, scan.time, scan.measurements, scan.own_times(), scene.sensors, _places(scene, scan), start,
         scan.sectors, gate_probability, scan.time,
     )  # fmt: skip
 
 
 def beginning(positions: Array, covariances: Array, prior: Array, lag: Array) -> tuple[Array, Array]:
-    """Means (n, 6) and covariances of positions and velocities `lag` (n,) seconds before targets were seen there.
+    """Means (n, 6) and covariances of positions and velocities `lag` (n,) seconds before targets were measured there.
 
     The velocity's mean is 0, its covariance `prior` (3, 3).
     """
@@ -94,7 +93,7 @@ def beginning(positions: Array, covariances: Array, prior: Array, lag: Array) ->
 
 
 def _places(scene: Scene, scan: Scan) -> Places:
-    """Positions of single measurements; any but a bearing may begin a target.
+    """Positions of single measurements; all but bearings may start a target.
 
     A birth is equation 5 of a single measurement times the volume of its position: with that of the position of the
     whole tuple (`_fusion`) the chain of predictive densities becomes the likelihood at the best position.
@@ -124,12 +123,12 @@ def _fusion(timed: TimedScan, rows: Array) -> Array:
 def _terms(scene: Scene) -> ScoreTerms:
     P = np.array([sensor.detection_probability for sensor in scene.sensors])
     density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in scene.sensors])
-    # births stand with the places
+    # births are in `Places`
     return ScoreTerms(np.log(P / density), np.log1p(-P), np.zeros(len(P)))
 
 
 def _checked(timed: TimedScan, tuples: Array) -> Array:
-    """Tuples with a measurement that tells a position, as int32 (K, S)."""
+    """Tuples with a measurement that determines a position, as int32 (K, S)."""
     rows = checked_tuples(tuples, np.array([len(z) for z in timed.measurements]))
     able = np.stack([np.append(fit, False)[rows[:, s] - 1] for s, fit in enumerate(timed.places.fit)], axis=1)
     if len(rows) and not able.any(axis=1).all():

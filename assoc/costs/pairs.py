@@ -39,7 +39,7 @@ class Pairs(NamedTuple):
 def _may_cross(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float) -> bool:
     """Whether two bearings may meet ahead of both sensors once they are moved within the gate."""
     s, t = scan.owner[n], scan.owner[m]
-    dx, dy = sensors.place[t, 0] - sensors.place[s, 0], sensors.place[t, 1] - sensors.place[s, 1]
+    dx, dy = sensors.position[t, 0] - sensors.position[s, 0], sensors.position[t, 1] - sensors.position[s, 1]
     if dx * dx + dy * dy < 1e-12:
         return True
     turn = 2.0 * math.pi
@@ -66,7 +66,7 @@ def _near(sensors: SensorArrays, scan: ScanArrays, n: int, m: int, limit: float)
             return _may_cross(sensors, scan, n, m, limit)
         if sensors.code[s] == BEARING:
             n, m, t = m, n, s
-        dx, dy = scan.centre[n, 0] - sensors.place[t, 0], scan.centre[n, 1] - sensors.place[t, 1]
+        dx, dy = scan.centre[n, 0] - sensors.position[t, 0], scan.centre[n, 1] - sensors.position[t, 1]
         ball = 2.0 * limit * (scan.spread[n, 0] + scan.spread[n, 3])
         away = dx * dx + dy * dy
         if ball >= away:
@@ -228,7 +228,7 @@ def _between(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
 
 
 def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float) -> tuple[Array, Array, Array]:
-    """Measurements of sensor t, and for each of sensor s where among them those near it begin and end.
+    """Measurements of sensor t, and for each of sensor s the interval of those near it.
 
     If one of the two sensors measures bearings alone, it is t.
     """
@@ -238,7 +238,7 @@ def _windows(sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: flo
     if sensors.code[t] != BEARING:
         return _windows_along_an_axis(sensors, scan, s, t, limit)
     azimuths = scan.z[others, 0]
-    d = scan.centre[rows, :2] - sensors.place[t, :2]
+    d = scan.centre[rows, :2] - sensors.position[t, :2]
     ball = 2.0 * limit * (scan.spread[rows, 0] + scan.spread[rows, 3])
     ratio = np.sqrt(ball / np.maximum((d**2).sum(axis=1), 1e-300))
     half = np.where(ratio < 1.0, np.arcsin(np.minimum(ratio, 1.0)), math.pi)
@@ -255,15 +255,15 @@ def _windows_along_an_axis(
     sensors: SensorArrays, scan: ScanArrays, s: int, t: int, limit: float
 ) -> tuple[Array, Array, Array]:
     """`_windows` of sensors that measure positions, along the axis, x or y, that spreads those of t the more."""
-    own, other = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
+    rows, other = slice(scan.start[s], scan.start[s + 1]), slice(scan.start[t], scan.start[t + 1])
     along = int(np.ptp(scan.centre[other, 1]) > np.ptp(scan.centre[other, 0]))
-    middle, line = scan.centre[own, along], scan.centre[other, along]
+    middle, line = scan.centre[rows, along], scan.centre[other, along]
     order = np.argsort(line, kind="stable")
     line = line[order]
     # variances of x or of y
     variance = scan.spread[:, 3 * along]
     wide = _wide(sensors.code[s], sensors.code[t], limit)
-    far = np.sqrt(wide * (variance[own] + variance[other].max())) * (1.0 + 1e-9)
+    far = np.sqrt(wide * (variance[rows] + variance[other].max())) * (1.0 + 1e-9)
     first, last = np.searchsorted(line, middle - far), np.searchsorted(line, middle + far, side="right")
     return order + scan.start[t], first, last
 
@@ -298,7 +298,7 @@ def compatible_pairs(sensors: SensorArrays, scan: ScanArrays, gates: Gates, *, n
         order = np.argsort(keys, kind="stable")
         pairs, chi = pairs.take(order, axis=0), chi[order]
     first, second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
-    # partners of a measurement in a sensor stand together; those in the next one, or of the next measurement, follow
+    # ordered by first measurement, then by sensor of the second
     partners = np.bincount(first * np.int64(count) + scan.owner[second], minlength=total * count)
     starts = np.append(0, np.cumsum(partners))
     return Pairs(first, second, chi, starts[np.arange(total)[:, None] * count + np.arange(count + 1)])

@@ -1,4 +1,4 @@
-"""Where the target of a tuple is, and what the tuple costs."""
+"""Maximum-likelihood positions and costs of tuples of measurements of one time."""
 
 from __future__ import annotations
 
@@ -63,15 +63,15 @@ def single_positions(scene: Scene, sensor: int, measured: Array) -> tuple[Array,
     """
     sensors = sensor_arrays(scene)
     if sensors.code[sensor] == POSITION:
-        # what a position sensor says of a place is the same wherever the place is
+        # the covariance of a position sensor does not depend on the position
         known = _known_positions.setdefault(scene, {})
         if len(measured):
             if sensor not in known:
                 known[sensor] = _positions(scene, sensors, sensor, measured[:1])[1]
-            places = np.empty((len(measured), 3))
-            places[:] = sensors.middle
-            places[:, : measured.shape[1]] = measured
-            return places, np.broadcast_to(known[sensor], (len(measured), 3, 3))
+            points = np.empty((len(measured), 3))
+            points[:] = sensors.middle
+            points[:, : measured.shape[1]] = measured
+            return points, np.broadcast_to(known[sensor], (len(measured), 3, 3))
     return _positions(scene, sensors, sensor, measured)
 
 
@@ -89,10 +89,10 @@ def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array
 
 
 def scan_of(scene: Scene, scan: int | Scan) -> Scan:
-    """Scan of that number, or the scan itself, where its measurements are those of the scene's sensors."""
+    """The scan of that number, or the scan itself after a check against the scene's sensors."""
     if not isinstance(scan, Scan):
         return scene.scan(scan)
-    dims = [one.dim for one in scene.sensors]
+    dims = [sensor.dim for sensor in scene.sensors]
     found = [z.shape[1] for z in scan.measurements]
     if len(found) == len(dims) and found != dims:
         raise InvalidInputError(f"scan has measurements of {found} components, the scene's sensors measure {dims}")
@@ -100,10 +100,11 @@ def scan_of(scene: Scene, scan: int | Scan) -> Scan:
 
 
 def _fit_tuples(scene: Scene, scan: int | Scan, tuples: Array) -> tuple[Array, Array, Array, Array]:
-    one = scan_of(scene, scan)
+    """Rows of measurements (K, S), chi-square (K,), positions (K, 3) and covariances (K, 3, 3) of tuples."""
+    scan = scan_of(scene, scan)
     sensors = sensor_arrays(scene)
-    measured, index = scan_arrays(sensors, one, 1.0, 1.0)  # gates do not matter here
-    sizes = one.sizes
+    measured, index = scan_arrays(sensors, scan, 1.0, 1.0)  # gates do not matter here
+    sizes = scan.sizes
     wanted = checked_tuples(tuples, sizes)
     # bearings were sorted: from 1-based index to row
     row_of = np.empty(len(index) + 1, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""What is added to the cost of a tuple beside the residuals of its position: range rates, and a prior of positions.
+"""Prices: parts of a tuple's cost besides the residuals of its position, of range rates and of a prior of positions.
 
 Equation 5 takes the likelihood at the best position, as if it were known that a target is there. A tuple of bearings
 then costs the same whether they cross in a point or almost run along one another, although the second would explain
@@ -11,7 +11,7 @@ with P the covariance of the position (Laplace's approximation, exact for linear
 
     - ln( lambda (2 pi)^(n/2) |P|^(1/2) ).
 
-A direction in which the measurements tell less than the region does integrates to the region's width, and the whole
+A direction in which the measurements are less exact than the region integrates to the region's width, and the whole
 to lambda V at most, the number of targets in the region. Where the best position lies outside of the region, the
 nearest one inside counts, with what it costs the residuals at least.
 """
@@ -44,7 +44,7 @@ class PositionPrior(NamedTuple):
 
 
 def position_prior(scene: Scene, sensors: SensorArrays, target_density: float | str | None) -> PositionPrior | None:
-    """Return the prior that `assoc.build_problem` was asked for; None: none, which is equation 5."""
+    """Return the prior that a `target_density` stands for; None for None, which is equation 5."""
     if target_density is None:
         return None
     width, depth, height = (2.0 * sensors.half).tolist()
@@ -66,7 +66,7 @@ def position_prior(scene: Scene, sensors: SensorArrays, target_density: float | 
 
 
 def expected_targets(scene: Scene) -> float:
-    """Return how many targets the numbers of measurements speak for, at least one.
+    """Estimate the number of targets from the numbers of measurements, at least one.
 
     The mean over scans and sensors of (measurements - false alarms) / P_d.
     """
@@ -88,14 +88,14 @@ def prices(
     rates: RangeRates | None,
     prior: PositionPrior | None,
 ) -> Array:
-    """Twice what is added to the costs of tuples, (K,); 0 or more, and it hardly ever falls when a tuple grows.
+    """Twice the prices of tuples, (K,); 0 or more, and it hardly ever falls when a tuple grows.
 
     Parameters
     ----------
     rows : int32 (K, S)
         Row of `scan` for each sensor, or -1.
     rates, prior
-        None where there is nothing to add.
+        None: no such price.
     """
     _, positions, covariances = fit(sensors, scan, rows, False)
     total = np.zeros(len(rows))

@@ -1,4 +1,4 @@
-"""What range rates say of a tuple: the price of their disagreement under a prior of the velocity.
+"""The price of range rates of a tuple that disagree under a prior of the velocity.
 
 A tuple has one position and one velocity v. The position is that of the other components; seen from there, the
 range rate of radar i is u_i v + noise, with u_i the direction from the radar to the target. With the prior
@@ -6,10 +6,10 @@ v ~ N(0, diag(speed^2)) integrated out, the range rates d of a tuple are Gaussia
 
     d ~ N(0, D),    D = U diag(speed^2) U' + diag(r),
 
-so that a tuple of one Doppler radar pays for a speed nobody flies, and one of four or more for range rates that no
+so that a tuple of one Doppler radar pays for improbable speeds, and one of four or more for range rates that no
 velocity explains. Noise that is correlated with range or angles enters by its conditional mean and variance r.
 
-The cost of a tuple (`assoc.costs.arrays.SensorArrays.gain`) holds -ln of the densities N(0; 0, r); what is to be
+The cost of a tuple (`assoc.costs.arrays.SensorArrays.gain`) holds -ln of the densities N(0; 0, r); to be
 added is half of
 
     q = d' D^-1 d + ln det D - sum ln r,
@@ -35,7 +35,7 @@ from assoc.scene.scene import Scene
 from assoc.sensors.kernels.records import TURN
 
 SPEED = 300.0
-"""Standard deviation of a target's velocity along each axis, m/s, where nothing else is said."""
+"""Standard deviation of a target's velocity along each axis, m/s: the default."""
 
 
 class RangeRates(NamedTuple):
@@ -80,7 +80,7 @@ def range_rates(scene: Scene, scan: Scan, speed: float | Sequence[float]) -> Ran
 def prices(
     sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Array, positions: Array | None = None
 ) -> Array:
-    """The price q of the range rates of tuples, (K,), twice what is added to a cost.
+    """The price q of the range rates of tuples, (K,), twice what it adds to a cost.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _prices(sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Ar
             if n < 0 or r == 0.0:
                 continue
             for i in range(3):
-                u[i] = positions[t, i] - sensors.place[s, i]
+                u[i] = positions[t, i] - sensors.position[s, i]
             flat = math.hypot(u[0], u[1])
             slant = max(math.hypot(flat, u[2]), 1e-9)
             turn = scan.z[n, 1] - math.atan2(u[1], u[0])

@@ -1,4 +1,4 @@
-"""Where a fit of a position to a tuple begins, and where it begins again, compiled."""
+"""Starting points of the fit of a position to a tuple, compiled."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import math
 
 from assoc._system.compiled import inner_njit
 from assoc._types import Array
-from assoc.costs.residuals import CENTRE, CODE, FULL, INFORMATION, MEASURED, PLACE, RISE, normal
+from assoc.costs.residuals import CENTRE, CODE, FULL, INFORMATION, MEASURED, RISE, SITE, normal
 from assoc.costs.symmetric import solve
 from assoc.sensors.codes import BEARING, RADAR2D, RADAR3D
 from assoc.sensors.kernels.records import Three
 
 # in half heights: ranges above this bend too little for another height to matter, where there are no others to be near
 _FAR = 2.0
-# a radar looks near its zenith where it sees a target within so many standard deviations of elevation of it
+# a target is near a radar's zenith within so many standard deviations of elevation
 _NEAR_ZENITH = 3.0
 
 
 @inner_njit
 def mean_start(members: Array, full: bool) -> Three:
-    """Where to begin: the mean of the converted measurements, weighted by their information."""
+    """The mean of the converted measurements, weighted by their information."""
     b0 = b1 = b2 = a0 = a1 = a2 = a3 = a4 = a5 = 0.0
     last = 0
     for m in range(len(members)):
@@ -41,25 +41,25 @@ def mean_start(members: Array, full: bool) -> Three:
 
 @inner_njit
 def at_height(members: Array, m: int, z: float) -> Three:
-    """Where a range and azimuth are at a height; as high or low as the range allows."""
+    """The position of a range and azimuth at a height, clipped to what the range allows."""
     far, azimuth = members[m, MEASURED], members[m, MEASURED + 1]
-    up = min(max(z - members[m, PLACE + 2], -far), far)
+    up = min(max(z - members[m, SITE + 2], -far), far)
     ground = math.sqrt(far * far - up * up)
     return (
-        members[m, PLACE] + ground * math.cos(azimuth),
-        members[m, PLACE + 1] + ground * math.sin(azimuth),
-        members[m, PLACE + 2] + up,
+        members[m, SITE] + ground * math.cos(azimuth),
+        members[m, SITE + 1] + ground * math.sin(azimuth),
+        members[m, SITE + 2] + up,
     )
 
 
 @inner_njit
 def bearing_starts(members: Array, middle: Three, half: Three) -> tuple[Three, Three]:
-    """Two places to begin with bearings: where the lines cross, and ahead along the mean bearing."""
+    """Two starts for bearings: where the lines cross, and ahead along the mean bearing."""
     n00 = n01 = n11 = c0 = c1 = u = v = px = py = 0.0
     count = len(members)
     for m in range(count):
         cos, sin = math.cos(members[m, MEASURED]), math.sin(members[m, MEASURED])
-        x, y = members[m, PLACE], members[m, PLACE + 1]
+        x, y = members[m, SITE], members[m, SITE + 1]
         n00, n01, n11 = n00 + sin * sin, n01 - sin * cos, n11 + cos * cos
         c0, c1 = c0 + sin * (sin * x - cos * y), c1 - cos * (sin * x - cos * y)
         u, v, px, py = u + cos, v + sin, px + x / count, py + y / count
@@ -78,15 +78,15 @@ def bearing_starts(members: Array, middle: Three, half: Three) -> tuple[Three, T
 
 @inner_njit
 def height_start(members: Array, middle: Three, half: Three, all_slant: bool) -> tuple[float, float, float, float]:
-    """Where a radar without elevation sees its measurement at its own height or at the bottom of the region.
+    """The positions of a radar's measurement without elevation at its own height or at the bottom of the region.
 
-    Of all such places the one that explains all measurements best: chi-square there (infinite if there is none), place.
+    Of these the one of least chi-square: chi-square (infinite if there is none), position.
     """
     least, at = math.inf, (0.0, 0.0, 0.0)
     for m in range(len(members)):
         if members[m, CODE] != RADAR2D or (all_slant and members[m, MEASURED] > _FAR * half[2]):
             continue
-        for height in (members[m, PLACE + 2], middle[2] - half[2]):
+        for height in (members[m, SITE + 2], middle[2] - half[2]):
             there = at_height(members, m, height)
             chi = normal(members, there[0], there[1], there[2])[0]
             if chi < least:
@@ -96,16 +96,16 @@ def height_start(members: Array, middle: Three, half: Three, all_slant: bool) ->
 
 @inner_njit
 def singular_start(members: Array, near: Three) -> tuple[float, float, float, float]:
-    """A start beside the places where azimuths jump: a radar's zenith, and a bearing sensor near the target.
+    """A start beside the positions where azimuths jump: a radar's zenith, and a bearing sensor near the target.
 
     There a descent cannot turn around the sensor. Tried are the measured azimuth some way off the zenith, and where a
-    bearing's ray passes `near`, on the right side of its sensor. Chi-square (infinite if there is none) and place.
+    bearing's ray passes `near`, on the right side of its sensor. Chi-square (infinite if there is none) and position.
     """
     least, at = math.inf, (0.0, 0.0, 0.0)
     for m in range(len(members)):
         if members[m, CODE] != RADAR3D and members[m, CODE] != BEARING:
             continue
-        x, y, z = members[m, PLACE], members[m, PLACE + 1], members[m, PLACE + 2]
+        x, y, z = members[m, SITE], members[m, SITE + 1], members[m, SITE + 2]
         first, second, third = members[m, MEASURED], members[m, MEASURED + 1], members[m, MEASURED + 2]
         if members[m, CODE] == RADAR3D:
             spread = math.sqrt(members[m, RISE])

@@ -22,6 +22,7 @@ from assoc.filters.kernels.linear_algebra import all_factors
 from assoc.filters.measurement import Measurement, Observation, observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
+from assoc.sensors.base import numbers
 
 
 class State(Protocol):
@@ -277,10 +278,7 @@ def measured_array(measured: object, batch: int | None, dim: int, what: str = "m
     if isinstance(measured, np.ndarray) and measured.dtype == np.float64 and measured.flags.c_contiguous:
         array = measured
     else:
-        try:
-            array = np.ascontiguousarray(measured, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"{what} must be numbers, got {type(measured).__name__}") from error
+        array = numbers(measured, what)
     if array.ndim == 1 and batch == 1:
         array = array[None]
     if array.ndim != 2 or array.shape[1] != dim or (batch is not None and len(array) != batch):
@@ -308,25 +306,6 @@ def scores(residuals: Array, covariance: Array) -> tuple[Array, Array]:
     square = (white**2).sum(axis=1)
     log_det = 2 * np.log(np.einsum("bii->bi", factor)).sum(axis=1)
     return -0.5 * (square + log_det[:, None] + residuals.shape[2] * LOG_TURN), square
-
-
-def given_points(o: Observation, points: Array, z: Array) -> tuple[Array, Array, Array]:
-    """What kernels need of a user's model at points (B, m, n).
-
-    Returns
-    -------
-    models
-        Packed, with the measurements of the points relative to the first.
-    residuals (B, d)
-        Of measurements z (B, d) from those of the first points; (0, d) where z is empty.
-    first (B, d)
-        Measurements of the first points.
-    """
-    B, m, n = points.shape
-    measured = o.model.measure(points.reshape(-1, n))
-    first = measured[::m]
-    relative = o.model.residual(measured, np.repeat(first, m, axis=0)).reshape(B, m, o.dim)
-    return o.given(relative), np.ascontiguousarray(o.model.residual(z, first)) if len(z) else z, first
 
 
 def check_dimension(state: Gaussian, dim: int) -> Gaussian:
@@ -360,3 +339,39 @@ def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
     if low == high:
         return filter.predict(state, low) if low > 0 else state
     return filter.predict_each(state, dt)
+
+
+class PointFilter(Filter[S]):
+    """The base of filters that carry points: sigma points or the members of an ensemble."""
+
+    @abstractmethod
+    def _points(self, state: S) -> Array:
+        """Points of each target, (B, m, n)."""
+
+    @abstractmethod
+    def _correct(self, state: S, z: Array, models: Array) -> Update[S]:
+        """Run the kernel; without measurements z it gives expected ones instead of innovations."""
+
+    def update(self, state: S, measured: Array, sensor: Measurement) -> Update[S]:
+        """Correct each target with its measurement; see `Filter.update`."""
+        o = self.observe(sensor)
+        return self._run(state, measured_array(measured, len(state), o.dim), o)[0]
+
+    def expected(self, state: S, sensor: Measurement) -> Expected:
+        """Return the expected measurements and their covariances; see `Filter.expected`."""
+        o = self.observe(sensor)
+        done, first = self._run(state, np.zeros((0, o.dim)), o)
+        return Expected(done.innovation + first, done.covariance)
+
+    def _run(self, state: S, z: Array, o: Observation) -> tuple[Update[S], Array]:
+        """Results, and measurements (B or 1, d) that expected ones are relative to."""
+        if o.code >= 0:
+            return self._correct(state, z, o.packed), np.zeros((1, o.dim))
+        # a user's model: its measurements of all points, relative to that of the first
+        points = self._points(state)
+        B, m, n = points.shape
+        measured = o.model.measure(points.reshape(-1, n))
+        first = measured[::m]
+        relative = o.model.residual(measured, np.repeat(first, m, axis=0)).reshape(B, m, o.dim)
+        residual = np.ascontiguousarray(o.model.residual(z, first)) if len(z) else z
+        return self._correct(state, residual, o.given(relative)), first

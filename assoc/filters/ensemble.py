@@ -12,20 +12,10 @@ from assoc._parameters import is_whole, positive
 from assoc._system import memory
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import (
-    Expected,
-    Filter,
-    Update,
-    check_dimension,
-    complain,
-    given_points,
-    measured_array,
-    update_of,
-)
+from assoc.filters.base import PointFilter, Update, check_dimension, complain, update_of
 from assoc.filters.batches import Batch
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.points import ensemble_update, move_ensemble
-from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, finite
 
@@ -65,7 +55,7 @@ def _ensemble(members: Array) -> Ensemble:
     return made
 
 
-class EnsembleKalmanFilter(Filter[Ensemble]):
+class EnsembleKalmanFilter(PointFilter[Ensemble]):
     """The ensemble Kalman filter with perturbed measurements (equations 8 to 13 of the UAV paper).
 
     Parameters
@@ -99,7 +89,7 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
 
     def predict(self, state: Ensemble, dt: float) -> Ensemble:
         """Return the ensembles dt seconds later, with noise for each member."""
-        members, motion = self._checked(state), self.motion
+        members, motion = self._points(state), self.motion
         B, N, n = members.shape
         positive(dt, "dt", zero=True)
         if motion.linear:
@@ -126,33 +116,17 @@ class EnsembleKalmanFilter(Filter[Ensemble]):
         cross = before.transpose(0, 2, 1) @ (after.members - after.mean[:, None])
         return after, cross / (state.members.shape[1] - 1)
 
-    def update(self, state: Ensemble, measured: Array, sensor: Measurement) -> Update[Ensemble]:
-        """Correct each target with a measurement of its own; see `Filter.update`."""
-        o = self.observe(sensor)
-        return self._run(state, measured_array(measured, len(state.members), o.dim), o)[0]
-
-    def expected(self, state: Ensemble, sensor: Measurement) -> Expected:
-        """Return the expected measurements and their covariances; see `Filter.expected`."""
-        o = self.observe(sensor)
-        done, first = self._run(state, np.zeros((0, o.dim)), o)
-        return Expected(done.innovation + first, done.covariance)
-
-    def _run(self, state: Ensemble, z: Array, o: Observation) -> tuple[Update[Ensemble], Array]:
-        """The kernel's results, and what is to be added to expected measurements."""
-        members = self._checked(state)
-        (B, N, _), d = members.shape, o.dim
-        models, first = o.packed, np.zeros((1, d))
-        if o.code < 0:
-            models, z, first = given_points(o, members, z)
+    def _correct(self, state: Ensemble, z: Array, models: Array) -> Update[Ensemble]:
+        members = self._points(state)
+        (B, N, _), d = members.shape, z.shape[1]
         shocks = self.rng.standard_normal((B, N, d)) if len(z) else _NOTHING3
         out, rest = np.empty(members.shape), np.empty(B * (d + d * d + 2))
         status = ensemble_update(members, z, models, shocks, out, rest)
         if status != GOOD:
             complain(status)
-        return update_of(_ensemble(out), rest, d), first
+        return update_of(_ensemble(out), rest, d)
 
-    def _checked(self, state: Ensemble) -> Array:
-        """Members of the right dimension."""
+    def _points(self, state: Ensemble) -> Array:
         n = state.members.shape[2]
         if n != self.motion.dim:
             raise InvalidInputError(f"state must have {self.motion.dim} components, got {n}")

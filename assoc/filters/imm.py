@@ -151,7 +151,7 @@ class InteractingMultipleModel(Filter[Mixture]):
         super().__init__(filters[0].motion)
         self.filters = tuple(filters)
         m = len(filters)
-        self.transition = finite(transition, "transition", 2).copy()
+        self.transition = finite(transition, "transition", 2)
         if self.transition.shape != (m, m):
             raise InvalidInputError(f"transition must have shape {(m, m)}, got {self.transition.shape}")
         if (self.transition < 0).any() or np.abs(self.transition.sum(axis=1) - 1).max() > 1e-9:
@@ -166,7 +166,7 @@ class InteractingMultipleModel(Filter[Mixture]):
                 raise InvalidInputError("weights must be given: transition has several stationary probabilities")
             stationary = np.abs(vectors[:, np.argmax(values.real)].real)
             weights = stationary / stationary.sum()
-        self.weights = finite(weights, "weights", 1).copy()
+        self.weights = finite(weights, "weights", 1)
         if self.weights.shape != (m,) or (self.weights < 0).any() or abs(self.weights.sum() - 1) > 1e-9:
             raise InvalidInputError(f"weights must be {m} probabilities that sum to 1")
 

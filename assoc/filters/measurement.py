@@ -29,7 +29,7 @@ class LinearMeasurement:
     """
 
     def __init__(self, matrix: Array, covariance: Array) -> None:
-        self.matrix = finite(matrix, "matrix", 2).copy()
+        self.matrix = finite(matrix, "matrix", 2)
         self.dim = len(self.matrix)
         self.covariance = positive_definite(covariance, "covariance", (1, self.dim, self.dim))[0]
 

@@ -11,25 +11,21 @@ import numpy as np
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.filters.kernels.linear_algebra import all_factors
+from assoc.sensors.base import numbers, require_finite
 
 
 def finite(value: object, what: str, *dimensions: int) -> Array:
-    """Return a finite float64 C-ordered array of one of these numbers of axes; errors name it `what`."""
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} must be numbers, got {type(value).__name__}") from error
+    """Return a finite float64 C-ordered copy with one of these numbers of axes; errors name it `what`."""
+    array = np.atleast_1d(numbers(value, what))
     if dimensions and array.ndim not in dimensions:
         wanted = " or ".join(str(d) for d in dimensions)
         raise InvalidInputError(f"{what} must have {wanted} axes, got shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise InvalidInputError(f"{what} must be finite, got {array[~np.isfinite(array)][0]}")
-    return array
+    return require_finite(array, what)
 
 
 def positive_definite(value: object, what: str, shape: tuple[int, ...]) -> Array:
     """Return a checked stack (B, n, n) of symmetric positive definite matrices, a copy."""
-    array = finite(value, what, 2, 3).copy()
+    array = finite(value, what, 2, 3)
     if array.ndim == 2:
         array = array[None]
     if array.shape != shape:
@@ -64,7 +60,7 @@ class Gaussian:
     covariance: Array
 
     def __post_init__(self) -> None:
-        mean = np.atleast_2d(finite(self.mean, "mean", 1, 2)).copy()
+        mean = np.atleast_2d(finite(self.mean, "mean", 1, 2))
         shape = (len(mean), mean.shape[1], mean.shape[1])
         covariance = np.asarray(self.covariance)
         if covariance.ndim == 2 and covariance.shape == shape[1:]:

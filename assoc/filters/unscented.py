@@ -9,27 +9,17 @@ import numpy as np
 from assoc._parameters import positive
 from assoc._types import Array
 from assoc.errors import InvalidInputError
-from assoc.filters.base import (
-    Expected,
-    Filter,
-    Update,
-    check_dimension,
-    complain,
-    given_points,
-    measured_array,
-    update_of,
-)
+from assoc.filters.base import PointFilter, Update, check_dimension, complain, update_of
 from assoc.filters.kernels.gaussian import GOOD
 from assoc.filters.kernels.gaussian import predict as predict_kernel
 from assoc.filters.kernels.points import moments, sigma_points, unscented
-from assoc.filters.measurement import Measurement, Observation
 from assoc.filters.motion.models import Motion
 from assoc.filters.state import Gaussian, gaussian
 
 _NOTHING2 = np.zeros((0, 0))
 
 
-class UnscentedKalmanFilter(Filter[Gaussian]):
+class UnscentedKalmanFilter(PointFilter[Gaussian]):
     """The unscented Kalman filter, sigma points drawn anew for each correction.
 
     Parameters
@@ -85,6 +75,7 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
         return gaussian(mean, P), cross
 
     def _points(self, state: Gaussian) -> Array:
+        check_dimension(state, self.motion.dim)
         B, n = state.mean.shape
         points = np.empty((B, 2 * n + 1, n))
         status = sigma_points(state.mean, state.covariance, self.weights[0, 1], points)
@@ -92,27 +83,11 @@ class UnscentedKalmanFilter(Filter[Gaussian]):
             complain(status)
         return points
 
-    def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
-        """Correct each target with a measurement of its own; see `Filter.update`."""
+    def _correct(self, state: Gaussian, z: Array, models: Array) -> Update[Gaussian]:
         check_dimension(state, self.motion.dim)
-        o = self.observe(sensor)
-        return self._run(state, measured_array(measured, len(state.mean), o.dim), o)[0]
-
-    def expected(self, state: Gaussian, sensor: Measurement) -> Expected:
-        """Return the expected measurements and their covariances; see `Filter.expected`."""
-        check_dimension(state, self.motion.dim)
-        o = self.observe(sensor)
-        done, first = self._run(state, np.zeros((0, o.dim)), o)
-        return Expected(done.innovation + first, done.covariance)
-
-    def _run(self, state: Gaussian, z: Array, o: Observation) -> tuple[Update[Gaussian], Array]:
-        """The kernel's results, and what is to be added to expected measurements."""
-        B, d = len(state.mean), o.dim
-        models, first = o.packed, np.zeros((1, d))
-        if o.code < 0:
-            models, z, first = given_points(o, self._points(state), z)
+        B, d = len(state.mean), z.shape[1]
         mean, P, rest = np.empty(state.mean.shape), np.empty(state.covariance.shape), np.empty(B * (d + d * d + 2))
         status = unscented(state.mean, state.covariance, z, models, self.weights, mean, P, rest)
         if status != GOOD:
             complain(status)
-        return update_of(gaussian(mean, P), rest, d), first
+        return update_of(gaussian(mean, P), rest, d)

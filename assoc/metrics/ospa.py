@@ -14,6 +14,7 @@ from assoc._system.door import door
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.metrics.trajectories import Trajectories, epochs
+from assoc.sensors.base import numbers
 
 
 class Ospa(NamedTuple):
@@ -107,10 +108,7 @@ def point_sets(truth: Array, estimates: Array) -> tuple[Array, Array]:
     """Two sets of points as checked arrays (m, d) and (n, d)."""
     sets = []
     for name, points in (("truth", truth), ("estimates", estimates)):
-        try:
-            array = np.asarray(points, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"{name} must be numbers, got {type(points).__name__}") from error
+        array = numbers(points, name)
         if array.size == 0:
             array = array.reshape(0, array.shape[1] if array.ndim == 2 else 0)
         if array.ndim != 2 or not np.isfinite(array).all():

@@ -12,6 +12,7 @@ from assoc._text.shown import Shown
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.scene import Scene
+from assoc.sensors.base import numbers, require_finite
 
 SAME_TIME = 1e-6
 """Time stamps that differ by less than about this (s) are one epoch."""
@@ -42,7 +43,7 @@ class Trajectories(Shown):
     positions: Array
 
     def __post_init__(self) -> None:
-        times = _numbers(self.times, "times")
+        times = require_finite(numbers(self.times, "times"), "times")
         ids = np.asarray(self.ids)
         if ids.size == 0:
             ids = ids.astype(np.int64)
@@ -50,7 +51,7 @@ class Trajectories(Shown):
             raise InvalidInputError(f"times and ids must both have shape (n,), got {times.shape} and {ids.shape}")
         if ids.dtype.kind not in "iu":
             raise InvalidInputError(f"ids must be integers, got {ids.dtype}")
-        positions = _numbers(self.positions, "positions")
+        positions = require_finite(numbers(self.positions, "positions"), "positions")
         if len(times) == 0 and positions.size == 0:
             positions = positions.reshape(0, positions.shape[1] if positions.ndim == 2 else 3)
         if positions.ndim != 2 or len(positions) != len(times) or positions.shape[1] not in (2, 3):
@@ -95,19 +96,6 @@ class Trajectories(Shown):
     def __repr__(self) -> str:
         span = f", {self.times[0]:g} to {self.times[-1]:g} s" if len(self) else ""
         return f"Trajectories({len(np.unique(self.ids))} identities, {len(self)} rows{span})"
-
-
-def _numbers(value: object, name: str) -> Array:
-    try:
-        if np.asarray(value).dtype.kind in "mM":
-            raise TypeError  # numpy would count their days or nanoseconds
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        kind = value.dtype if isinstance(value, np.ndarray) else type(value).__name__
-        raise InvalidInputError(f"{name} must be numbers, got {kind}") from error
-    if not np.isfinite(array).all():
-        raise InvalidInputError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-    return array
 
 
 def columns_of_rows(**columns: Array) -> list[Array]:

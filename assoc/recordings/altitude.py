@@ -38,12 +38,12 @@ def garbled_altitudes(levels: ArrayLike, identities: ArrayLike, codes: ArrayLike
     """
     level, identity = np.asarray(levels, dtype=np.float64), np.asarray(identities)
     garbled = np.isin(level, np.asarray(codes, dtype=np.float64))
-    for one in np.unique(identity[identity != 0]):
-        rows = np.flatnonzero((identity == one) & ~np.isnan(level))
+    for code in np.unique(identity[identity != 0]):
+        rows = np.flatnonzero((identity == code) & ~np.isnan(level))
         good = rows[~garbled[rows]]
-        for place, row in enumerate(good):
+        for index, row in enumerate(good):
             around = np.concatenate(
-                [good[max(0, place - NEIGHBOURS) : place], good[place + 1 : place + 1 + NEIGHBOURS]]
+                [good[max(0, index - NEIGHBOURS) : index], good[index + 1 : index + 1 + NEIGHBOURS]]
             )
             if len(around) >= NEIGHBOURS and abs(level[row] - np.median(level[around])) > LARGEST_STEP:
                 garbled[row] = True

@@ -1,4 +1,4 @@
-"""Which column of a CSV file means what, in which unit, and how its text becomes a number."""
+"""Columns of a CSV file: their meanings, units, and numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "altitude": ("altitude", "alt", "mode_c", "flight_level"),
     "aircraft": ("aircraft",),
 }
-"""Where no column is named, the first of these that the file has is taken, a unit at its end or not."""
+"""Usual names by meaning, with or without a unit at the end: the first that the file has is taken."""
 
 REQUIRED = ("time", "range", "bearing")
 
@@ -33,9 +33,9 @@ UNITS: dict[str, dict[str, float]] = {
     "altitude": {"fl": FLIGHT_LEVEL, "ft": 0.3048, "m": 1.0},
     "mode3": {"dec": 10, "oct": 8},
 }
-"""Units of each column and what they are in metres and radians, of codes the base in which their digits are written.
+"""Units of each column in metres and radians; for codes the base of their digits.
 
-The first one is taken where nothing is said, for a column squawk the second.
+The first is the default, for a column squawk the second.
 """
 
 _ENDINGS = {meaning: (*known, "nm") if meaning == "range" else tuple(known) for meaning, known in UNITS.items()}
@@ -45,18 +45,18 @@ _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:\.\d{1,9})?)\Z")
 def choose(
     header: Sequence[str], columns: Mapping[str, str], units: Mapping[str, str]
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Find the place and the unit of every meaning.
+    """Find the column and the unit of every meaning.
 
     Parameters
     ----------
     header : sequence of str
         The names in the file; upper and lower case are the same.
     columns, units : mapping of str to str
-        Meaning to the column's name, and to its unit, where the user gives them.
+        Column name and unit by meaning, as given by the user.
 
     Returns
     -------
-    places : dict of str to int
+    columns : dict of str to int
         Meaning to column number, for the columns that are there.
     units : dict of str to str
         The unit of range, bearing and altitude, and the base of codes.
@@ -70,7 +70,7 @@ def choose(
         if unit not in UNITS[meaning]:
             raise InvalidInputError(f"units: expected {' or '.join(UNITS[meaning])} for the {meaning}, got {unit!r}")
     names = [name.strip().lower() for name in header]
-    places: dict[str, int] = {}
+    found_columns: dict[str, int] = {}
     chosen: dict[str, str] = {meaning: next(iter(known)) for meaning, known in UNITS.items()}
     for meaning, usual in COLUMNS.items():
         endings = {f"_{unit}": unit for unit in _ENDINGS.get(meaning, ())}
@@ -87,19 +87,19 @@ def choose(
             continue
         if names.count(found) > 1:
             raise InvalidInputError(f"the column {found!r} is there {names.count(found)} times")
-        places[meaning] = names.index(found)
+        found_columns[meaning] = names.index(found)
         unit = next((unit for ending, unit in endings.items() if found.endswith(ending)), "")
         if found == "squawk":
             unit = "oct"
         if unit:
             chosen[meaning] = "nmi" if unit == "nm" else unit
-    if len(set(places.values())) < len(places):
+    if len(set(found_columns.values())) < len(found_columns):
         raise InvalidInputError("columns: two meanings have the same column")
-    return places, {**chosen, **units}
+    return found_columns, {**chosen, **units}
 
 
 def seconds(text: str) -> tuple[float, bool]:
-    """Read a time: seconds, a clock time h:mm:ss, or a date with a time (ISO 8601, UTC unless it says otherwise).
+    """Read a time: seconds, a clock time h:mm:ss, or a date with a time (ISO 8601, UTC by default).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Groupings that ignore the antenna, to see what the clustering time window is worth."""
+"""Groupings that ignore the antenna, for comparison with the clustering time window."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def irregular_groups(
 ) -> list[Window]:
     """Group plots by intervals of irregular length, as the paper's data come without a window.
 
-    The paper has 183 groups in about 1,130 s, some shorter and some longer than a rotation, and does not say how
-    they come about. Here the lengths are gamma-distributed.
+    The paper has 183 groups in about 1,130 s, some shorter and some longer than a rotation, and does not explain
+    their lengths. Here they are gamma-distributed.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ def radar_of(
     false_alarm_rate: float = 2.5,
     name: str = "radar",
 ) -> Radar2D:
-    """Describe the radar of a recording; it stands at the origin.
+    """Describe the radar of a recording, at the origin.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _noise(name: str, given: float | None, values: Array) -> float:
         return float(given)
     step = resolution(values)
     if step == 0.0:
-        raise InvalidInputError(f"{name}: the plots do not come in steps that would tell it, so it must be given")
+        raise InvalidInputError(f"{name}: the plots do not come in steps, from which it could be estimated: give it")
     return step / math.sqrt(12.0)
 
 

@@ -20,7 +20,7 @@ from assoc.recordings.columns import COLUMNS, DAY, UNITS, choose, code, number, 
 from assoc.recordings.recording import UNDECODED, Recording
 
 MAX_DISORDER = 30.0
-"""Plots that come at most this late (s) are put where they belong; later ones are an error."""
+"""Plots up to this late (s) are sorted in; later ones are an error."""
 
 MOST_PLOTS = 20_000_000
 _FARTHEST = 1e7
@@ -47,10 +47,9 @@ def read_plots(
         Names of the columns for "time", "range", "bearing", "mode3", "altitude", "aircraft", where they are not
         the usual ones (`assoc.recordings.columns.COLUMNS`).
     units : mapping of str to str, optional
-        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m), and how the codes of "mode3" are
-        written: dec, the 12 bits as a number, or oct, their octal digits. Without it the end of the column's name
-        tells (range_km), and without that nautical miles, degrees, flight levels and dec are meant, of a column squawk
-        oct.
+        Of "range" (nmi, km, m), "bearing" (deg, rad) and "altitude" (fl, ft, m), and of the codes of "mode3": dec, the
+        12 bits as a number, or oct, their octal digits. By default the end of the column's name (range_km), else
+        nautical miles, degrees, flight levels and dec, for a column squawk oct.
     max_disorder : float, default 30
         Plots up to this many seconds late are sorted in; one that is later is an error with its line.
     garbled_codes : array_like of int, optional
@@ -59,8 +58,8 @@ def read_plots(
     Returns
     -------
     Recording
-        In the order of time. Its notes count what was mended: rows that came late, that repeat a row word for
-        word (left out), that hold only zeros (left out: fillers, not plots), and midnights that were passed.
+        In the order of time. Its notes count late rows (sorted in), repeated rows and rows of zeros (left out:
+        fillers, not plots), and midnights passed.
 
     Raises
     ------
@@ -87,12 +86,12 @@ def _read(
     separator = max(",;\t", key=head.count)
     try:
         header = next(csv.reader([head], delimiter=separator))
-        places, scales = choose(header, columns, units)
+        columns_of, scales = choose(header, columns, units)
     except csv.Error as error:
         raise InvalidInputError(f"{file}: line 1: {error}") from None
     except InvalidInputError as error:
         raise InvalidInputError(f"{file}: {error}") from None
-    table = _Table(file, places, header, UNITS["mode3"][scales["mode3"]])
+    table = _Table(file, columns_of, header, UNITS["mode3"][scales["mode3"]])
     rows = csv.reader(lines, delimiter=separator)
     try:
         for cells in rows:
@@ -105,11 +104,11 @@ def _read(
 class _Table:
     """Rows of the file as they come."""
 
-    def __init__(self, file: Path, places: Mapping[str, int], header: list[str], base: float) -> None:
+    def __init__(self, file: Path, columns_of: Mapping[str, int], header: list[str], base: float) -> None:
         self.file = file
-        self.places = places
+        self.columns_of = columns_of
         self.base = base
-        self.names = {meaning: header[place].strip()[:30] for meaning, place in places.items()}
+        self.names = {meaning: header[index].strip()[:30] for meaning, index in columns_of.items()}
         self.values = {meaning: array("d") for meaning in COLUMNS}
         self.lines = array("q")
         self.fillers = self.midnights = 0
@@ -118,12 +117,12 @@ class _Table:
         self.before = 0.0
 
     def add(self, cells: list[str], line: int) -> None:
-        """Take one row, or refuse it by a line that names it."""
+        """Add one row; errors name its line."""
         if not any(cell.strip() for cell in cells):
             return
         row = {}
-        for meaning, place in self.places.items():
-            text = cells[place].strip() if place < len(cells) else ""
+        for meaning, index in self.columns_of.items():
+            text = cells[index].strip() if index < len(cells) else ""
             try:
                 row[meaning] = self._value(meaning, text)
             except (ValueError, OverflowError):
@@ -133,13 +132,13 @@ class _Table:
         if abs(row["bearing"]) > 1000 or abs(row.get("altitude", 0.0)) > _FARTHEST or abs(row["time"]) > 1e12:
             wrong = "bearing" if abs(row["bearing"]) > 1000 else "time" if abs(row["time"]) > 1e12 else "altitude"
             raise self._error(line, wrong, "a number of usual size", f"{row[wrong]:g}")
-        # a row of zeros is a mark between groups, as in tables 4.5 to 4.8 of the paper, and no plot
+        # a row of zeros separates groups, as in tables 4.5 to 4.8 of the paper
         if all(row.get(meaning, 0.0) == 0.0 for meaning in ("range", "bearing", "mode3", "altitude")):
             self.fillers += 1
             return
         if len(self.lines) >= MOST_PLOTS:
             raise LimitExceededError(f"{self.file}: more than {MOST_PLOTS} plots; split the file")
-        row["time"] = self._running(row["time"], line)
+        row["time"] = self._running(row["time"])
         for meaning, values in self.values.items():
             default = math.nan if meaning == "altitude" else -1.0 if meaning == "aircraft" else float(UNDECODED)
             values.append(row.get(meaning, default))
@@ -160,7 +159,7 @@ class _Table:
             return math.nan
         return number(text)
 
-    def _running(self, time: float, line: int) -> float:
+    def _running(self, time: float) -> float:
         """Let clock times run on over midnight: a fall by more than half a day is a new day."""
         if self.clock and self.lines and time + self.day < self.before - DAY / 2:
             self.day += DAY
@@ -199,9 +198,9 @@ class _Table:
                 f"{max_disorder:g} s; split the file there, or allow more with max_disorder"
             )
         order = np.argsort(columns["time"], kind="stable")
-        # a value that is missing is equal to another missing one, and to no number
-        content = np.stack([np.nan_to_num(columns[meaning], nan=-math.inf) for meaning in self.places], axis=1)[order]
-        _, first = np.unique(content, axis=0, return_index=True)
+        # missing values are equal to one another only
+        content = np.stack([np.nan_to_num(columns[meaning], nan=-math.inf) for meaning in self.columns_of], axis=1)
+        _, first = np.unique(content[order], axis=0, return_index=True)
         keep = order[np.sort(first)]
         scale = {meaning: UNITS[meaning][unit] for meaning, unit in units.items()}
         levels = columns["altitude"][keep]
@@ -216,7 +215,7 @@ class _Table:
             altitudes=levels * scale["altitude"],
             garbled=garbled_altitudes(in_levels, identities, known if units["altitude"] == "fl" else ()),
             lines=lines[keep],
-            sources=columns["aircraft"][keep].astype(np.int64) if "aircraft" in self.places else None,
+            sources=columns["aircraft"][keep].astype(np.int64) if "aircraft" in self.columns_of else None,
             notes={
                 "late plots sorted in": int((late > 0).sum()),
                 "repeated rows left out": len(order) - len(keep),

@@ -39,13 +39,13 @@ class Recording(Shown):
     garbled : array_like of bool (n,), optional
         Altitudes that cannot be right.
     lines : array_like of int (n,), optional
-        Where the plot stood in its file.
+        Line of the plot in its file.
     addresses : array_like of int (n,), optional
         ICAO addresses of 24 bits; 0 is "not known", and the default.
     sources : array_like of int (n,), optional
-        The aircraft that really caused the plot, -1 for a false plot; only a simulation knows.
+        The aircraft that caused the plot, -1 for a false plot; known in simulations.
     notes : mapping of str to int, optional
-        What reading had to mend, and how often.
+        What reading had to correct, and how often.
     name : str
 
     Raises
@@ -127,7 +127,7 @@ class Recording(Shown):
 
     @property
     def positions(self) -> Array:
-        """Places x (east), y (north) in the slant plane (n, 2), metres."""
+        """Positions x (east), y (north) in the slant plane (n, 2), metres."""
         return self.ranges[:, None] * np.stack([np.cos(self.azimuths), np.sin(self.azimuths)], axis=1)
 
     @property
@@ -154,7 +154,7 @@ class Recording(Shown):
         return Recording(**parts, sources=sources, notes=self.notes, name=self.name)
 
     def summary(self) -> str:
-        """What is in it and what is wrong with it, a few lines of text."""
+        """Return its contents and defects in a few lines."""
         if not len(self):
             return "no plots"
         missing = int(np.isnan(self.altitudes).sum())

@@ -1,4 +1,4 @@
-"""How long the antenna takes for a turn, from the plots themselves."""
+"""Estimation of the rotation time from plots."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from assoc.errors import InvalidInputError
 from assoc.recordings.recording import Recording
 
 SHORTEST, LONGEST = 2.0, 30.0
-"""Rotation times (s) that are looked for. Below 2 s, stamps in whole seconds could not tell two of them apart."""
+"""Rotation times (s) that are tried. Below 2 s stamps in whole seconds do not distinguish them."""
 
 STRETCH = 300.0
-"""Seconds that are looked at together, so that neither gaps nor a drifting motor matter."""
+"""Length of a stretch, seconds, so that neither gaps nor a drifting motor matter."""
 
 _MOST = 20_000
 _MOST_FREQUENCIES = 10_000_000
@@ -55,7 +55,7 @@ def estimate_rotation(recording: Recording, shortest: float = SHORTEST, longest:
     if count < 5 or span < 2 * shortest:
         raise InvalidInputError(f"the rotation time cannot be estimated from {count} plots over {span:g} s: give it")
     step = 1.0 / (8.0 * span)
-    # less than a turn and a half tells nothing of a turn
+    # at least a turn and a half is needed
     lowest = max(1.0 / longest, 1.5 / span)
     if (1.0 / shortest - lowest) / step > _MOST_FREQUENCIES:
         raise InvalidInputError(f"shortest: {shortest:g} s makes too many rotation times to try on {span:g} s of plots")

@@ -32,9 +32,9 @@ def scene_of_radars(
 ) -> Scene:
     """Put the plots of several radars into one scene, each with its own time.
 
-    A scan holds what all radars measured since the one before. The sectors that a radar looked at follow from its
-    rotation and from the azimuths and times of its own plots, so that a radar is not said to have missed what it did
-    not look at; before its first plot and after its last it does not look.
+    A scan holds the measurements of all radars since the previous one. The sectors that a radar covered follow from its
+    rotation and from the azimuths and times of its plots; before its first plot and after its last it is taken for
+    switched off.
 
     Parameters
     ----------
@@ -56,40 +56,42 @@ def scene_of_radars(
     InvalidInputError
         There are no plots, or arguments are not as described.
     """
-    if not len(recordings) or len(recordings) != len(radars) or not all(len(one) for one in recordings):
+    if not len(recordings) or len(recordings) != len(radars) or not all(len(recording) for recording in recordings):
         raise InvalidInputError(
             f"recordings: expected at least one, each with plots and a radar, got {len(recordings)} with "
             f"{len(radars)} radars"
         )
     if rotations is not None and len(rotations) != len(recordings):
         raise InvalidInputError(f"rotations: expected one for each of {len(recordings)} recordings")
-    given = [estimate_rotation(one) for one in recordings] if rotations is None else rotations
-    turns = [positive(one, "rotations") for one in given]
+    given = [estimate_rotation(recording) for recording in recordings] if rotations is None else rotations
+    turns = [positive(turn, "rotations") for turn in given]
     pace = 0.5 * min(turns) if interval is None else positive(interval, "interval")
     if pace > min(turns) * (1 + 1e-9):
         raise InvalidInputError(f"interval: expected at most the shortest turn, {min(turns):g} s, got {pace:g}")
-    start, end = min(float(one.times[0]) for one in recordings), max(float(one.times[-1]) for one in recordings)
+    start = min(float(recording.times[0]) for recording in recordings)
+    end = max(float(recording.times[-1]) for recording in recordings)
     if (end - start) / pace > MOST_SCANS:
         raise InvalidInputError(f"interval: {pace:g} s makes more than {MOST_SCANS} scans of {end - start:g} s")
     edges = start + pace * np.arange(math.floor((end - start) / pace) + 2)
-    blocks = []
-    for one in recordings:
+    measured, stamps, sectors = [], [], []
+    for recording, turn in zip(recordings, turns, strict=True):
         # a plot on an edge belongs to the scan before it, but for the first
-        cut = np.searchsorted(one.times, edges, side="right")
-        cut[0] = 0
-        blocks.append([slice(a, b) for a, b in zip(cut[:-1], cut[1:], strict=True)])
-    scans = range(len(edges) - 1)
+        cut = np.searchsorted(recording.times, edges[1:-1], side="right")
+        measured.append(np.split(recording.measurements, cut))
+        stamps.append(np.split(recording.times, cut))
+        sectors.append(_sectors(recording, turn, edges))
     return Scene(
-        radars, edges[1:],
-        [[one.measurements[block[k]] for one, block in zip(recordings, blocks, strict=True)] for k in scans],
-        measurement_times=[[one.times[block[k]] for one, block in zip(recordings, blocks, strict=True)] for k in scans],
-        sectors=np.stack([_sectors(one, turn, edges) for one, turn in zip(recordings, turns, strict=True)], axis=1),
-        name=" + ".join(one.name for one in recordings if one.name),
-    )  # fmt: skip
+        radars,
+        edges[1:],
+        list(zip(*measured, strict=True)),
+        measurement_times=list(zip(*stamps, strict=True)),
+        sectors=np.stack(sectors, axis=1),
+        name=" + ".join(recording.name for recording in recordings if recording.name),
+    )
 
 
 def _sectors(recording: Recording, turn: float, edges: Array) -> Array:
-    """Azimuths from which to which an antenna looked between the edges, (K, 2)."""
+    """First and last azimuth that an antenna covered between the edges, (K, 2)."""
     times = recording.times
     phase = running_phase(times, times / turn - recording.bearings / FULL_TURN, turn)
     # a recording may end within a scan

@@ -134,10 +134,10 @@ def _by_antenna(recording: Recording, turn: float) -> Array:
     for rows in parts:
         turns = recording.times[rows] / turn - bearings[rows]
         phase = running_phase(recording.times[rows], turns, turn)
-        own = np.round(turns - phase).astype(np.int64)
-        own += last + 1 - own.min()
-        numbers[rows] = own
-        last = int(own.max())
+        turn_numbers = np.round(turns - phase).astype(np.int64)
+        turn_numbers += last + 1 - turn_numbers.min()
+        numbers[rows] = turn_numbers
+        last = int(turn_numbers.max())
     return numbers
 
 

@@ -59,8 +59,8 @@ def write_tracks(path: str | os.PathLike[str], ids: Array, times: Array, positio
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["track_id", "time", "x", "y", "z", "vx", "vy", "vz"])
-    for one, time, place, velocity in zip(ids.tolist(), times, positions, velocities, strict=True):
-        writer.writerow([one, _short(time, 6), *(_short(value, 3) for value in (*place, *velocity))])
+    for target, time, position, velocity in zip(ids.tolist(), times, positions, velocities, strict=True):
+        writer.writerow([target, _short(time, 6), *(_short(value, 3) for value in (*position, *velocity))])
     write_text(path, text.getvalue())
 
 

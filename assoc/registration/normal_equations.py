@@ -18,7 +18,7 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Array
 from assoc.costs.arrays import SensorArrays
 from assoc.costs.symmetric import inverse
-from assoc.registration.terms import MEASURED, PLACE, TermArrays
+from assoc.registration.terms import MEASURED, SITE, TermArrays
 from assoc.sensors.codes import BEARING, POSITION
 from assoc.sensors.kernels.dispatch import linearise, wrap
 
@@ -60,7 +60,7 @@ def _bias_column(kind: int, index: int, H: Array, v: Array, d: int, column: Arra
     for i in range(d):
         if kind == MEASURED:
             column[i] = 1.0 if i == index else 0.0
-        elif kind == PLACE:
+        elif kind == SITE:
             column[i] = H[i, index]
         elif not math.isnan(v[0]):
             column[i] = -(H[i, 0] * v[0] + H[i, 1] * v[1] + H[i, 2] * v[2])
@@ -81,7 +81,7 @@ def _linearise_tuple(
         if not seen[s]:
             continue
         code, d, W = sensors.code[s], sensors.dim[s], sensors.weight[s]
-        linearise(code, d, sensors.place[s], at[0], at[1], at[2], h, H[s])
+        linearise(code, d, sensors.position[s], at[0], at[1], at[2], h, H[s])
         for i in range(d):
             nu[s, i] = z[s, i] - h[i]
         wrap(code, nu[s])

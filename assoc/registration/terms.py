@@ -16,7 +16,7 @@ from assoc.sensors.base import ANGLES
 from assoc.sensors.codes import CODES
 
 AXES = ("x", "y", "z")
-MEASURED, PLACE, TIME = 0, 1, 2
+MEASURED, SITE, TIME = 0, 1, 2
 """Kinds of terms in kernels: a measured component, the position along an axis, the clock."""
 
 
@@ -105,7 +105,7 @@ def term_arrays(terms: Sequence[Term], sensors: Sequence[Sensor]) -> TermArrays:
             kind.append(TIME)
             index.append(0)
         elif term.component in AXES:
-            kind.append(PLACE)
+            kind.append(SITE)
             index.append(AXES.index(term.component))
         else:
             kind.append(MEASURED)

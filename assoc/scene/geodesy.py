@@ -25,9 +25,9 @@ def checked_origin(origin: object) -> Origin:
     Raises
     ------
     InvalidInputError
-        They are not numbers, or not ones of a place on the earth in radians and metres.
+        They are not numbers, or not a position on the earth in radians and metres.
     """
-    lat, lon, height = (float(one) for one in finite_array(origin, "origin", (3,)))
+    lat, lon, height = finite_array(origin, "origin", (3,)).tolist()
     for name, value, most in (("latitude", lat, math.pi / 2), ("longitude", lon, 2 * math.pi)):
         if abs(value) > most * (1 + 1e-12):
             raise InvalidInputError(f"origin: {name} must be within +-{most:.4g} rad, got {value:g} (degrees?)")

@@ -11,7 +11,7 @@ from assoc.errors import InvalidInputError
 
 
 def as_seconds(times: Any, what: str) -> Any:
-    """Turn dates into seconds since 1970-01-01 UTC, and durations into seconds; all else is returned as it is.
+    """Turn dates into seconds since 1970-01-01 UTC, and durations into seconds; anything else is returned unchanged.
 
     Taken are arrays of numpy's datetime64 and timedelta64, Python's datetimes and timedeltas, and what pandas makes
     of them. A date without a time zone is one of UTC.
@@ -27,7 +27,7 @@ def as_seconds(times: Any, what: str) -> Any:
         if not isinstance(first, (datetime.datetime, datetime.timedelta, np.datetime64, np.timedelta64)):
             return times
         try:
-            array = np.array([_plain(one) for one in array.flat]).reshape(array.shape)
+            array = np.array([_plain(date) for date in array.flat]).reshape(array.shape)
         except (TypeError, ValueError) as error:
             raise InvalidInputError(f"{what} must be all dates or all seconds, got both") from error
     if array.dtype.kind not in "mM":
@@ -39,11 +39,11 @@ def as_seconds(times: Any, what: str) -> Any:
     return whole.astype(np.int64) / 1e6
 
 
-def _plain(one: Any) -> np.datetime64 | np.timedelta64:
-    if isinstance(one, datetime.datetime):
-        return np.datetime64(one if one.tzinfo is None else one.astimezone(datetime.UTC).replace(tzinfo=None), "us")
-    if isinstance(one, datetime.timedelta):
-        return np.timedelta64(one, "us")
-    if isinstance(one, (np.datetime64, np.timedelta64)):
-        return one
-    raise TypeError(type(one).__name__)
+def _plain(date: Any) -> np.datetime64 | np.timedelta64:
+    if isinstance(date, datetime.datetime):
+        return np.datetime64(date if date.tzinfo is None else date.astimezone(datetime.UTC).replace(tzinfo=None), "us")
+    if isinstance(date, datetime.timedelta):
+        return np.timedelta64(date, "us")
+    if isinstance(date, (np.datetime64, np.timedelta64)):
+        return date
+    raise TypeError(type(date).__name__)

@@ -1,4 +1,4 @@
-"""What a scene file may hold beside measurements: where the scene is on the earth, and what things are called."""
+"""Metadata of a scene file: its origin on the earth, notes, and names of targets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ METADATA_FIELDS = {
 
 
 def metadata_arrays(parts: Mapping[str, Any]) -> dict[str, Array]:
-    """Return the fields of a scene's attributes; only those that say something."""
+    """Return the fields of a scene's attributes; only those that are not empty."""
     arrays: dict[str, Array] = {}
     if parts["origin"] is not None:
         arrays["origin"] = np.array(parts["origin"])

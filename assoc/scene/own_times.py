@@ -1,4 +1,4 @@
-"""Measurements with times of their own, and where a sensor looked in a scan: what is asked of them."""
+"""Checks of measurements' own times, and of the sectors that sensors covered in a scan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SLACK = 1e-9
 
 
 def checked_times(times: object, measurements: Sequence[Array], end: float, where: str) -> tuple[Array, ...]:
-    """Times of a scan's measurements, read-only arrays (n_s,), none of them after the scan's own time.
+    """Times of a scan's measurements, read-only arrays (n_s,), none of them after the time of the scan.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
     end : float
         Time of the scan, seconds.
     where : str
-        What messages begin with.
+        Beginning of messages.
 
     Raises
     ------
@@ -38,9 +38,9 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
     if not known or len(times) != count:  # type: ignore[arg-type]
         raise InvalidInputError(f"{where} must be one array for each of {count} sensors")
     result = []
-    for s, (one, z) in enumerate(zip(times, measurements, strict=True)):  # type: ignore[call-overload]
+    for s, (stamps, z) in enumerate(zip(times, measurements, strict=True)):  # type: ignore[call-overload]
         what = f"{where} of sensor {s}"
-        array = finite_array(np.zeros(0) if np.size(one) == 0 else one, what, (len(z),))
+        array = finite_array(np.zeros(0) if np.size(stamps) == 0 else stamps, what, (len(z),))
         if len(array) and array.max() > end:
             raise InvalidInputError(f"{what} must not be after the scan's time, {end:g} s, got {array.max():g}")
         result.append(array)
@@ -48,7 +48,7 @@ def checked_times(times: object, measurements: Sequence[Array], end: float, wher
 
 
 def checked_sectors(sectors: object, sensors: int, where: str) -> Array:
-    """The sectors that sensors looked at in a scan, read-only (S, 2).
+    """The sectors that sensors covered in a scan, read-only (S, 2).
 
     Raises
     ------

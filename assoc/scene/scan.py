@@ -12,7 +12,7 @@ from assoc._types import Array
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scan:
-    """All measurements of one instant, or those up to it that have times of their own.
+    """All measurements of one instant, or with their own times those up to it.
 
     Attributes
     ----------
@@ -20,12 +20,12 @@ class Scan:
         Number of the scan from 0, time stamp in seconds.
     measurements : tuple over sensors of arrays (n_s, d_s)
     sources : tuple over sensors of int arrays (n_s,), or None
-        Target id of each measurement, -1 for a false alarm; None where it is not known.
+        Target id of each measurement, -1 for a false alarm; None where unknown.
     truth_ids, truth_positions : arrays (T,) and (T, 3), or None
     times : tuple over sensors of arrays (n_s,), or None
         When each measurement was made, seconds; None: all at `time`.
     sectors : array (S, 2), or None
-        Azimuths from which to which each sensor looked, see `assoc.Scene`; None: all looked everywhere.
+        First and last azimuth that each sensor covered, see `assoc.Scene`; None: all directions.
     identities : tuple over sensors of int arrays (n_s, 2), or None
         Mode 3/A code and ICAO address of each measurement, 0 where it has none.
     """
@@ -53,7 +53,7 @@ class Scan:
 
     @property
     def at_once(self) -> bool:
-        """Whether all sensors looked everywhere, at the scan's time."""
+        """Whether all sensors covered all directions at the scan's time."""
         return self.times is None and self.sectors is None
 
     def true_tuples(self) -> NDArray[np.int32] | None:
@@ -62,7 +62,7 @@ class Scan:
         Returns
         -------
         int32 array (T, S), or None
-            In order of target id; None where the sources are not known. A target of which one sensor has several
+            In order of target id; None where the sources are unknown. A target of which one sensor has several
             measurements has no tuple and is left out.
         """
         if self.sources is None:

@@ -14,11 +14,11 @@ from assoc._system.door import doors
 from assoc._text.html import escape, table
 from assoc._types import Array
 from assoc.errors import InvalidInputError, warn
-from assoc.scene.doubts import doubts_about
 from assoc.scene.file import load_parts, save_parts
 from assoc.scene.geodesy import Origin, checked_origin, geodetic
 from assoc.scene.instants import as_seconds
 from assoc.scene.own_times import checked_sectors, checked_times
+from assoc.scene.plausibility import implausible
 from assoc.scene.scan import Scan
 from assoc.scene.truth import Truth
 from assoc.sensors import PositionSensor, Radar2D, Radar3D, Sensor
@@ -52,14 +52,14 @@ class Scene:
         When each measurement was made, seconds, not after its scan's time; left out, all are of their scan's time.
         One from before the scan before is late: it arrived with this scan.
     sectors : array_like (K, S, 2), optional
-        From which to which azimuth (radians, from +x towards +y) each sensor looked in each scan; the second is 0
-        to 2 pi above the first, and a sector without width means that the sensor did not look. Left out, all
-        sensors look everywhere in every scan. What was not looked at is not missed.
+        First and last azimuth (radians, from +x towards +y) that each sensor covered in each scan; the second is 0
+        to 2 pi above the first, and a sector without width means that the sensor was off. Left out, all sensors
+        cover all directions in every scan. Targets that were not covered are not missed.
     origin : tuple of latitude, longitude, height, optional
         Where the scene's frame stands on the earth: x east, y north, z up in the plane that touches the WGS-84
         ellipsoid there; radians, radians, metres. Tracks and reports then have latitudes and longitudes.
     notes : mapping of str to int, optional
-        What was left out or mended when the scene was made from a file, and how often.
+        What was left out or corrected when the scene was made from a file, and how often.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Scene:
     Warns
     -----
     AssocWarning
-        The measurements of a sensor do not fit what it says of itself, as with degrees or kilometres.
+        The measurements of a sensor do not fit its parameters, as with degrees or kilometres.
     """
 
     sensors: Sequence[Sensor]
@@ -117,17 +117,17 @@ class Scene:
         put(self, "notes", {str(what): int(count) for what, count in self.notes.items()})
         if self.truth is not None:
             self._check_truth(self.truth)
-        for line in self._doubts:
+        for line in self._implausible:
             warn(line)
 
     @cached_property
-    def _doubts(self) -> tuple[str, ...]:
-        return doubts_about(self.sensors, self.measurements)
+    def _implausible(self) -> tuple[str, ...]:
+        return implausible(self.sensors, self.measurements)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is almost surely a mistake in the sensors and their measurements, one line each."""
-        return (*(line for sensor in self.sensors for line in sensor.warnings), *self._doubts)
+        """Probable mistakes in the sensors and their measurements, one line each."""
+        return (*(line for sensor in self.sensors for line in sensor.warnings), *self._implausible)
 
     def _checked_measurement_times(self, given: Sequence[Sequence[Array]]) -> tuple[tuple[Array, ...], ...]:
         if len(given) != self.num_scans:
@@ -259,20 +259,20 @@ class Scene:
         rows, units = [], {"range rate": "m/s"}
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
-            place = ", ".join(f"{x:g}" for x in sensor.position)
+            position = ", ".join(f"{x:g}" for x in sensor.position)
             if self.origin is not None:
                 lat, lon, _ = geodetic(sensor.position, self.origin)[0]
-                place += f" ({np.degrees(lat):.5f}°, {np.degrees(lon):.5f}°)"
+                position += f" ({np.degrees(lat):.5f}°, {np.degrees(lon):.5f}°)"
             sigmas = np.sqrt(np.diagonal(sensor.covariance))
             noise = ", ".join(
                 f"{name} {np.degrees(sigma):.3g}°" if name in ANGLES else f"{name} {sigma:.3g} {units.get(name, 'm')}"
                 for name, sigma in zip(sensor.components, sigmas, strict=False)
             )
             rows.append(
-                [sensor.name or s + 1, type(sensor).__name__, place, noise, f"{sensor.detection_probability:g}"]
+                [sensor.name or s + 1, type(sensor).__name__, position, noise, f"{sensor.detection_probability:g}"]
                 + [f"{sensor.false_alarm_rate:g}", f"{np.mean(counts):.3g}"]
             )
-        headers = ["sensor", "kind", "place (m)", "noise (1 σ)", "P_d"]
+        headers = ["sensor", "kind", "position (m)", "noise (1 σ)", "P_d"]
         headers += ["false alarms per scan", "measurements per scan"]
         return f"<p>{escape(repr(self))}</p>{table(headers, rows, numbers=(4, 5, 6))}"
 
@@ -286,12 +286,12 @@ def default_region(sensors: Sequence[Sensor]) -> Array:
             boxes.append(np.stack([sensor.position[:2] - reach, sensor.position[:2] + reach], axis=1))
         elif isinstance(sensor, PositionSensor):
             boxes.append(sensor.field_of_view[:2])
-    places = np.array([sensor.position for sensor in sensors])
+    positions = np.array([sensor.position for sensor in sensors])
     if not boxes:
         # bearings contain no distance: take the surroundings of the sensors, at least 100 km
-        reach = max(100_000.0, float(np.ptp(places[:, :2], axis=0).max()))
-        boxes.append(np.stack([places[:, :2].min(axis=0) - reach, places[:, :2].max(axis=0) + reach], axis=1))
-    floor = float(places[:, 2].min())
+        reach = max(100_000.0, float(np.ptp(positions[:, :2], axis=0).max()))
+        boxes.append(np.stack([positions[:, :2].min(axis=0) - reach, positions[:, :2].max(axis=0) + reach], axis=1))
+    floor = float(positions[:, 2].min())
     heights = [(floor, floor + _DEFAULT_HEIGHT)]
     heights += [tuple(s.field_of_view[2]) for s in sensors if isinstance(s, PositionSensor) and s.dim == 3]
     plane = np.stack([np.min(boxes, axis=0)[:, 0], np.max(boxes, axis=0)[:, 1]], axis=1)

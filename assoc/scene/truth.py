@@ -1,4 +1,4 @@
-"""Where the targets of a scene really were, and which measurement came from which."""
+"""True positions of the targets of a scene, and the source of each measurement."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Truth:
     target_ids : sequence over scans of int arrays (T_k,)
         The targets present, each id (0 or more) once per scan.
     positions : sequence over scans of arrays (T_k, 3)
-        Where they were, metres.
+        Their positions, metres.
     sources : sequence over scans of sequences over sensors of int arrays (n,), optional
         The target that caused each measurement, or -1 for a false alarm.
     names : mapping of int to str, optional
-        What targets are called, as call signs, by their ids.
+        Names of targets, as call signs, by their ids.
     """
 
     target_ids: Sequence[Array]
@@ -54,16 +54,16 @@ class Truth:
             raise InvalidInputError(
                 f"truth: target_ids has {len(self.target_ids)} scans, positions has {len(self.positions)}"
             )
-        ids, places = [], []
-        for k, (one, where) in enumerate(zip(self.target_ids, self.positions, strict=True)):
-            checked = integers(one, f"truth: target_ids of scan {k}", len(one))
+        ids, positions = [], []
+        for k, (targets, points) in enumerate(zip(self.target_ids, self.positions, strict=True)):
+            checked = integers(targets, f"truth: target_ids of scan {k}", len(targets))
             if checked.size and (checked.min() < 0 or len(np.unique(checked)) != len(checked)):
                 raise InvalidInputError(f"truth: target_ids of scan {k} must be 0 or more and different")
             ids.append(checked)
-            place = np.zeros((0, 3)) if len(one) == 0 and np.size(where) == 0 else where
-            places.append(finite_array(place, f"truth: positions of scan {k}", (len(one), 3)))
+            points = np.zeros((0, 3)) if len(targets) == 0 and np.size(points) == 0 else points
+            positions.append(finite_array(points, f"truth: positions of scan {k}", (len(targets), 3)))
         object.__setattr__(self, "target_ids", tuple(ids))
-        object.__setattr__(self, "positions", tuple(places))
+        object.__setattr__(self, "positions", tuple(positions))
         if self.sources is not None:
             sources = []
             for k, scan in enumerate(self.sources):
@@ -78,7 +78,7 @@ class Truth:
         object.__setattr__(self, "names", {int(target): name for target, name in self.names.items()})
 
     def name_of(self, target: int) -> str:
-        """What a target is called: its name, or its id where it has none."""
+        """Name of a target, or its id where it has none."""
         return self.names.get(int(target), str(int(target)))
 
     def part(self, scans: slice) -> Truth:
@@ -87,5 +87,5 @@ class Truth:
         return replace(self, target_ids=self.target_ids[scans], positions=self.positions[scans], sources=sources)
 
     def __repr__(self) -> str:
-        targets = len({int(i) for one in self.target_ids for i in one})
+        targets = len({int(i) for ids in self.target_ids for i in ids})
         return f"Truth({targets} targets, {len(self.target_ids)} scans)"

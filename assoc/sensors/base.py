@@ -29,22 +29,30 @@ def wrap_angle(angle: Array) -> Array:
     return wrapped
 
 
-def _kind_of(value: object) -> str:
-    return str(value.dtype) if isinstance(value, np.ndarray) else type(value).__name__
-
-
-def finite_array(value: object, what: str, shape: tuple[int, ...] | None = None) -> Array:
-    """Return a read-only float64 copy; what is not finite numbers is refused by a line naming `what`."""
+def numbers(value: object, what: str) -> Array:
+    """Return a C-ordered float64 copy; errors name it `what`."""
     try:
         if np.asarray(value).dtype.kind in "mM":
             raise TypeError  # numpy would count their days or nanoseconds
-        array = np.array(value, dtype=np.float64, order="C")
+        return np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} must be numbers, got {_kind_of(value)}") from error
-    if shape is not None and array.shape != shape:
-        raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
+        kind = value.dtype if isinstance(value, np.ndarray) else type(value).__name__
+        raise InvalidInputError(f"{what} must be numbers, got {kind}") from error
+
+
+def require_finite(array: Array, what: str) -> Array:
+    """Return an array of finite numbers; errors name it `what`."""
     if not np.isfinite(array).all():
         raise InvalidInputError(f"{what} must be finite, got {array[~np.isfinite(array)][0]}")
+    return array
+
+
+def finite_array(value: object, what: str, shape: tuple[int, ...] | None = None) -> Array:
+    """Return a read-only float64 copy of finite numbers of usual size; errors name it `what`."""
+    array = numbers(value, what)
+    if shape is not None and array.shape != shape:
+        raise InvalidInputError(f"{what} must have shape {shape}, got {array.shape}")
+    require_finite(array, what)
     if array.size and np.abs(array).max() > LARGEST:
         raise InvalidInputError(f"{what} must be within +-{LARGEST:g}, got {np.abs(array).max():g}")
     array.setflags(write=False)

@@ -1,10 +1,9 @@
-"""Which measurements may belong to which tracks: sorted by one component, then boxes."""
+"""Coarse gates of tracks and measurements: sorted by one component, then boxes."""
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -15,21 +14,21 @@ from assoc.filters.base import Expected
 from assoc.filters.measurement import Measurement
 
 MOST_PAIRS = 20_000_000
-"""The most pairs of tracks and measurements: more would only mean that the tracks know nothing."""
+"""Most pairs of tracks and measurements; more occur only with useless predictions."""
 
 _TURN = 2.0 * math.pi
 
 
 def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...], gate: float) -> tuple[Array, Array]:
-    """Pairs of tracks and measurements that may pass a chi-square gate; none that does is left out.
+    """Pairs of tracks and measurements that may pass a chi-square gate: all that pass, and some more.
 
     Parameters
     ----------
     expected : Expected
-        Means (B, d) and covariances (B, d, d) of what each track leads one to expect.
+        Expected measurements of each track, (B, d), and their covariances (B, d, d).
     measurements : array (M, d)
     angular : tuple of bool
-        Which components are angles (they are compared around the circle).
+        Which components are angles.
     gate : float
         Squared Mahalanobis distance.
 
@@ -48,11 +47,11 @@ def near_pairs(expected: Expected, measurements: Array, angular: tuple[bool, ...
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     tracks, found = _sweep(h, expected.covariance, np.ascontiguousarray(z), _turning(angular), gate, MOST_PAIRS)
     if len(tracks) > MOST_PAIRS:
-        # ordered by track: what is left would go on like this
+        # ordered by track: extrapolated to those left
         expected_pairs = len(tracks) * len(h) / (int(tracks[-1]) + 1)
         raise LimitExceededError(
             f"about {expected_pairs:.3g} pairs of {len(h)} tracks and {len(z)} measurements in their gates, at most "
-            f"{MOST_PAIRS} are looked at; lower gate_probability, or end uncertain tracks sooner"
+            f"{MOST_PAIRS} are allowed; lower gate_probability, or end uncertain tracks sooner"
         )
     return tracks, found
 
@@ -63,8 +62,8 @@ def _turning(angular: tuple[bool, ...]) -> Array:
 
 
 @njit
-def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int) -> Any:
-    """Pairs whose components are all within reach, no more than one above ``most``; sorted by one component."""
+def _sweep(h: Array, covariance: Array, z: Array, turning: Array, gate: float, most: int) -> tuple[Array, Array]:
+    """Pairs whose components are all within reach, sorted by track; at most one more than ``most``."""
     num, dim = h.shape
     reach = np.empty((num, dim))
     total = np.zeros(dim)
@@ -114,15 +113,15 @@ def _sweep(h: Any, covariance: Any, z: Any, turning: Any, gate: float, most: int
                 count += 1
                 if count > most:
                     return tracks[:count].copy(), found[:count].copy()
-        # number by number: a line for all would compile the text for lengths that differ
-        own = np.sort(found[first:count])
-        for k in range(own.size):
-            found[first + k] = own[k]
+        # number by number: assigning the slice would compile an error message about lengths
+        ordered = np.sort(found[first:count])
+        for k in range(ordered.size):
+            found[first + k] = ordered[k]
     return tracks[:count].copy(), found[:count].copy()
 
 
 @inner_njit
-def _doubled(array: Any) -> Any:
+def _doubled(array: Array) -> Array:
     larger = np.empty(2 * array.size, np.int64)
     for i in range(array.size):
         larger[i] = array[i]
@@ -152,5 +151,5 @@ def _apart(a: Array, b: Array, turning: Array) -> Array:
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:
-    """Which components of a measurement are angles; none for models that are no sensor."""
+    """Which components of a measurement are angles; none for models that are not sensors."""
     return getattr(sensor, "angular", (False,) * sensor.dim)[: sensor.dim]

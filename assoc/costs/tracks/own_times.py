@@ -1,12 +1,11 @@
-"""Candidate tuples of a scan whose measurements have times of their own.
+"""Candidate tuples of a scan whose measurements have their own times.
 
 A tuple is filtered in the order of its measurements' times: predicted to each, corrected by it. So its measurements are
-compared through the target's predicted motion, with all its uncertainty, and the logarithms of the predictive densities
-add up to that of all of them together. A tuple without a track begins with its first measurement that tells a
-position, and with the velocity that the beginning of a track is given.
+compared through the target's predicted motion, and the logarithms of the predictive densities add up to their joint
+one. A tuple without a track starts at its first measurement that determines a position, with the prior velocity of new
+tracks.
 
-Which pairs may pass a gate at all is asked with the boxes that a track's gate passes through between the first and the
-last measurement of a sensor.
+Coarse pairs are found by the boxes that a track's gate sweeps between the first and the last measurement of a sensor.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from assoc.filters.batches import arrays_of, concatenate, state_from
 from assoc.scene.own_times import looked_at
 from assoc.sensors import Sensor
 
-# a gate moves on a curve where the box takes a straight line: this much more than the way
+# a gate moves on a curve, the box on a straight line: it is longer by this factor
 _CURVED = 1.3
 
 
@@ -35,14 +34,14 @@ PairEvidence = Callable[[Array, int, Array], tuple[Array, Array]]
 
 
 class Places(NamedTuple):
-    """What the measurements of each sensor say of positions, and which may begin a track."""
+    """Positions of the measurements of each sensor, and which may start a track."""
 
     positions: list[Array]
     """(n_s, 3)."""
     covariances: list[Array]
     """(n_s, 3, 3)."""
     fit: list[Array]
-    """Whether it is narrow enough for that, bool (n_s,)."""
+    """Whether it may start a track, bool (n_s,)."""
     births: list[Array]
     """Score of each as a new target, misses of other sensors apart, (n_s,)."""
 
@@ -57,7 +56,7 @@ class Followed(NamedTuple):
     first: Array
     """Time of the first measurement, (M,)."""
     lead: Array
-    """Sensor whose measurement began the track, (M,); -1 where there was a track."""
+    """Sensor whose measurement started the track, (M,); -1 for an existing track."""
     log_likelihood: Array
     """Of all measurements but the lead's, (M,)."""
     inside: Array
@@ -99,7 +98,7 @@ class TimedScan:
         Their times, none after the measurements', seconds.
     measurements, times : sequences over sensors of arrays (n_s, d_s), (n_s,)
     sensors : sequence of Sensor
-    places : Places
+    positions : Positions
     start : callable (positions, covariances, lag) -> states
         Begins tracks at a time `lag` (n,) seconds before that of the positions.
     sectors : array (S, 2) or None
@@ -108,8 +107,8 @@ class TimedScan:
     end : float
         Time of the scan, seconds; no measurement is after it.
     evidence : callable (track, sensor, measurement) -> (log ratio, possible), optional
-        What else than their places says which pairs of a track and a measurement (K,) belong together: it adds to the
-        log likelihood, and rules out.
+        Further evidence on pairs of a track and a measurement (K,): a log likelihood ratio, and whether they may belong
+        together.
     """
 
     def __init__(
@@ -138,7 +137,7 @@ class TimedScan:
         sizes = [len(z) for z in measurements]
         self.offsets = np.cumsum([len(states), *sizes])
         """Where each sensor's measurements begin among anchors: tracks, then measurements that began one."""
-        # tracks begin with sensors that tell positions: these come first
+        # tracks start with sensors that determine positions: these come first
         self.order = sorted(range(len(sensors)), key=lambda s: not places.fit[s].any())
 
     def stamps(self, rows: Array) -> Array:
@@ -191,7 +190,7 @@ class TimedScan:
         return Followed(states, when, first, leads, log_likelihood, inside)
 
     def _moved(self, states: Any, dt: Array) -> Any:
-        """Each state its own dt seconds later; even equal steps are new ones, of which nothing is remembered."""
+        """Each state its own dt seconds later, without caching models by time step."""
         return self.filter.predict_each(states, dt) if len(states) else states
 
     def _begin(self, rows: Array, turn: Array, stamps: Array, first: Array) -> tuple[Array, Any]:
@@ -217,7 +216,7 @@ class TimedScan:
         return concatenate([moved, self.late[track[missed]]])[back]
 
     def looked(self) -> Array:
-        """Whether each sensor looked where each track and each measurement (as anchors) is, bool (A, S)."""
+        """Whether each sensor covered each track and each measurement (as anchors), bool (A, S)."""
         total = int(self.offsets[-1])
         result = np.ones((total, len(self.sensors)), dtype=np.bool_)
         if self.sectors is None:
@@ -229,7 +228,7 @@ class TimedScan:
         for s, (sensor, sector) in enumerate(zip(self.sensors, self.sectors, strict=True)):
             away = places - sensor.position
             result[:, s] = looked_at(sector, np.arctan2(away[:, 1], away[:, 0]))
-            # a measurement is made where its sensor looks, whatever rounding says
+            # a sensor covers its own measurements, in spite of rounding
             result[self.offsets[s] : self.offsets[s + 1], s] = True
         return result
 
@@ -259,7 +258,7 @@ class TimedScan:
         new[:, s] = found + 1
         followed = self.follow(track[parent], new)
         good = np.flatnonzero(followed.inside)
-        chosen = Followed(followed.states[good], *(one[good] for one in followed[1:]))
+        chosen = Followed(followed.states[good], *(part[good] for part in followed[1:]))
         return Grown(parent[good], found[good], new[good], chosen)
 
     def near(self, s: int) -> tuple[Array, Array]:
@@ -270,7 +269,7 @@ class TimedScan:
             return nothing, nothing
         sensor, gate = self.sensors[s], self.gates[s]
         angles, axes = angular_components(sensor), len(self.filter.motion.position)
-        # the gate is widest at the end of the scan; on the way there it was where the velocity says
+        # the gate is widest at the end of the scan; before, it moves with the velocity
         late = self.filter.expected(self.late, sensor)
         velocity = np.zeros((len(self.states), 3))
         moving = [k for k in range(axes, 2 * axes) if k < self.filter.motion.dim]
@@ -295,8 +294,8 @@ class TimedScan:
         able = np.flatnonzero(self.places.fit[r])
         if not len(able) or not len(self.times[s]):
             return nothing, nothing
-        own, ends = self.times[r][able], (float(self.times[s].min()), float(self.times[s].max()))
-        lag = np.maximum(np.abs(own - ends[0]), np.abs(own - ends[1]))
+        stamps, ends = self.times[r][able], (float(self.times[s].min()), float(self.times[s].max()))
+        lag = np.maximum(np.abs(stamps - ends[0]), np.abs(stamps - ends[1]))
         wide = self.start(self.places.positions[r][able], self.places.covariances[r][able], lag)
         sensor = self.sensors[s]
         expected = self.filter.expected(wide, sensor)
@@ -320,7 +319,7 @@ def _put(states: Any, rows: Array, new: Any) -> Any:
         return new
     parts, arrays = arrays_of(new), {name: np.array(value) for name, value in arrays_of(states).items()}
     if any(parts[name].shape[1:] != value.shape[1:] for name, value in arrays.items()):
-        # what a filter keeps of measurements has no width before the first one
+        # histories of measurements have no width before the first one
         rest = np.setdiff1d(np.arange(len(states)), rows)
         return concatenate([new, states[rest]])[np.argsort(np.concatenate([rows, rest]), kind="stable")]
     for name, value in arrays.items():
@@ -337,7 +336,7 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
     terms : ScoreTerms
         Of its sensors.
     looked : bool array (A, S)
-        `TimedScan.looked`; a sensor that did not look has not missed.
+        `TimedScan.looked`; a sensor that did not cover a target has not missed it.
     max_tuples : int
         The most tuples that may be made.
 
@@ -360,17 +359,17 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
                 f"more than max_tuples = {max_tuples}; lower gate_probability or raise max_tuples"
             )
         value = score_costs(scan, new.followed, new.rows, terms, looked[anchor[new.parent]])
-        own = np.flatnonzero(scan.places.fit[s])
-        single = np.zeros((len(own), width), dtype=np.int32)
-        single[:, s] = own + 1
-        own_anchor = scan.offsets[s] + own
-        begun = terms.miss[s] - looked[own_anchor] @ terms.miss - scan.places.births[s][own]
+        starts = np.flatnonzero(scan.places.fit[s])
+        single = np.zeros((len(starts), width), dtype=np.int32)
+        single[:, s] = starts + 1
+        start_anchor = scan.offsets[s] + starts
+        begun = terms.miss[s] - looked[start_anchor] @ terms.miss - scan.places.births[s][starts]
         costs = np.concatenate([costs, value, begun])
         rows = np.concatenate([rows, new.rows, single])
-        track = np.concatenate([track, track[new.parent], np.full(len(own), -1)])
-        anchor = np.concatenate([anchor, anchor[new.parent], own_anchor])
+        track = np.concatenate([track, track[new.parent], np.full(len(starts), -1)])
+        anchor = np.concatenate([anchor, anchor[new.parent], start_anchor])
         done.append(s)
-    # a track that would do better with all missed: its measurements are better declared false alarms, at cost 0
+    # not cheaper than a track all missed: its measurements are better false alarms, at cost 0
     good = (track < 0) | ~rows.any(axis=1)
     good[~good] = costs[~good] < alone[track[~good]]
     order = np.flatnonzero(good)
@@ -379,7 +378,7 @@ def grow_timed_tuples(scan: TimedScan, terms: ScoreTerms, looked: Array, max_tup
 
 
 def score_costs(scan: TimedScan, followed: Followed, rows: Array, terms: ScoreTerms, looked: Array) -> Array:
-    """Costs of followed tuples, given which sensors looked at each, bool (M, S)."""
+    """Costs of followed tuples, given which sensors covered each, bool (M, S)."""
     seen = rows > 0
     gain = followed.log_likelihood + seen @ terms.detection + (looked & ~seen) @ terms.miss
     for s, births in enumerate(scan.places.births):

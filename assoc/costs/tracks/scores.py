@@ -30,22 +30,22 @@ from assoc.sensors.base import Sensor
 
 
 class ScoreTerms(NamedTuple):
-    """What a scan of each of S sensors adds to a score, before the likelihood of the measurement."""
+    """Terms of the score for a scan of each of S sensors, without the likelihood of the measurement."""
 
     detection: Array
     """ln(P_D / beta_FA) with beta_FA = r / V, (S,)."""
     miss: Array
     """ln(1 - P_D), (S,)."""
     birth: Array
-    """ln(P_D / beta_FA) - 1/2 ln det(2 pi R) of what tells of the position, (S,): with `log_birth` of the position's
-    covariance it is the score of a single measurement as a new target."""
+    """ln(P_D / beta_FA) - 1/2 ln det(2 pi R) of the components that depend on the position, (S,): with `log_birth` of
+    the position's covariance the score of a single measurement as a new target."""
 
 
 def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
     """Terms of the score."""
     P = np.array([sensor.detection_probability for sensor in sensors])
     density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in sensors])
-    # a range rate says as little of a new target as of a false alarm
+    # range rates are as likely for a new target as for a false alarm
     located = [sensor.position_part for sensor in sensors]
     there = np.array([one.false_alarm_rate / one.volume for one in located])
     spread = np.array([np.linalg.slogdet(2.0 * math.pi * one.covariance)[1] for one in located])
@@ -53,12 +53,11 @@ def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
 
 
 def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
-    """Logarithm of the birth density integrated over the places where a new target may be.
+    """Logarithm of the birth density integrated over the positions of a new target.
 
     The cost of a tuple is taken at the most likely position. A target is born anywhere in the region with density
     birth rate / volume; integrated over the position (Laplace's approximation, exact for linear sensors) the
-    likelihood is the one at the best position times this. In directions in which the region has no width, targets
-    are where it is: there is nothing to integrate.
+    likelihood is the one at the best position times this. Directions in which the region has no width are left out.
 
     Parameters
     ----------
@@ -83,11 +82,11 @@ def log_birth(covariances: Array, region: Array, birth_rate: float) -> Array:
 
 
 def doubted_gain(score: Array, gain: Array) -> Array:
-    """What a scan adds to the logarithm of a hypothesis' probability if a track may be none: ln(1 - p + p exp(gain)).
+    """Gain of a scan in a hypothesis' log probability if a track may be false: ln(1 - p + p exp(gain)).
 
-    The score is the logarithm of the odds that the track is a target; p is the probability of that. If it is
-    none, its measurements are false alarms and its misses no surprise, and the scan adds nothing. So a track in
-    the making takes what nobody else wants, but does not outbid one that is certain.
+    The score is the log odds that the track is a target, with probability p. If it is false, its measurements are
+    false alarms, its misses are expected, and the scan adds nothing. So a tentative track takes measurements that no
+    other track needs, but does not outbid a certain one.
 
     Parameters
     ----------

@@ -63,10 +63,10 @@ def track_pairs(filter: Filter[Any], states: Any, measurements: Array, sensor: M
 
 
 def require_states(states: Any, count: int) -> None:
-    """Refuse to correct more tracks than there is memory for."""
-    own = [value for value in vars(states).values() if isinstance(value, np.ndarray)] if len(states) else []
-    each = sum(array.nbytes for array in own) / max(len(states), 1)
-    # picked, corrected, and what a filter needs in between
+    """Refuse to correct more tracks than memory allows."""
+    arrays = [value for value in vars(states).values() if isinstance(value, np.ndarray)] if len(states) else []
+    each = sum(array.nbytes for array in arrays) / max(len(states), 1)
+    # selected, corrected, and a filter's temporaries
     memory.require(
         4.0 * each * count,
         f"{count} pairs of {len(states)} tracks and measurements",
@@ -116,8 +116,7 @@ def grow_track_tuples(
     Returns
     -------
     TrackTuples
-        Ordered by track. A tuple that costs as much as its track all missed is left out: its measurements
-        are better declared false alarms, at cost 0.
+        Ordered by track. A tuple that costs as much as its track all missed is left out: false alarms cost 0.
 
     Raises
     ------
@@ -135,7 +134,7 @@ def grow_track_tuples(
         near = near_pairs(filter.expected(states, sensor), z, angular_components(sensor), gate)
         parent, found = join(track, *near, count)
         if s:
-            # what has corrected the track already narrows its gate
+            # measurements so far narrow the gate
             angles = angular_components(sensor)
             inside = within(filter.expected(grown, sensor), parent, z, found, angles, gate)
             parent, found = parent[inside], found[inside]
@@ -152,7 +151,7 @@ def grow_track_tuples(
         rows = np.concatenate([rows, new])
         track = np.concatenate([track, track[done.track]])
         grown = concatenate([grown, done.states])
-        # what the sensors to come can still take off the cost; then a track all missed must be beaten
+        # the sensors left must be able to bring the cost below that of a track all missed
         hopeful = np.flatnonzero((costs - ahead[s + 1] < alone) | ~rows.any(axis=1))
         if len(hopeful) < len(rows):
             costs, rows, track, grown = costs[hopeful], rows[hopeful], track[hopeful], grown[hopeful]

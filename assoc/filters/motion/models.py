@@ -352,7 +352,7 @@ class FunctionMotion(Motion):
     ) -> None:
         self.dim, self.position = dim, position
         self._function, self._jacobian = function, jacobian
-        self._noise = noise if callable(noise) else finite(noise, "noise", 2, 3).copy()
+        self._noise = noise if callable(noise) else finite(noise, "noise", 2, 3)
 
     def propagate(self, states: Array, dt: float) -> Array:
         """Move states (m, n) on by dt seconds, without noise."""

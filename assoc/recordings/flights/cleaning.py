@@ -70,9 +70,9 @@ def _repeats(reports: Reports) -> Array:
 
 def _speeds(reports: Reports) -> Array:
     """Speed from the report before to each, (n,), m/s; 0 for a target's first."""
-    place = earth_centered(reports.latitude, reports.longitude, reports.height)
+    points = earth_centered(reports.latitude, reports.longitude, reports.height)
     away = np.zeros(len(reports))
-    away[1:] = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.maximum(np.diff(reports.time), 1e-3)
+    away[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.maximum(np.diff(reports.time), 1e-3)
     away[1:][np.diff(reports.target) != 0] = 0.0
     return away
 
@@ -83,9 +83,9 @@ def _jumps(reports: Reports) -> Array:
     fast = np.zeros(len(reports), dtype=np.bool_)
     if len(reports) < 3:
         return fast
-    place = earth_centered(level.latitude, level.longitude, level.height)
+    points = earth_centered(level.latitude, level.longitude, level.height)
     speed = _speeds(level)
-    around = np.linalg.norm(place[2:] - place[:-2], axis=1) / np.maximum(reports.time[2:] - reports.time[:-2], 1e-3)
+    around = np.linalg.norm(points[2:] - points[:-2], axis=1) / np.maximum(reports.time[2:] - reports.time[:-2], 1e-3)
     whole = (reports.target[2:] == reports.target[1:-1]) & (reports.target[1:-1] == reports.target[:-2])
     fast[1:-1] = whole & (speed[1:-1] > FASTEST) & (speed[2:] > FASTEST) & (around <= FASTEST)
     return fast

@@ -12,7 +12,7 @@ from assoc.sensors.radar import NEAREST
 
 @inner_njit
 def measure_bearing(dx: float, dy: float, h: Array) -> None:
-    """Write the azimuth of a place, relative to the sensor, into h."""
+    """Write the azimuth of a position, relative to the sensor, into h."""
     h[0] = math.atan2(dy, dx)
 
 
@@ -26,10 +26,10 @@ def linearise_bearing(dx: float, dy: float, h: Array, H: Array) -> None:
 
 
 @inner_njit
-def add_bearing(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
+def add_bearing(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
-    dx, dy = at[0] - place[0], at[1] - place[1]
+    dx, dy = at[0] - position[0], at[1] - position[1]
     flat2 = dx * dx + dy * dy
     turn = math.atan2(dy, dx)
     flat2 = max(flat2, NEAREST * NEAREST)

@@ -1,4 +1,4 @@
-"""Compiled measurement models of all kinds of sensors: one place, one state or one measurement at a time.
+"""Compiled measurement models of all kinds of sensors: one position, one state or one measurement at a time.
 
 They follow `measure`, `jacobian` and `residual` of the sensors line by line; a test holds them together for
 every kind in the registry. A new kind is a file beside this one and a branch in each of these functions.
@@ -28,13 +28,13 @@ from assoc.sensors.radar import NEAREST
 
 
 @njit
-def linearise(code: int, dim: int, place: Array, x: float, y: float, z: float, h: Array, H: Array) -> None:
+def linearise(code: int, dim: int, position: Array, x: float, y: float, z: float, h: Array, H: Array) -> None:
     """Write the noise-free measurement of a position into h (d,) and its derivatives into H (d, 3)."""
     H[:dim, :3] = 0.0
     if code == POSITION:
         linearise_position(dim, x, y, z, h, H)
         return
-    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    dx, dy, dz = x - position[0], y - position[1], z - position[2]
     if code == BEARING:
         linearise_bearing(dx, dy, h, H)
     elif code == RADAR3D:
@@ -44,12 +44,12 @@ def linearise(code: int, dim: int, place: Array, x: float, y: float, z: float, h
 
 
 @njit
-def measure(code: int, dim: int, place: Array, x: float, y: float, z: float, h: Array) -> None:
+def measure(code: int, dim: int, position: Array, x: float, y: float, z: float, h: Array) -> None:
     """Write the noise-free measurement of a position into h (d,)."""
     if code == POSITION:
         measure_position(dim, x, y, z, h)
         return
-    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    dx, dy, dz = x - position[0], y - position[1], z - position[2]
     if code == BEARING:
         measure_bearing(dx, dy, h)
         return
@@ -59,14 +59,14 @@ def measure(code: int, dim: int, place: Array, x: float, y: float, z: float, h: 
 
 
 @njit
-def measure_moving(place: Array, state: Array, columns: Array, h: Array) -> None:
+def measure_moving(position: Array, state: Array, columns: Array, h: Array) -> None:
     """Write range, azimuth, elevation and range rate of a state into h (4,).
 
     `columns` says where x, y (and z) stand in the state, and after them their velocities.
     """
     axes = len(columns) // 2
-    dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
-    dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
+    dx, dy = state[columns[0]] - position[0], state[columns[1]] - position[1]
+    dz = (state[columns[2]] if axes == 3 else 0.0) - position[2]
     flat = measure_range_azimuth(dx, dy, dz, h)
     h[2] = math.atan2(dz, flat)
     along = dx * state[columns[axes]] + dy * state[columns[axes + 1]]
@@ -76,14 +76,14 @@ def measure_moving(place: Array, state: Array, columns: Array, h: Array) -> None
 
 
 @njit
-def linearise_moving(place: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
+def linearise_moving(position: Array, state: Array, columns: Array, h: Array, H: Array) -> None:
     """Write range, azimuth, elevation and range rate into h (4,), and their derivatives by the columns into H (4, c).
 
     `columns` is as for `measure_moving`.
     """
     axes = len(columns) // 2
-    dx, dy = state[columns[0]] - place[0], state[columns[1]] - place[1]
-    dz = (state[columns[2]] if axes == 3 else 0.0) - place[2]
+    dx, dy = state[columns[0]] - position[0], state[columns[1]] - position[1]
+    dz = (state[columns[2]] if axes == 3 else 0.0) - position[2]
     H[:] = 0.0
     linearise_radar3d(dx, dy, dz, h, H)
     if axes == 2:
@@ -104,7 +104,7 @@ def wrap(code: int, v: Array) -> None:
 
 @inner_njit
 def add_information(
-    code: int, dim: int, W: Six, place: Three, measured: Three, at: Three, sums: Information
+    code: int, dim: int, W: Six, position: Three, measured: Three, at: Three, sums: Information
 ) -> Information:
     """Add one measurement's chi-square, gradient and information at a position to those of others.
 
@@ -113,23 +113,23 @@ def add_information(
     code, dim : int
     W
         Inverse of the measurement covariance, padded with zeros.
-    place, measured, at
-        The sensor's place, the measurement, and the position it is held against.
+    position, measured, at
+        The sensor's position, the measurement, and the position it is held against.
     sums
         Of the measurements before.
     """
     if code == POSITION:
         return add_position(dim, W, measured, at, sums)
     if code == BEARING:
-        return add_bearing(W, place, measured, at, sums)
+        return add_bearing(W, position, measured, at, sums)
     if code == RADAR2D:
-        return add_radar2d(W, place, measured, at, sums)
-    return add_radar3d(W, place, measured, at, sums)
+        return add_radar2d(W, position, measured, at, sums)
+    return add_radar3d(W, position, measured, at, sums)
 
 
 @inner_njit
 def convert_one(
-    code: int, dim: int, measured: Three, place: Three, R: Six, heights: Three, reach: float, least: float
+    code: int, dim: int, measured: Three, position: Three, R: Six, heights: Three, reach: float, least: float
 ) -> Converted:
     """Position that a measurement points at, and its covariance, widened.
 
@@ -144,5 +144,5 @@ def convert_one(
     if code == POSITION:
         return convert_position(dim, measured, R, heights[1])
     if code == RADAR3D:
-        return convert_radar3d(measured, place, R, reach, least)
-    return convert_radar2d(measured, place, R, heights, reach, least)
+        return convert_radar3d(measured, position, R, reach, least)
+    return convert_radar2d(measured, position, R, heights, reach, least)

@@ -15,7 +15,7 @@ START_REACH = 10.0
 
 @inner_njit
 def measure_range_azimuth(dx: float, dy: float, dz: float, h: Array) -> float:
-    """Write range and azimuth of a place, relative to the radar, into h; return the ground range."""
+    """Write range and azimuth of a position, relative to the radar, into h; return the ground range."""
     flat = math.hypot(dx, dy)
     h[0], h[1] = math.hypot(flat, dz), math.atan2(dy, dx)
     return flat
@@ -55,10 +55,10 @@ def linearise_range_rate(dx: float, dy: float, dz: float, velocity: Three, H: Ar
 
 
 @inner_njit
-def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
+def add_radar3d(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
-    dx, dy, dz = at[0] - place[0], at[1] - place[1], at[2] - place[2]
+    dx, dy, dz = at[0] - position[0], at[1] - position[1], at[2] - position[2]
     flat2 = dx * dx + dy * dy
     turn = math.atan2(dy, dx)
     flat = math.sqrt(flat2)
@@ -102,10 +102,10 @@ def add_radar3d(W: Six, place: Three, measured: Three, at: Three, sums: Informat
 
 
 @inner_njit
-def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Information) -> Information:
+def add_radar2d(W: Six, position: Three, measured: Three, at: Three, sums: Information) -> Information:
     """Add one measurement's share; see `assoc.sensors.kernels.dispatch.add_information`."""
     chi, g0, g1, g2, a0, a1, a2, a3, a4, a5 = sums
-    dx, dy, dz = at[0] - place[0], at[1] - place[1], at[2] - place[2]
+    dx, dy, dz = at[0] - position[0], at[1] - position[1], at[2] - position[2]
     flat2 = dx * dx + dy * dy
     turn = math.atan2(dy, dx)
     flat = math.sqrt(flat2)
@@ -131,7 +131,7 @@ def add_radar2d(W: Six, place: Three, measured: Three, at: Three, sums: Informat
 
 
 @inner_njit
-def convert_radar3d(measured: Three, place: Three, R: Six, reach: float, least: float) -> Converted:
+def convert_radar3d(measured: Three, position: Three, R: Six, reach: float, least: float) -> Converted:
     """Range, azimuth, elevation; see `assoc.sensors.kernels.dispatch.convert_one`."""
     slant = max(measured[0], 0.0)
     ca, sa, ce, se = math.cos(measured[1]), math.sin(measured[1]), math.cos(measured[2]), math.sin(measured[2])
@@ -150,7 +150,7 @@ def convert_radar3d(measured: Three, place: Three, R: Six, reach: float, least: 
         _rotated(y, z, R, f * y[0] * z[0]),
         _rotated(z, z, R, f * z[0] * z[0] + wide),
     )
-    return (place[0] + slant * x[0], place[1] + slant * y[0], place[2] + slant * z[0]), c
+    return (position[0] + slant * x[0], position[1] + slant * y[0], position[2] + slant * z[0]), c
 
 
 @inner_njit
@@ -162,9 +162,9 @@ def _rotated(a: Three, b: Three, R: Six, more: float) -> float:
 
 
 @inner_njit
-def convert_radar2d(measured: Three, place: Three, R: Six, heights: Three, reach: float, least: float) -> Converted:
+def convert_radar2d(measured: Three, position: Three, R: Six, heights: Three, reach: float, least: float) -> Converted:
     """Range and azimuth: the ground ranges that the heights (lowest, middle, highest) allow make it long."""
-    low, high = heights[0] - place[2], heights[2] - place[2]
+    low, high = heights[0] - position[2], heights[2] - position[2]
     lowest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
     most = max(abs(low), abs(high))
     slack = math.sqrt(START_REACH * R[0])
@@ -181,4 +181,4 @@ def convert_radar2d(measured: Three, place: Three, R: Six, heights: Three, reach
     across = 2.0 * max(farthest * farthest, R[0]) * R[3] * reach / least + wide
     ca, sa = math.cos(measured[1]), math.sin(measured[1])
     xx, xy, yy = ca * ca * along + sa * sa * across, ca * sa * (along - across), sa * sa * along + ca * ca * across
-    return (place[0] + ground * ca, place[1] + ground * sa, heights[1]), (xx, xy, 0.0, yy, 0.0, 1.0)
+    return (position[0] + ground * ca, position[1] + ground * sa, heights[1]), (xx, xy, 0.0, yy, 0.0, 1.0)

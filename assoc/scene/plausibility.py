@@ -1,7 +1,7 @@
-"""What is legal in a scene and almost surely a mistake: other units than metres and radians.
+"""Plausibility checks of a scene: other units than metres and radians.
 
-Each rule is one that sound measurements pass whatever the scene: it asks what most of a sensor's measurements, over
-all scans, have in common. A rule that noise, clutter or a wide field of view could break has no place here.
+Sound measurements pass each check in every scene: it regards what most of a sensor's measurements, over all scans, have
+in common. Noise, clutter or a wide field of view must not break it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from assoc._types import Array
 from assoc.sensors import PositionSensor, Sensor
 from assoc.sensors.base import ANGLES
 
-# fewer measurements of a sensor than this prove nothing
+# with fewer measurements of a sensor nothing is checked
 _ENOUGH = 10
 # a share of measurements that neither noise nor the edge of a field of view explains
 _MANY = 0.25
@@ -24,8 +24,8 @@ _MANY = 0.25
 _WITHIN = 0.2
 
 
-def doubts_about(sensors: Sequence[Sensor], measurements: Sequence[Sequence[Array]]) -> tuple[str, ...]:
-    """Return one line for each sensor and component whose measurements do not fit what the sensor says of itself.
+def implausible(sensors: Sequence[Sensor], measurements: Sequence[Sequence[Array]]) -> tuple[str, ...]:
+    """Return one line for each sensor and component whose measurements do not fit the sensor's parameters.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def doubts_about(sensors: Sequence[Sensor], measurements: Sequence[Sequence[Arra
         z = np.concatenate([scan[s] for scan in measurements])
         sigma = np.sqrt(np.diagonal(sensor.covariance))
         for axis in range(sensor.dim):
-            doubt = _doubt(sensor, axis, z[:, axis], float(sigma[axis]))
-            if doubt:
-                found.append(f"{sensor.label(s)}: {doubt}")
+            complaint = _complaint(sensor, axis, z[:, axis], float(sigma[axis]))
+            if complaint:
+                found.append(f"{sensor.label(s)}: {complaint}")
     return tuple(found)
 
 
-def _doubt(sensor: Sensor, axis: int, values: Array, sigma: float) -> str:
+def _complaint(sensor: Sensor, axis: int, values: Array, sigma: float) -> str:
     name = sensor.components[axis]
     low, high = sensor.field_of_view[axis]
     seen = f"{values.min():.4g} to {values.max():.4g}"
@@ -66,7 +66,7 @@ def _doubt(sensor: Sensor, axis: int, values: Array, sigma: float) -> str:
             f"{100 * share:.0f} % of its {plural} ({seen} {unit}) lie outside of its field of view "
             f"({low:.4g} to {high:.4g} {unit}): another unit?"
         )
-    # a constant, as the height of targets that were put on the ground, is no measurement and no matter of units
+    # a constant, as the height of targets set on the ground, has no unit to doubt
     if 0.0 < float(np.std(values)) < _WITHIN * sigma:
         return (
             f"its {plural} ({seen} {unit}) all lie closer together than their noise ({sigma:.4g} {unit}): another unit?"
