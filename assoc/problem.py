@@ -54,8 +54,7 @@ class AssignmentProblem:
         Wrong shape, an index out of range, the all-dummy tuple, a cost that is NaN or -inf, or a `dummy` that is
         neither True nor False.
     LimitExceededError
-        More measurements than there should be memory for (ten million of four sensors, say), or more tuples
-        than there is memory for.
+        More measurements (ten million of four sensors, say) or tuples than memory allows.
 
     Notes
     -----
@@ -95,7 +94,7 @@ class AssignmentProblem:
             raise InvalidInputError(f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}")
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
-        # by columns to be checked, and what is kept, at first without and then with the singletons
+        # columns for the check, and what is kept, without and with singletons
         memory.require(
             tuples_.size * (tuples_.itemsize + 1 + 2 * 4.0) + 40.0 * costs_.size,
             f"tuples: {tuples_.shape[0]} of {sizes_.size} sensors",
@@ -129,7 +128,7 @@ class AssignmentProblem:
         return f"AssignmentProblem({sizes} measurements, {self.num_tuples} tuples{kind})"
 
     def _repr_html_(self) -> str:
-        """Return what notebooks and reports show: how many tuples of each size there are, and their costs."""
+        """HTML for notebooks and reports: numbers of tuples by size, and their costs."""
         from assoc._text.html import escape, table
 
         found = np.count_nonzero(self.tuples, axis=1)
@@ -179,7 +178,7 @@ class AssignmentProblem:
             keep[(0,) * dense.ndim] = False
             _doubt(float(dense[(0,) * dense.ndim]), "tensor")
         count = np.count_nonzero(keep)
-        # numpy's list of indices and the stacked one; then what a problem of them takes
+        # numpy's list of indices and the stacked one, then the problem
         memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
         index = np.stack(np.nonzero(keep), axis=1)
         offset = 0 if dummy else 1
@@ -188,7 +187,7 @@ class AssignmentProblem:
 
     @classmethod
     def from_sparse(cls, array: Any, dummy: bool = True) -> AssignmentProblem:
-        """Read a sparse cost array: what it does not store is forbidden, a stored 0 is a cost.
+        """Read a sparse cost array: entries not stored are forbidden, a stored 0 is a cost.
 
         Parameters
         ----------
@@ -201,7 +200,7 @@ class AssignmentProblem:
         Raises
         ------
         InvalidInputError
-            It is no such array, or holds NaN or -inf.
+            The array is of another kind, or holds NaN or -inf.
 
         Warns
         -----
@@ -236,8 +235,7 @@ class AssignmentProblem:
             One row for each tuple: a column ``cost``, every other column a sensor with the number of its measurement,
             from 1; 0 or nothing: it missed the target.
         sizes : array_like of int, shape (S,), optional
-            Measurements of each sensor; by default the largest number in its column, so that measurements after it
-            that no tuple has are not known of.
+            Measurements of each sensor; by default the largest number in its column.
         cost : str, default "cost"
             Name of the column of costs.
         dummy : bool, default True
@@ -246,7 +244,7 @@ class AssignmentProblem:
         Raises
         ------
         InvalidInputError
-            It is no table, has no such column, or a number is none.
+            The frame is not a table, has no such column, or a value is not a number.
         """
         if not hasattr(frame, "columns") or not hasattr(frame, "drop"):
             raise InvalidInputError(f"frame: expected a pandas DataFrame, got {type(frame).__name__}")
@@ -264,7 +262,7 @@ class AssignmentProblem:
             except (TypeError, ValueError):
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
             numbers = np.where(np.isnan(numbers), 0.0, numbers)
-            # nothing beyond all indices may be cast
+            # the range before the cast
             if (np.abs(numbers) > np.iinfo(np.int32).max).any() or (numbers != np.round(numbers)).any():
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers")
             columns.append(numbers.astype(np.int64))
@@ -275,7 +273,7 @@ class AssignmentProblem:
         return cls(tuples, _numbers(frame[cost].to_numpy(), f"frame: column {cost!r}"), counts, dummy=dummy)
 
     def to_dense(self) -> NDArray[np.float64]:
-        """Return the dense tensor of ``from_dense``; what is not listed is ``inf``, the all-dummy entry 0.
+        """Return the dense tensor of ``from_dense``; tuples not listed are ``inf``, the all-dummy entry 0.
 
         Raises
         ------
@@ -439,7 +437,7 @@ def _finite(costs: NDArray[np.float64]) -> bool:
 
 
 def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which tuples are not forbidden (inf); refuses what is no cost at all."""
+    """Which tuples are not forbidden (inf); refuses NaN and -inf."""
     bad = np.isnan(costs) | np.isneginf(costs)
     if bad.any():
         row = int(np.argmax(bad))

@@ -1,4 +1,4 @@
-"""What a solver answers: the chosen tuples, what they cost, and how far from optimal that can be."""
+"""The answer of a solver: chosen tuples, cost, and certificate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHOWN = 10
 
 
 class TracePoint(NamedTuple):
-    """One line of a solver's history: when, after how much work, and what was known then."""
+    """One line of a solver's history."""
 
     iteration: int
     """Iterations done so far; for their meaning see each solver's documentation."""
@@ -54,7 +54,7 @@ class Solution:
         Seconds from the problem to this solution, without compiling.
     stopped_by : str
         Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", "interrupted"
-        (a program that was asked to end), or "memory_limit": what was left needed more memory than there was.
+        (a program that was asked to end), or "memory_limit".
     duals : tuple of float arrays
         One multiplier per measurement of each sensor, from which the bound can be checked: with them
         every tuple's reduced cost is >= 0 up to rounding. Empty where the proof was by enumeration.
@@ -82,7 +82,7 @@ class Solution:
 
     @property
     def gap(self) -> float:
-        """How much more than the optimum this can cost at most: ``cost - lower_bound`` >= 0."""
+        """Bound of the cost above the optimum: ``cost - lower_bound`` >= 0."""
         return self.cost - self.lower_bound
 
     @property
@@ -111,7 +111,7 @@ class Solution:
         )
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show: the certificate, and the first tuples that are more than a false alarm."""
+        """HTML for notebooks: the certificate, and the first targets."""
         from assoc._text.html import escape, facts, table
 
         certificate = {

@@ -45,7 +45,7 @@ def associate(
         Options of ``assoc.build_problem``: ``gate_probability``, ``max_tuples``, ``speed``, ``target_density``,
         ``all_tuples``.
     gate_loss : bool, default False
-        Whether to bound for each scan what the gates may have cost (``ScanAssociation.gate_loss``): the scan is built
+        Whether to bound the loss by gating of each scan (``ScanAssociation.gate_loss``): the scan is built
         and solved once more without gates, which takes about three times as long.
     **parameters
         Parameters of the solver (``assoc.solvers.parameters(solver)``).

@@ -93,7 +93,7 @@ class Association:
         ]
         if "gate_loss" in total:
             bound = total["gate_loss"]
-            lines.append("gates: may have cost any amount" if bound is None else f"gates: cost at most {bound:.3g}")
+            lines.append("gating loss: unknown" if bound is None else f"gating loss: at most {bound:.3g}")
         if total["share_correct"] is not None:
             lines.append(
                 f"{total['correct_tuples']} of {total['true_tuples']} true tuples correct "
@@ -148,7 +148,7 @@ class Association:
         }
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
-        """Write the result as JSON of format "assoc.result", version 1; whole or not at all.
+        """Write the result as JSON of format "assoc.result", version 1; atomically.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Association:
         )
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show: the summary, and one row for each of the first scans."""
+        """HTML for notebooks: the summary, and one row for each of the first scans."""
         headers, cells = rows(self.scans[:_SHOWN], [""] * min(len(self.scans), _SHOWN))
         lines = "<br>".join(escape(line) for line in self.summary().splitlines())
         numbers = [column for column, header in enumerate(headers) if header != "status"]

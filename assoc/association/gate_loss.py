@@ -1,4 +1,4 @@
-"""What gates may have cost: how far an association can be above the optimum of all tuples, gated or not."""
+"""Bound of the loss by gating: cost of an association above the optimum of all tuples, gated or not."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _SECONDS = 10.0
 
 
 def bound_without_gates(scene: Scene, scan: Scan, gating: Mapping[str, Any], time_limit: float | None) -> float:
-    """Bound from below what an association of any tuples of negative cost can cost, gated or not.
+    """Lower bound of the cost of an association of any tuples of negative cost, gated or not.
 
-    What an association costs above it is at most what the gates may have cost (``ScanAssociation.gate_loss``).
+    The cost of an association above it bounds the loss by gating (``ScanAssociation.gate_loss``).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The plan of an association: which scans of what, solved how; it can be sent to other processes."""
+"""The plan of an association: scans and solver; it can be sent to other processes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from assoc.solvers.aco.pheromone_history import PheromoneHistory, pheromone
 from assoc.solvers.assign import assign
 
 GATING = ("gate_probability", "max_tuples", "speed", "target_density", "all_tuples")
-"""What ``assoc.build_problem`` takes beside the scan."""
+"""Options of ``assoc.build_problem``."""
 
 # tuples whose pheromone is kept
 _NODES = 30
@@ -55,7 +55,7 @@ class Plan:
     watch : callable, optional
         Called with the number of a scan and each TracePoint of its solver, in this process only.
     gate_loss : bool
-        Bound for each scan of a scene what the gates may have cost.
+        Whether to bound the loss by gating for each scan of a scene.
     """
 
     sources: Sequence[Source]
@@ -138,12 +138,12 @@ class Plan:
         return [assign(problem, self.solver, **common, **self.parameters)], None
 
     def _callback(self, scan: int) -> Callback | None:
-        """Return what hears of each TracePoint of a scan; its answer, nothing, stops no solver."""
+        """Return the callback for each TracePoint of a scan; it never stops the solver."""
         watch = self.watch
         return None if watch is None else lambda point: watch(scan, point) and None
 
     def _best(self, scans: list[ScanAssociation], history: PheromoneHistory | None, compiled: float) -> ScanAssociation:
-        """Return the first of ranked associations, which carries all of them where they were asked for."""
+        """Return the first of ranked associations, which holds all of them, if requested."""
         scans = [replace(ranked, pheromone=history, compile_time=compile_seconds() - compiled) for ranked in scans]
         return scans[0] if self.kbest is None else replace(scans[0], ranked=tuple(scans))
 
@@ -171,7 +171,7 @@ def _received(solvers: tuple[registry.Own, ...], values: tuple[Any, ...]) -> Pla
 
 
 def _targets(problem: AssignmentProblem, solution: Solution) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Tuples that are targets, and what each costs."""
+    """Tuples that are targets, and their costs."""
     number = np.count_nonzero(solution.tuples, axis=1)
     alone_but_real = (number == 1) & (problem.costs[solution.indices] < 0)
     real = (number >= 2) | alone_but_real

@@ -37,21 +37,21 @@ class ScanAssociation(Shown):
     covariances : array (T, 3, 3) or None
         Their covariances, m^2.
     costs : array (T,) or None
-        What each target costs in the problem that was solved; None in associations made elsewhere.
+        Cost of each target in the solved problem; None in associations made elsewhere.
     true_tuples : int or None
         Targets that at least two sensors detected; None where the truth is not known.
     correct_tuples : int or None
-        Those of them whose measurements, all of them and no other, form a chosen tuple.
+        Those of them whose measurements form exactly a chosen tuple.
     ranked : tuple of ScanAssociation
-        The k best associations of the scan, this one first; empty where they were not asked for.
+        The k best associations of the scan, this one first; empty if not requested.
     pheromone : PheromoneHistory or None
         Largest pheromone values, if requested (solver aco).
     compile_time : float
-        Seconds in which kernels were compiled or loaded for this scan, for its costs and positions, too; they are
-        no part of ``solution.runtime``.
+        Seconds of compiling or loading kernels for this scan, costs and positions included; not part of
+        ``solution.runtime``.
     gate_loss : float or None
-        By how much the cost can be above the optimum of all tuples of negative cost, gated or not; infinite where
-        nothing is known, None where it was not asked for.
+        Bound of the cost above the optimum of all tuples of negative cost, gated or not; infinite if unknown, None if
+        not requested.
     """
 
     scan: int
@@ -83,7 +83,7 @@ class ScanAssociation(Shown):
         return result
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the scan as it stands in a result file (docs/results.md)."""
+        """Return the scan as in a result file (docs/results.md)."""
         solution = self.solution
         targets: list[dict[str, Any]] = [
             {"tuple": row.tolist(), "position": None, "covariance": None} for row in self.targets

@@ -1,4 +1,4 @@
-"""What can be associated: a scene, or an assignment problem."""
+"""Sources of an association: a scene, or an assignment problem."""
 
 from __future__ import annotations
 

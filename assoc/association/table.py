@@ -14,7 +14,7 @@ KEYS = ("file", "scan", "rank")
 """Columns that identify a row."""
 
 WIDTHS = {"cost": 10, "status": 11, "ms": 8, "correct": 7}
-"""By header: what most cells need."""
+"""Usual width of cells, by header."""
 
 _HEADERS = ("scan", "measurements", "targets", "false alarms", "cost", "lower bound", "gap", "status", "ms")
 LEFT_ALIGNED = ("file", "status")

@@ -21,9 +21,9 @@ class Gates(NamedTuple):
     joint: Array
     """By degrees of freedom."""
     pair: Array
-    """For each pair of sensors, (S, S); also below what any tuple with a negative cost can have."""
+    """For each pair of sensors, (S, S); also below the largest of any tuple with a negative cost."""
     future: Array
-    """What detections by sensors t, t + 1, ... can still take off the cost, (S + 1,)."""
+    """The most that detections by sensors t, t + 1, ... can take off the cost, (S + 1,)."""
 
 
 @lru_cache(maxsize=64)

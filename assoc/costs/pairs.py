@@ -17,7 +17,7 @@ from assoc.costs.gating import Gates
 from assoc.costs.limits import refuse, too_many
 from assoc.sensors.codes import BEARING, POSITION
 
-# up to so many combinations looking at each is quicker than a tree
+# up to so many combinations trying each is quicker than a tree
 _BRUTE = 100_000
 # coarse pairs are fitted in blocks of about this size, so that memory grows with the pairs kept
 _BLOCK = 500_000

@@ -28,7 +28,6 @@ import numpy as np
 from assoc._system.compiled import njit
 from assoc._types import Array
 from assoc.costs.arrays import ScanArrays, SensorArrays
-from assoc.costs.estimation import fit
 from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
@@ -77,25 +76,17 @@ def range_rates(scene: Scene, scan: Scan, speed: float | Sequence[float]) -> Ran
     return RangeRates(np.concatenate(values), variance, slope, sigma**2)
 
 
-def prices(
-    sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Array, positions: Array | None = None
-) -> Array:
-    """The price q of the range rates of tuples, (K,), twice what it adds to a cost.
+@njit
+def prices(sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Array, positions: Array) -> Array:
+    """The price q of the range rates of tuples, (K,), twice what it adds to a cost, by a Kalman filter.
 
     Parameters
     ----------
     rows : int32 (K, S)
         Row of `scan` for each sensor, or -1.
-    positions : (K, 3), optional
-        Of the tuples, if they are known.
+    positions : (K, 3)
+        Of the tuples.
     """
-    places = fit(sensors, scan, rows, False)[1] if positions is None else positions
-    return np.asarray(_prices(sensors, scan, rates, rows, places))
-
-
-@njit
-def _prices(sensors: SensorArrays, scan: ScanArrays, rates: RangeRates, rows: Array, positions: Array) -> Array:
-    """`prices` at given positions (K, 3): a Kalman filter that takes in one range rate after the other."""
     result = np.zeros(len(rows))
     P, v, k, u = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for t in range(len(rows)):

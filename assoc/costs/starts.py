@@ -11,7 +11,7 @@ from assoc.costs.symmetric import solve
 from assoc.sensors.codes import BEARING, RADAR2D, RADAR3D
 from assoc.sensors.kernels.records import Three
 
-# in half heights: ranges above this bend too little for another height to matter, where there are no others to be near
+# in half heights: without other measurements, ranges above this bend too little for another height to matter
 _FAR = 2.0
 # a target is near a radar's zenith within so many standard deviations of elevation
 _NEAR_ZENITH = 3.0

@@ -26,7 +26,7 @@ from assoc.sensors.base import numbers
 
 
 class State(Protocol):
-    """What every state of a filter offers."""
+    """State of a filter."""
 
     @property
     def mean(self) -> Array:
@@ -47,7 +47,7 @@ _new = object.__new__
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Update(Generic[S]):
-    """What a correction gives."""
+    """Result of a correction."""
 
     state: S
     innovation: Array
@@ -96,7 +96,7 @@ class Expected(NamedTuple):
 
 
 class History(NamedTuple, Generic[S]):
-    """What `Filter.run` gives: the corrected states of K steps."""
+    """Result of `Filter.run`: the corrected states of K steps."""
 
     mean: Array
     """(K, B, n)."""
@@ -158,7 +158,7 @@ class Filter(ABC, Generic[S]):
 
     @abstractmethod
     def update(self, state: S, measured: Array, sensor: Measurement) -> Update[S]:
-        """Correct each target with a measurement of its own.
+        """Correct each target with its measurement.
 
         Parameters
         ----------
@@ -244,16 +244,12 @@ class Filter(ABC, Generic[S]):
             raise InvalidInputError("measurements must be finite, got NaN or infinity")
         h, covariance = self.expected(state, sensor)
         if o.code < 0:
-            return self._compare_given(o, h, covariance, z)
+            residuals = [o.model.residual(z, np.broadcast_to(row, z.shape)) for row in h]
+            return scores(np.stack(residuals), covariance)
         status, ll, square = pairs(h, covariance, z, o.code)
         if status != GOOD:
             complain(status)
         return ll, square
-
-    @staticmethod
-    def _compare_given(o: Observation, h: Array, covariance: Array, z: Array) -> tuple[Array, Array]:
-        """`compare` with a user's model and its residuals."""
-        return scores(np.stack([o.model.residual(z, np.broadcast_to(row, z.shape)) for row in h]), covariance)
 
     def observe(self, sensor: Measurement) -> Observation:
         """Put a measurement model in the form that the kernels take."""
@@ -316,7 +312,7 @@ def check_dimension(state: Gaussian, dim: int) -> Gaussian:
 
 
 def predict_each(filter: Filter[Any], state: Any, dt: Array) -> Any:
-    """Predict each target by a time step of its own.
+    """Predict each target by its time step.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ class GaussianFilter(Filter[Gaussian]):
         return self.predict(state, dt), state.covariance @ F.transpose(0, 2, 1)
 
     def update(self, state: Gaussian, measured: Array, sensor: Measurement) -> Update[Gaussian]:
-        """Correct each target with a measurement of its own; see `Filter.update`."""
+        """Correct each target with its measurement; see `Filter.update`."""
         seen = self._seen
         o = seen[1] if seen[0] is sensor else self.observe(sensor)
         return self.correct(state, measured, o)

@@ -63,7 +63,7 @@ def ospa2(
         f"OSPA(2) of {shape[0]} targets and {shape[1]} tracks",
         "compare a shorter time, with fewer identities",
     )
-    # running sums over the window; what leaves it is taken out again
+    # running sums over the window
     total, both = np.zeros(shape), np.zeros(shape)
     present = [np.zeros(shape[0]), np.zeros(shape[1])]
     steps: list[tuple[Array, Array, Array]] = []

@@ -129,7 +129,7 @@ def seconds(text: str) -> tuple[float, bool]:
 
 
 def number(text: str) -> float:
-    """Read a finite number; what Python would also take (1_000, nan, other scripts' digits) is refused."""
+    """Read a finite number; other spellings that Python accepts (1_000, nan, other scripts' digits) are refused."""
     if not text.isascii() or "_" in text:
         raise ValueError(text)
     value = float(text)
@@ -139,7 +139,7 @@ def number(text: str) -> float:
 
 
 def code(text: str, base: float) -> int:
-    """Read a Mode 3/A code: a whole number, or its octal digits as the number of their 12 bits; nothing is 0."""
+    """Read a Mode 3/A code: a whole number, or its octal digits as the number of their 12 bits; empty is 0."""
     value = whole(text)
     if value < 0 or (base == 8 and value > 7777):
         raise ValueError(text)
@@ -147,7 +147,7 @@ def code(text: str, base: float) -> int:
 
 
 def whole(text: str) -> int:
-    """Read a whole number, also one written as 902.0; nothing is 0."""
+    """Read a whole number, also written as 902.0; empty is 0."""
     if not text:
         return 0
     value = number(text)

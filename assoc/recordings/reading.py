@@ -184,7 +184,7 @@ class _Table:
         return InvalidInputError(f"{self.file}: line {line}, column {name!r}: expected {expected}, got {text[:60]!r}")
 
     def recording(self, units: Mapping[str, str], max_disorder: float, codes: Array | None) -> Recording:
-        """Sort, leave out what repeats, and convert units."""
+        """Sort, leave out repeated rows, and convert units."""
         if not self.lines:
             raise InvalidInputError(f"{self.file}: holds no plots")
         columns = {meaning: np.array(values) for meaning, values in self.values.items()}

@@ -21,9 +21,8 @@ from assoc.registration.register import make_problem
 from assoc.registration.result import is_significant
 from assoc.registration.terms import Term
 from assoc.scene.scan import Scan
-from assoc.scene.scene import Scene
+from assoc.scene.scene import Scene, checked_measurements
 from assoc.sensors import Sensor
-from assoc.sensors.base import finite_array
 
 HOUR = 3600.0
 PREFIX = "registration_"
@@ -85,17 +84,17 @@ class OnlineRegistration:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """What each bias is of."""
+        """Sensor and component of each bias."""
         return self._problem.terms
 
     @property
     def significant(self) -> bool:
-        """Whether there is a bias at all, as `Registration.significant`."""
+        """Whether any bias is significant, see `Registration.significant`."""
         return is_significant(self.biases, self.covariance)
 
     def correct(self, measurements: Sequence[Array]) -> list[Array]:
         """Measurements without the biases known so far."""
-        checked = self._checked(measurements)
+        checked = checked_measurements(measurements, self.sensors, "measurements")
         if not self.significant:
             return list(measurements)
         return [
@@ -119,7 +118,7 @@ class OnlineRegistration:
             Measurements have the wrong shape, or are not finite.
         """
         later = copy.copy(self)
-        epoch = epoch_of(Scan(self._scans, time, self._checked(measurements)))
+        epoch = epoch_of(Scan(self._scans, time, checked_measurements(measurements, self.sensors, "measurements")))
         apart = 0.0 if self._time is None else max(time - self._time, 0.0)
         drift = (self.parameters.drift * self._problem.spreads) ** 2 * apart / HOUR
         later._now = replace(self._now, covariance=self._now.covariance + np.diag(drift))
@@ -133,19 +132,6 @@ class OnlineRegistration:
         later._now = estimate(self._problem, kept) if together else later._corrected(epoch)
         later._kept = () if later._scans == _MOST_KEPT else kept
         return later
-
-    def _checked(self, measurements: Sequence[Array]) -> tuple[Array, ...]:
-        """Measurements as float64 arrays (n_s, d_s)."""
-        if len(measurements) != len(self.sensors):
-            raise InvalidInputError(f"measurements of {len(measurements)} sensors, expected {len(self.sensors)}")
-        found = []
-        for s, (z, sensor) in enumerate(zip(measurements, self.sensors, strict=True)):
-            what = f"measurements of sensor {s}"
-            array = finite_array(np.zeros((0, sensor.dim)) if np.size(z) == 0 else z, what)
-            if array.ndim != 2 or array.shape[1] != sensor.dim:
-                raise InvalidInputError(f"{what} must have shape (n, {sensor.dim}), got {array.shape}")
-            found.append(array)
-        return tuple(found)
 
     def _corrected(self, epoch: Epoch) -> Estimate:
         """The biases after one more scan: one step of a filter in information form."""

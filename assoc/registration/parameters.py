@@ -10,7 +10,7 @@ from assoc._parameters import Parameters
 from assoc.errors import InvalidInputError
 
 COMPONENTS = ("range", "azimuth", "elevation", "time", "position")
-"""Biases that can be asked for."""
+"""Biases that can be estimated."""
 
 
 @dataclass(frozen=True)

@@ -50,14 +50,14 @@ class Residuals:
 @doors
 @dataclass(frozen=True, eq=False, repr=False)
 class Registration(Shown):
-    """Biases of sensors: what a sensor states, less what is true.
+    """Biases of sensors: stated less true values.
 
     Attributes
     ----------
     sensors : tuple of Sensor
         As they were stated.
     terms : tuple of Term
-        What each bias is of: number of the sensor, component.
+        Sensor and component of each bias.
     biases : array (n,)
         Metres, radians, seconds.
     covariance : array (n, n)
@@ -186,9 +186,7 @@ class Registration(Shown):
         if self.skipped:
             lines.append(f"{self.skipped} scans had too many candidate tuples and were passed over")
         if self.tuples and self.noise > 1.5:
-            lines.append(
-                "the residuals are larger than the noise: biases that were not asked for, or noise understated"
-            )
+            lines.append("the residuals are larger than the noise: biases of other components, or noise understated")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -204,7 +202,7 @@ def is_significant(biases: Array, covariance: Array) -> bool:
 
 
 def noise_factor(chi: Array, freedom: Array) -> float:
-    """Residuals as a multiple of what is expected: by the median, which outliers hardly move."""
+    """Residuals as a multiple of those expected, by the median because of outliers."""
     good = freedom > 0
     if not good.any():
         return math.nan

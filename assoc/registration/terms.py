@@ -35,7 +35,7 @@ class Term(NamedTuple):
 
     @property
     def shown_unit(self) -> str:
-        """m, deg or s: what people read."""
+        """m, deg or s, for people."""
         return "deg" if self.component in ANGLES else self.unit
 
     @property
@@ -50,7 +50,7 @@ def label_of(sensors: Sequence[Sensor], number: int) -> str:
 
 
 def make_terms(sensors: Sequence[Sensor], parameters: RegistrationParameters) -> tuple[Term, ...]:
-    """List the biases of sensors that parameters ask for.
+    """List the biases of sensors that parameters name.
 
     Raises
     ------

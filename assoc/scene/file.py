@@ -17,9 +17,9 @@ from assoc.sensors import KINDS
 
 FORMAT = "assoc.scene"
 VERSION = 2
-# bytes, a quarter of what it takes: what is in it is counted, too
+# bytes, a quarter of its memory: its content counts as well
 _OF_A_SCAN = 120
-# what only files of version 2 have; a scene without them is written as version 1, byte for byte as before
+# fields of version 2 alone; a scene without them is written as version 1
 _OWN_TIMES = ("measurement_times", "sectors")
 
 _FIELDS = {
@@ -53,7 +53,7 @@ def save_parts(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
 
 
 def load_parts(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read what `save_parts` wrote, as arguments of `assoc.scene.Scene` and `assoc.scene.Truth`."""
+    """Read the fields of `save_parts`, as arguments of `assoc.scene.Scene` and `assoc.scene.Truth`."""
     arrays = load_npz(path, FORMAT, VERSION, _FIELDS)
     # each scan of each sensor becomes an array of its own, also where it is empty
     check_unpacked(path, _OF_A_SCAN * arrays["measurement_offsets"].size, os.path.getsize(path), FLOOR)

@@ -1,4 +1,4 @@
-"""A scene: sensors, what they measured in every scan, and the truth where it is known."""
+"""A scene: sensors, their measurements in every scan, and the truth if known."""
 
 from __future__ import annotations
 
@@ -141,19 +141,10 @@ class Scene:
     def _checked_measurements(self) -> tuple[tuple[Array, ...], ...]:
         if len(self.measurements) != self.num_scans:
             raise InvalidInputError(f"measurements: {len(self.measurements)} scans, but times has {self.num_scans}")
-        result = []
-        for k, scan in enumerate(self.measurements):
-            if len(scan) != len(self.sensors):
-                raise InvalidInputError(f"measurements: scan {k} has {len(scan)} sensors, expected {len(self.sensors)}")
-            row = []
-            for s, (z, sensor) in enumerate(zip(scan, self.sensors, strict=True)):
-                what = f"measurements of scan {k}, sensor {s}"
-                array = finite_array(np.zeros((0, sensor.dim)) if np.size(z) == 0 else z, what)
-                if array.ndim != 2 or array.shape[1] != sensor.dim:
-                    raise InvalidInputError(f"{what} must have shape (n, {sensor.dim}), got {array.shape}")
-                row.append(array)
-            result.append(tuple(row))
-        return tuple(result)
+        return tuple(
+            checked_measurements(scan, self.sensors, f"measurements of scan {k}")
+            for k, scan in enumerate(self.measurements)
+        )
 
     def _checked_region(self) -> Array:
         region = finite_array(default_region(self.sensors) if self.region is None else self.region, "region", (3, 2))
@@ -228,7 +219,7 @@ class Scene:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the scene as an npz file of format "assoc.scene"; the file appears whole or not at all."""
+        """Write the scene as an npz file of format "assoc.scene"; atomically."""
         # vars: the dataclass as it is, without the copies that dataclasses.asdict makes
         save_parts(path, {**vars(self), "truth": None if self.truth is None else vars(self.truth)})
 
@@ -255,7 +246,7 @@ class Scene:
         return f"Scene({name}{len(self.sensors)} sensors, {self.num_scans} scans, {count} measurements{known})"
 
     def _repr_html_(self) -> str:
-        """Return what notebooks and reports show: one row a sensor."""
+        """HTML for notebooks and reports: one row a sensor."""
         rows, units = [], {"range rate": "m/s"}
         for s, sensor in enumerate(self.sensors):
             counts = [len(scan[s]) for scan in self.measurements]
@@ -277,8 +268,21 @@ class Scene:
         return f"<p>{escape(repr(self))}</p>{table(headers, rows, numbers=(4, 5, 6))}"
 
 
+def checked_measurements(scan: Sequence[Array], sensors: Sequence[Sensor], where: str) -> tuple[Array, ...]:
+    """Measurements of a scan as read-only float64 arrays (n_s, d_s); errors begin with `where`."""
+    if len(scan) != len(sensors):
+        raise InvalidInputError(f"{where}: {len(scan)} sensors, expected {len(sensors)}")
+    found = []
+    for s, (z, sensor) in enumerate(zip(scan, sensors, strict=True)):
+        array = finite_array(np.zeros((0, sensor.dim)) if np.size(z) == 0 else z, f"{where}, sensor {s}")
+        if array.ndim != 2 or array.shape[1] != sensor.dim:
+            raise InvalidInputError(f"{where}, sensor {s} must have shape (n, {sensor.dim}), got {array.shape}")
+        found.append(array)
+    return tuple(found)
+
+
 def default_region(sensors: Sequence[Sensor]) -> Array:
-    """Box of x, y, z around what the sensors can see, shape (3, 2), metres; see `Scene`."""
+    """Box of x, y, z around the fields of view, shape (3, 2), metres; see `Scene`."""
     boxes = []
     for sensor in sensors:
         if isinstance(sensor, (Radar3D, Radar2D)):

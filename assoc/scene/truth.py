@@ -14,7 +14,7 @@ from assoc.sensors.base import finite_array
 
 
 def integers(value: object, what: str, length: int) -> Array:
-    """Return whole numbers as a read-only int64 array (length,), or raise an error that names them ``what``."""
+    """Return whole numbers as a read-only int64 array (length,); errors name them ``what``."""
     array = np.asarray(value)
     if array.size == 0:
         array = array.astype(np.int64)

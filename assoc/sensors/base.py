@@ -1,4 +1,4 @@
-"""What all sensors have: a place, noise, detection probability, false alarms and a field of view."""
+"""The base of all sensors: position, noise, detection probability, false alarms and field of view."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ANGLES = ("azimuth", "elevation")
 """Components that are angles, in radians; all others are lengths, in metres, but for the range rate, in m/s."""
 
 LARGEST_ANGLE_NOISE = 0.3
-"""Standard deviation of an angle (rad, 17 degrees) from which a sensor is asked whether it means degrees."""
+"""Standard deviation of an angle (rad, 17 degrees) from which a warning suggests degrees."""
 
 LARGEST = 1e12
 """Lengths beyond this (metres) are refused: their squares would leave no digits for the residuals."""
@@ -66,7 +66,7 @@ class Sensor(ABC):
     Parameters
     ----------
     position : array_like (3,)
-        Its place, metres.
+        Metres.
     noise : array_like (d,) or (d, d)
         Standard deviations, or the covariance matrix, of one measurement.
     detection_probability : float
@@ -136,7 +136,7 @@ class Sensor(ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is almost surely a mistake in these values, one line each."""
+        """Probable mistakes in these values, one line each."""
         found = []
         for axis in range(self.dim):
             name, (low, high) = self.components[axis], self.field_of_view[axis]
@@ -151,7 +151,7 @@ class Sensor(ABC):
         return tuple(found)
 
     def label(self, number: int) -> str:
-        """What to call the sensor in a message: its kind and name, or its number where it has none."""
+        """Name of the sensor in messages: its kind and name, or its number."""
         return self._label if self.name else f"{self._label} (sensor {number})"
 
     def _checked_noise(self) -> Array:
@@ -208,7 +208,7 @@ class Sensor(ABC):
 
     @property
     def measures_velocity(self) -> bool:
-        """Whether a measurement depends on the target's velocity, too: `measure` then asks for velocities."""
+        """Whether measurements depend on the target's velocity: `measure` then needs velocities."""
         return False
 
     @property
@@ -236,8 +236,8 @@ class Sensor(ABC):
     def jacobian(self, positions: Array, velocities: Array | None = None) -> Array:
         """Derivatives of `measure` by the position, shape (n, d, 3).
 
-        Of a sensor that measures a velocity, by position and velocity, shape (n, d, 6). At the sensor's own
-        place, where angles have no derivative, the distance is taken as 1e-9 m.
+        Of a sensor that measures a velocity, by position and velocity, shape (n, d, 6). At the
+        sensor itself, where angles have no derivative, the distance is taken as 1e-9 m.
         """
 
     def residual(self, measured: Array, predicted: Array) -> Array:

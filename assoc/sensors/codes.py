@@ -1,4 +1,4 @@
-"""The numbers by which compiled code knows the kinds of sensors."""
+"""Numbers of the kinds of sensors in kernels."""
 
 from __future__ import annotations
 

@@ -43,6 +43,6 @@ def in_steps(values: Array, step: float) -> Array:
 
 
 def bearings_in_steps(bearings: Array, step: float) -> Array:
-    """Round bearings (rad, in [0, 2 pi)) to multiples of a step; what rounds to a full turn or more is north, 0."""
+    """Round bearings (rad, in [0, 2 pi)) to multiples of a step; a full turn or more is north, 0."""
     rounded = in_steps(bearings, step)
     return np.where(rounded >= 2 * math.pi, 0.0, rounded)

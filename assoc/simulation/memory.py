@@ -1,4 +1,4 @@
-"""How much memory a simulated scene takes, asked before it is made."""
+"""Memory of a simulated scene, checked before it is made."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def require_scene_memory(scans: float, sensors: float, targets: float, false_ala
     false_alarms : float
         Mean number of a sensor in a scan.
     names : str
-        What the caller's parameters are called, in the same order, with spaces between.
+        Names of the caller's parameters in the same order, separated by spaces.
 
     Raises
     ------

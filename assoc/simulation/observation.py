@@ -1,4 +1,4 @@
-"""What sensors report of targets: detections with noise, misses, and false alarms."""
+"""Reports of sensors: detections with noise, misses, and false alarms."""
 
 from __future__ import annotations
 

@@ -110,10 +110,10 @@ def test_bad_input():
         OnlineRegistration([1])
     online, z = OnlineRegistration(scene.sensors, REGION), scene.measurements[0]
     for given, match in (
-        (z[:2], "measurements of 2 sensors, expected 3"),
-        ([z[0], z[1][:, :2], z[2]], "measurements of sensor 1 must have shape .n, 3., got"),
-        ([z[0], z[1], np.zeros(3)], "measurements of sensor 2 must have shape"),
-        ([np.full((1, 3), np.nan), *z[1:]], "measurements of sensor 0 must be finite"),
+        (z[:2], "measurements: 2 sensors, expected 3"),
+        ([z[0], z[1][:, :2], z[2]], "measurements, sensor 1 must have shape .n, 3., got"),
+        ([z[0], z[1], np.zeros(3)], "measurements, sensor 2 must have shape"),
+        ([np.full((1, 3), np.nan), *z[1:]], "measurements, sensor 0 must be finite"),
     ):
         for act in (online.correct, lambda one: online.after(0.0, one)):
             with pytest.raises(InvalidInputError, match=match):

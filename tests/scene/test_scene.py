@@ -115,7 +115,7 @@ NAN = float("nan")
         ({"times": [0, NAN, 1]}, "times must be finite"),
         ({"times": []}, "K >= 1"),
         ({"times": "now"}, "times must be numbers"),
-        ({"measurements": [[[]] * 3] * 3}, "scan 0 has 3 sensors, expected 4"),
+        ({"measurements": [[[]] * 3] * 3}, "scan 0: 3 sensors, expected 4"),
         (
             {"measurements": [[[[1, 2]], [], [], []]] * 3},
             r"scan 0, sensor 0 must have shape \(n, 3\), got \(1, 2\)",

@@ -1,1 +1,1 @@
-"""Candidate tuples of tracks and measurements, and what they cost."""
+"""Candidate tuples of tracks and measurements, and their costs."""

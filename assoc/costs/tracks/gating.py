@@ -128,26 +128,18 @@ def _doubled(array: Array) -> Array:
     return larger
 
 
-def _reach(expected: Expected, gate: float) -> Array:
-    """Largest component of a residual within the gate: |v_i| <= sqrt(gate S_ii)."""
-    reach: Array = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
-    return reach
-
-
 def within(
     expected: Expected, rows: Array, measurements: Array, found: Array, angular: tuple[bool, ...], gate: float
 ) -> Array:
     """Which pairs (row of `expected`, row of `measurements`) may pass a chi-square gate; bool (K,)."""
-    off = _apart(measurements[found], expected.mean[rows], np.array(angular))
-    return np.asarray((off <= _reach(expected, gate)[rows]).all(axis=1))
-
-
-def _apart(a: Array, b: Array, turning: Array) -> Array:
-    off: Array = np.abs(a - b)
+    off: Array = np.abs(measurements[found] - expected.mean[rows])
+    turning = np.array(angular)
     if turning.any():
-        part = off[..., turning] % (2 * math.pi)
-        off[..., turning] = np.minimum(part, 2 * math.pi - part)
-    return off
+        part = off[:, turning] % _TURN
+        off[:, turning] = np.minimum(part, _TURN - part)
+    # |v_i| <= sqrt(gate S_ii) for every residual within the gate
+    reach: Array = np.sqrt(gate * np.einsum("bii->bi", expected.covariance)) * (1 + 1e-9)
+    return np.asarray((off <= reach[rows]).all(axis=1))
 
 
 def angular_components(sensor: Measurement) -> tuple[bool, ...]:

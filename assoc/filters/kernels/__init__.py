@@ -1,1 +1,1 @@
-"""What filters compute, compiled."""
+"""Kernels of filters."""

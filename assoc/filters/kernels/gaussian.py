@@ -163,7 +163,7 @@ def correct(
             S[e, a] = total
     if not factor(S, d, work[L]):
         return False, 0.0, 0.0
-    # the inverse of S; what rounding makes of the gain, Joseph's form forgives
+    # the inverse of S; Joseph's form forgives rounding errors of the gain
     log_det = nis = 0.0
     for a in range(d):
         log_det += 2.0 * math.log(work[L, a, a])

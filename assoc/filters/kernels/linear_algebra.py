@@ -1,4 +1,4 @@
-"""Small symmetric matrices in kernels: Cholesky factors and what is solved with them."""
+"""Small symmetric matrices in kernels: Cholesky factors and solutions."""
 
 from __future__ import annotations
 

@@ -259,7 +259,7 @@ class CoordinatedTurn(Motion):
 
 
 class Padded(LinearMotion):
-    """A linear model with components added that it does not use, so that it can stand beside a larger one.
+    """A linear model with added components that it does not use, to be combined with a larger model.
 
     In an interacting multiple model all models share one state. The added components are drawn anew with
     each step, N(0, spread^2): constant velocity beside a coordinated turn forgets the turn rate.

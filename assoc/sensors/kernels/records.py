@@ -1,4 +1,4 @@
-"""What the compiled models of all kinds of sensors take and give."""
+"""Types of the compiled sensor models."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _TOUCH = 1e-11
 
 @njit
 def turn(angle: float) -> float:
-    """Angle in [0, 2 pi), where what rounding made of 0 is 0."""
+    """Angle in [0, 2 pi); rounding errors around 0 become 0."""
     angle = angle % TURN
     return 0.0 if angle > TURN - _TINY else angle
 

@@ -119,7 +119,11 @@ def simulate(parameters: RotatingRadarParameters, rng: np.random.Generator, name
         f"false_plots = {p.false_plots:g}",
         "shorten the recording, or lower the number of plots",
     )
-    flights = _random_traffic(p, rng) if p.traffic == "random" else _pair(p, rng)
+    far = p.reach * NAUTICAL_MILE
+    if p.traffic == "random":
+        flights = [random_flight(rng, 0.08 * far, 0.85 * far, p.duration) for _ in range(p.count)]
+    else:
+        flights = _pair(p, rng)
     codes = rng.choice(np.arange(1, 4096), len(flights), replace=False)
     seen = [_seen(p, flight) for flight in flights]
     source = np.repeat(np.arange(len(flights)), [len(times) for times, _, _ in seen])
@@ -170,11 +174,6 @@ def _seen(p: RotatingRadarParameters, flight: Flight) -> tuple[Array, Array, Arr
     step = p.range_step * NAUTICAL_MILE
     inside = in_steps(np.linalg.norm(position, axis=1), step) <= p.reach * NAUTICAL_MILE
     return when[inside], position[inside], velocity[inside]
-
-
-def _random_traffic(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:
-    far = p.reach * NAUTICAL_MILE
-    return [random_flight(rng, 0.08 * far, 0.85 * far, p.duration) for _ in range(p.count)]
 
 
 def _pair(p: RotatingRadarParameters, rng: np.random.Generator) -> list[Flight]:

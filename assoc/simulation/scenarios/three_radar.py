@@ -76,7 +76,8 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
     paths = np.stack([trajectory.positions(since) for trajectory in TRAJECTORIES], axis=1)
     speeds = np.stack([trajectory.velocities(since) for trajectory in TRAJECTORIES], axis=1)
     fastest = float(np.linalg.norm(speeds, axis=2).max())
-    region = around(paths if not wave[-1] else _whole_paths(), parameters.margin)
+    whole = since if not wave[-1] else np.arange(0.0, DURATION, 1.0)
+    region = around(np.stack([trajectory.positions(whole) for trajectory in TRAJECTORIES], axis=1), parameters.margin)
     positions = on_circle(region.mean(axis=1), parameters.radar_distance, parameters.radars)
     sensors = radars_over(
         region,
@@ -90,11 +91,6 @@ def simulate(parameters: ThreeRadarParameters, rng: np.random.Generator, name: s
     )
     ids = [np.arange(len(TRAJECTORIES)) + len(TRAJECTORIES) * number for number in wave.tolist()]
     return observe(sensors, times, ids, list(paths), rng, region=region, name=name, velocities=list(speeds))
-
-
-def _whole_paths() -> Array:
-    times = np.arange(0.0, DURATION, 1.0)
-    return np.stack([trajectory.positions(times) for trajectory in TRAJECTORIES], axis=1)
 
 
 def around(positions: Array, margin: float) -> Array:
