@@ -80,7 +80,7 @@ _known_positions: weakref.WeakKeyDictionary[Scene, dict[int, Array]] = weakref.W
 
 def _positions(scene: Scene, sensors: SensorArrays, sensor: int, measured: Array) -> tuple[Array, Array]:
     count = len(scene.sensors)
-    parts = tuple(measured if s == sensor else np.empty((0, one.dim)) for s, one in enumerate(scene.sensors))
+    parts = tuple(measured if s == sensor else np.empty((0, other.dim)) for s, other in enumerate(scene.sensors))
     flat, index = scan_arrays(sensors, Scan(0, 0.0, parts), 1.0, 1.0)
     rows = np.full((len(measured), count), -1, dtype=np.int32)
     rows[index - 1, sensor] = np.arange(len(measured))

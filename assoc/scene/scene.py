@@ -106,8 +106,8 @@ class Scene:
         if self.sectors is not None:
             shape = (self.num_scans, len(self.sensors), 2)
             given = finite_array(self.sectors, "sectors", shape)
-            for k, one in enumerate(given):
-                checked_sectors(one, len(self.sensors), f"sectors of scan {k}")
+            for k, sectors in enumerate(given):
+                checked_sectors(sectors, len(self.sensors), f"sectors of scan {k}")
             put(self, "sectors", given)
         if self.origin is not None:
             put(self, "origin", checked_origin(self.origin))

@@ -261,10 +261,10 @@ class Sensor(ABC):
         return inside
 
     def _places(self, positions: Array) -> Array:
-        places = np.asarray(positions, dtype=np.float64)
-        if places.ndim != 2 or places.shape[1] != 3:
-            raise InvalidInputError(f"{self._label}: positions must have shape (n, 3), got {places.shape}")
-        return places
+        points = np.asarray(positions, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InvalidInputError(f"{self._label}: positions must have shape (n, 3), got {points.shape}")
+        return points
 
     def _components(self, measurements: Array, what: str) -> Array:
         z = np.asarray(measurements, dtype=np.float64)
@@ -289,8 +289,8 @@ class Sensor(ABC):
         return hash((type(self), self.name, self.detection_probability, (self.position + 0.0).tobytes()))
 
     def __repr__(self) -> str:
-        place = ", ".join(f"{x:g}" for x in self.position)
+        position = ", ".join(f"{x:g}" for x in self.position)
         return (
-            f"{self._label}(({place}) m, P_d {self.detection_probability:g}, "
+            f"{self._label}(({position}) m, P_d {self.detection_probability:g}, "
             f"{self.false_alarm_rate:g} false alarms per scan)"
         )

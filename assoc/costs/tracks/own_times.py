@@ -221,12 +221,12 @@ class TimedScan:
         result = np.ones((total, len(self.sensors)), dtype=np.bool_)
         if self.sectors is None:
             return result
-        places = np.zeros((total, 3))
+        points = np.zeros((total, 3))
         axes = self.filter.motion.position
-        places[: len(self.late), : len(axes)] = self.late.mean[:, list(axes)]
-        places[len(self.late) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
+        points[: len(self.late), : len(axes)] = self.late.mean[:, list(axes)]
+        points[len(self.late) :] = np.concatenate([*self.places.positions, np.zeros((0, 3))])
         for s, (sensor, sector) in enumerate(zip(self.sensors, self.sectors, strict=True)):
-            away = places - sensor.position
+            away = points - sensor.position
             result[:, s] = looked_at(sector, np.arctan2(away[:, 1], away[:, 0]))
             # a sensor covers its own measurements, in spite of rounding
             result[self.offsets[s] : self.offsets[s + 1], s] = True
@@ -274,12 +274,12 @@ class TimedScan:
         velocity = np.zeros((len(self.states), 3))
         moving = [k for k in range(axes, 2 * axes) if k < self.filter.motion.dim]
         velocity[:, : len(moving)] = self.late.mean[:, moving]
-        place = np.zeros((len(self.states), 3))
-        place[:, :axes] = self.late.mean[:, list(self.filter.motion.position)]
-        here = _measured(sensor, place, velocity)
+        position = np.zeros((len(self.states), 3))
+        position[:, :axes] = self.late.mean[:, list(self.filter.motion.position)]
+        here = _measured(sensor, position, velocity)
         ways = []
         for back in (self.end - float(times.max()), self.end - float(times.min())):
-            way = _measured(sensor, place - back * velocity, velocity) - here
+            way = _measured(sensor, position - back * velocity, velocity) - here
             turning = np.array(angles)
             way[:, turning] -= 2 * np.pi * np.round(way[:, turning] / (2 * np.pi))
             ways.append(way)
@@ -303,8 +303,8 @@ class TimedScan:
         return able[first], second
 
 
-def _measured(sensor: Sensor, places: Array, velocities: Array) -> Array:
-    return sensor.measure(places, velocities) if sensor.measures_velocity else sensor.measure(places)
+def _measured(sensor: Sensor, positions: Array, velocities: Array) -> Array:
+    return sensor.measure(positions, velocities) if sensor.measures_velocity else sensor.measure(positions)
 
 
 def _diagonal(variances: Array) -> Array:

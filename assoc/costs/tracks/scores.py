@@ -47,8 +47,8 @@ def score_terms(sensors: Sequence[Sensor]) -> ScoreTerms:
     density = np.array([sensor.false_alarm_rate / sensor.volume for sensor in sensors])
     # range rates are as likely for a new target as for a false alarm
     located = [sensor.position_part for sensor in sensors]
-    there = np.array([one.false_alarm_rate / one.volume for one in located])
-    spread = np.array([np.linalg.slogdet(2.0 * math.pi * one.covariance)[1] for one in located])
+    there = np.array([part.false_alarm_rate / part.volume for part in located])
+    spread = np.array([np.linalg.slogdet(2.0 * math.pi * part.covariance)[1] for part in located])
     return ScoreTerms(np.log(P / density), np.log1p(-P), np.log(P / there) - 0.5 * spread)
 
 

@@ -143,7 +143,7 @@ def unscented(
     ----------
     z : (B, d) or (0, d)
         Measurements; of a user's model (GIVEN) the residuals of the first point. Empty: the expected measurements and
-        their covariances are written in the place of the innovations.
+        their covariances are written in place of the innovations.
     models : (B or 1, ...)
         Packed measurement models; a user's has the measurements of the points (2n+1, d) relative to the first.
     weights : (3, 2n+1)
