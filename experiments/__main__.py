@@ -1,7 +1,5 @@
 """List the experiments: ``python -m experiments``."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ proven optimum where five seconds will do: with the costs of equation 5, and wit
 (`target_density="auto"`). Counted are the targets found and the true tuples among them.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

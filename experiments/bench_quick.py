@@ -7,8 +7,6 @@ the median of the ratios depends little on the machine and on what else it does.
 bench_quick.json is measured once more, and makes the exit code 1 if it stays so. ``--write`` writes the file.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -10,8 +10,6 @@ printed as each scan is finished. Wall seconds say what a user feels on two idle
 command and the processes that it started.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -4,8 +4,6 @@ Pictures are of fixed scenes and seeds, or of published results (surfaces-*). Th
 screen, so that they are sharp on good ones. Only the report's screenshot shows measured times.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import shutil

@@ -9,8 +9,6 @@ something better with the ten forbidden: it must not find any. Processor time of
 compiled, from the candidate tuples on: building them counts, too.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple

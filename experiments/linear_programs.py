@@ -9,8 +9,6 @@ which keeps nothing) begins anew. All bounds must agree to 1e-9 of the optimum. 
 to a core, kernels compiled; ratios are of the same programs.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -13,8 +13,6 @@ Processor time depends on the load of the machine (caches, clock rate). So a fix
 this package is done and timed between the steps; the time of a step divided by the time of that work must not grow.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import time

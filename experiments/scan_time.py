@@ -9,8 +9,6 @@ first call of a solver: each call has a new one. HiGHS, from the tuples to the c
 ratios say more than times of one machine. Processor time of one thread, pinned to a core, kernels compiled.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

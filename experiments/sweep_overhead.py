@@ -12,8 +12,6 @@ workers all of it, in one process the share outside the solver. Full size: 3,000
 workers.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

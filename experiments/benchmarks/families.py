@@ -1,9 +1,8 @@
 """Which instances are run, by whom, for how long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
+from typing import Self
 
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scene
@@ -65,23 +64,23 @@ class Case:
     chosen: tuple[int, ...] = ()
     brief: int = 2
 
-    def restricted_to(self, solvers: Collection[str]) -> Case:
+    def restricted_to(self, solvers: Collection[str]) -> Self:
         """Return the same case with only these solvers and peers."""
         ours = tuple(entry for entry in self.ours if entry.solver in solvers)
         return replace(self, ours=ours, peers=tuple(entry for entry in self.peers if entry.solver in solvers))
 
-    def on_one_core(self) -> Case:
+    def on_one_core(self) -> Self:
         """Return the same case without peers that need two."""
         both = {"cp_sat": "cp_sat_1", "scip": "scip_1"}
         peers = (replace(entry, solver=both.get(entry.solver, entry.solver)) for entry in self.peers)
         return replace(self, peers=tuple(dict.fromkeys(peers)))
 
-    def by_seed(self, most: int | None = None) -> list[Case]:
+    def by_seed(self, most: int | None = None) -> list[Self]:
         """Return a case for each seed, of so many at the most."""
         every = self.chosen or tuple(range(FIRST_SEED, FIRST_SEED + self.seeds))
         return [replace(self, chosen=(seed,)) for seed in every[:most]]
 
-    def with_peers_within(self, limit: float) -> Case:
+    def with_peers_within(self, limit: float) -> Self:
         """Return the same case with peers that get this time limit at the most."""
         peers = (replace(entry, limit=min(entry.limit, limit)) for entry in self.peers)
         return replace(self, peers=tuple(dict.fromkeys(peers)))

@@ -1,7 +1,5 @@
 """The goals of the benchmark, each read off the rows: what was asked, what was measured, met or not."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The Markdown report: goals first, then one table for each family."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform

@@ -1,7 +1,5 @@
 """The k best: against one exact solve and against Murty's algorithm of a peer."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import time

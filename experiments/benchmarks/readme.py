@@ -1,7 +1,5 @@
 """The tables of README.md, written from the same rows as docs/benchmarks.md."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from statistics import median

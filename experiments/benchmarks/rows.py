@@ -1,7 +1,5 @@
 """One measurement is one row; rows go to CSV and come back."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -125,9 +123,6 @@ def load(path: Path) -> list[Row]:
             values: dict[str, object] = {}
             for field in fields(Row):
                 text = record.get(field.name) or "0"
-                if field.type == "bool":
-                    values[field.name] = text == "True"
-                else:
-                    values[field.name] = {"int": int, "float": float, "str": str}[str(field.type)](text)
+                values[field.name] = text == "True" if field.type is bool else field.type(text)  # type: ignore[operator]
             rows.append(Row(**values))  # type: ignore[arg-type]
     return rows

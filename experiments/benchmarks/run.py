@@ -1,7 +1,5 @@
 """Run one case: peers and exact methods first (they give the reference), then the rest."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import multiprocessing

@@ -3,8 +3,6 @@
 ``python -m experiments.benchmarks.scale TARGETS SEED`` prints one line of JSON.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

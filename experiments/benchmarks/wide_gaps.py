@@ -3,8 +3,6 @@
 ``python -m experiments.benchmarks.wide_gaps TARGETS`` prints them as it finds them.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator

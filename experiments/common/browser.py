@@ -1,7 +1,5 @@
 """A real browser without a screen, driven through WebDriver; tests that need it skip where it is missing."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

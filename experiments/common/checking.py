@@ -1,7 +1,5 @@
 """An independent reading of "this is a solution": plain Python, nothing shared with the solvers."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The shared result form of all experiments: what was claimed, what we measured, and whether it holds."""
 
-from __future__ import annotations
-
 import datetime
 import json
 import math

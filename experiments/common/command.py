@@ -1,7 +1,5 @@
 """The command line that most experiments share: --quick, --seed, --json, --figure, --publish."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path

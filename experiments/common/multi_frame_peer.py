@@ -9,8 +9,6 @@ nothing. Costs are against false alarms; a track's are raised together so that i
 2 % is meant for costs above 0.
 """
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np

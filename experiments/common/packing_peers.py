@@ -11,8 +11,6 @@ tuple costs the sum of its pairs. Its tuples are priced by our costs afterwards,
 alarms.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 import os

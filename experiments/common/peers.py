@@ -19,8 +19,6 @@ computed by `experiments.common.checking`, not by the peer.
 ======================  ==========================================================================
 """
 
-from __future__ import annotations
-
 import datetime
 import importlib.util
 import time

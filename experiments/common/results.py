@@ -1,7 +1,5 @@
 """The published results: one small file for each experiment, from which the pages take their figures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

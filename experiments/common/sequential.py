@@ -1,7 +1,5 @@
 """Sensor by sensor, one two-dimensional assignment each: what most trackers do."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment

@@ -1,10 +1,8 @@
 """Benchmark B1: one radar, a target 100 km away, bearings so coarse that an EKF fails."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -58,7 +56,7 @@ class Runs:
     measured: Array
 
     @classmethod
-    def draw(cls, setting: Setting, count: int, rng: np.random.Generator) -> Runs:
+    def draw(cls, setting: Setting, count: int, rng: np.random.Generator) -> Self:
         """Draw independent runs, azimuths spread evenly unless the setting gives one."""
         s = setting
         F, Q = (one[0] for one in s.motion.matrices(s.interval))

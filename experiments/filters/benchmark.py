@@ -11,8 +11,6 @@ times, which depend less on the load of the machine. Full size: 12 rounds, batch
 ensemble).
 """
 
-from __future__ import annotations
-
 import datetime
 import math
 import time

@@ -8,8 +8,6 @@ of as many independent values (99.9 %). On the linear case the exact filters mus
 and the table says by how much. Ensembles have 100 or 1,000 members.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any

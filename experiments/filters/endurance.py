@@ -8,8 +8,6 @@ eigenvalue of the correlation matrix (above 0: positive definite, whatever the u
 units of the standard deviations.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The filters that the experiments compare: the two tuned ones, and one of each kind."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,10 +1,8 @@
 """Manoeuvring targets seen by one radar: scenarios C to H, and random ones for tuning."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -109,7 +107,7 @@ class Batch:
     radar: Radar3D
 
     @classmethod
-    def draw(cls, flights: list[Flight], runs: int, rng: np.random.Generator) -> Batch:
+    def draw(cls, flights: list[Flight], runs: int, rng: np.random.Generator) -> Self:
         """Draw `runs` runs of each flight; the angle noise makes the raw RMSE 89.7 m on average."""
         truth = np.repeat(np.stack([f.positions() for f in flights], axis=1), runs, axis=1)
         flat2 = (truth[..., :2] ** 2).sum(axis=-1)

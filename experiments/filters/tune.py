@@ -8,8 +8,6 @@ of these flights is in the report (experiments/papers/fuzzy_ekf.py). At the end 
 which shows whether they are overfitted. About three minutes of one core.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Callable

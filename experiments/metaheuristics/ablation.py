@@ -14,8 +14,6 @@ one core is compared with two workers on two.
 these parts alone, so that the whole table can be measured in several runs.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """The parts of the three metaheuristics, and how each is taken out."""
 
-from __future__ import annotations
-
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator

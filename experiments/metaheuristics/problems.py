@@ -4,8 +4,6 @@ Their seeds were used for nothing else, but for one thing: on twelve scenes of 2
 settings (sweep.py) chose the defaults of `aco`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from assoc.costs import build_problem

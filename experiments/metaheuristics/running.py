@@ -1,7 +1,5 @@
 """One run with a budget of processor time, on a machine that others may use."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -14,8 +14,6 @@ resampling problems. The best setting is chosen on every second problem, and jud
 The gallery draws the published figures: mean excess over alpha and beta, and over rho and ants, the other two averaged.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import tempfile

@@ -6,8 +6,6 @@ The results are the files of experiments/results, which the experiments write wi
 and those of the benchmark set; a test fails where a table and they differ.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

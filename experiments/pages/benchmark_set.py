@@ -1,7 +1,5 @@
 """The tables of docs/benchmark_set.md, from what is known and what was compared."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which solver where, and what was measured there: made from the rows of the benchmarks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from statistics import mean, median
 from typing import NamedTuple

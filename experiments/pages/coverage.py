@@ -1,7 +1,5 @@
 """What of the five papers is where, and whether it holds: the tables of docs/papers.md, every element a row."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from experiments.common.claims import Claim

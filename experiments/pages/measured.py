@@ -1,7 +1,5 @@
 """Tables of measured figures for the pages of filters, recordings, sweeps, trackers, concepts, and installations."""
 
-from __future__ import annotations
-
 from experiments.common.claims import Claim
 from experiments.common.results import Results, number, result_file, table
 

@@ -1,7 +1,5 @@
 """What the parts and the settings of the metaheuristics do, made from the published results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from experiments.common.claims import Claim

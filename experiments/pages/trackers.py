@@ -1,7 +1,5 @@
 """Tables of measured trackers: docs/tracking.md, and biased radars for docs/registration.md."""
 
-from __future__ import annotations
-
 from experiments.common.claims import Claim
 from experiments.common.results import Results, number, table
 

@@ -11,8 +11,6 @@ instance, with the paths of an instance (plain text) and of the solution that it
 many seconds of CPU time; solutions are judged by verify.py. docs/benchmark_set.md describes the set and the files.
 """
 
-from __future__ import annotations
-
 import argparse
 import datetime
 import json

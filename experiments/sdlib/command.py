@@ -1,7 +1,5 @@
 """Any solver as a command: started once for each instance, watched while it runs, judged by verify.py."""
 
-from __future__ import annotations
-
 import lzma
 import os
 import shlex

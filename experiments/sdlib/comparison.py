@@ -1,7 +1,5 @@
 """What a comparison found: as a file, and as the tables of docs/benchmark_set.md."""
 
-from __future__ import annotations
-
 import datetime
 import json
 import platform

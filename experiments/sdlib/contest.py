@@ -5,8 +5,6 @@ and its time is CPU time, so that other programs on the machine hardly matter. W
 should it not keep its time, the system stops it.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import multiprocessing

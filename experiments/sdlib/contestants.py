@@ -6,8 +6,6 @@ started anew, with 1, 5 and all seconds. Most can be limited by the wall's clock
 too, they are given as much more of that as they got less of the processor shortly before.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 import resource

@@ -1,7 +1,5 @@
 """The instances of the set: how each is made, from a seed; costs are rounded to six decimals: they are exact."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

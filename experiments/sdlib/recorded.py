@@ -7,8 +7,6 @@ traffic, with noise, misses and false alarms; no position, time or aircraft can 
 can make them anew: the environment variable named by `PATH` says where it lies.
 """
 
-from __future__ import annotations
-
 import os
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Solve an instance, keep what is better than what was known, and prove it."""
 
-from __future__ import annotations
-
 import lzma
 import math
 import tempfile

@@ -1,7 +1,5 @@
 """Where the set lies: instances, best solutions and proofs as files, and the table of what is known."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import lzma

@@ -12,8 +12,6 @@ its cost. Every measurement must be in exactly one chosen tuple; without dummies
 be in one. Lines that begin with # are comments.
 """
 
-from __future__ import annotations
-
 import lzma
 import re
 import sys

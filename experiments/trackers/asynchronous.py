@@ -11,8 +11,6 @@ plots refused, beside the tracks of plots in order. Seeds are --seed and those t
 them (8), half as many for recorded traffic and late plots.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any

@@ -9,8 +9,6 @@ heights); a reported track that is further than that from every target is false.
 follow, --seeds of them (20).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

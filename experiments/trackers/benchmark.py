@@ -11,8 +11,6 @@ peer, too. GOSPA has a cutoff of 50 m; times are CPU times of a scan, the median
 their time is over (--budget, 30 s of CPU for a setting): then both are compared on the scans that were done.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

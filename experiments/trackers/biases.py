@@ -8,8 +8,6 @@ with them, with a scene that was registered, with registration online. On simula
 recorded trajectories (scenario from-tracks, half as many) if a file is given. No truth is used but to judge.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ in a box of 10 x 10 x 5 km with noise of 100 m and 10 % false alarms; `mht-hypot
 flight over 90 x 90 km, seen every 4 s. Times are CPU times.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -3,8 +3,6 @@
 Twelve targets in nearly straight flight, 40 scans at 4 s, in a box of 60 x 60 x 12 km with the sensors around it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

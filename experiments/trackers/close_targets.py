@@ -8,8 +8,6 @@ scene and CPU time of a scan, beside an oracle that is told which measurement is
 that follow, --seeds of them (20).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from experiments.common.claims import Claim

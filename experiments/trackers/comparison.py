@@ -9,8 +9,6 @@ from-tracks, --seeds of them). Tracks count while they are reported. GOSPA and w
 OSPA(2), HOTA, all with a cutoff of 500 m, identity switches a scene, and CPU time of a scan.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -10,8 +10,6 @@ front it takes one set of fused detections. The settings of each way (points unt
 Mahalanobis distance) are those that did best for it on other seeds.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta

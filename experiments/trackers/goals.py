@@ -1,7 +1,5 @@
 """What a multi-sensor tracker must reach on the three-radar scene, and its time with a thousand targets."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

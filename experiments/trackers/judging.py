@@ -1,7 +1,5 @@
 """How the trackers of all experiments are judged: GOSPA, OSPA(2), HOTA, identity switches, CPU time of a scan."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ the targets at time 0, as ours are, and starts no others; by loopy belief propag
 sensor.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import time

@@ -8,8 +8,6 @@ CPU times of a step, from the plot that ends an interval to the picture, and wal
 machine hold what others do.
 """
 
-from __future__ import annotations
-
 import time
 from functools import partial
 

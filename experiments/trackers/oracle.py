@@ -1,7 +1,5 @@
 """A tracker that is told which measurement is whose: what no tracker with the same filter can beat by association."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

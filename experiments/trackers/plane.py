@@ -1,7 +1,5 @@
 """Point targets in a plane, with clutter: what our trackers and Stone Soup's are given alike."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

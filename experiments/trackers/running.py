@@ -1,7 +1,5 @@
 """Running our trackers and keeping what is judged: tracks, decisions, time per scan."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass

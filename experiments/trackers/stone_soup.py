@@ -4,8 +4,6 @@ All are given the targets at time 0, as ours are, and none starts or ends tracks
 enumeration of all joint events is for a few targets.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Iterator

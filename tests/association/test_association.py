@@ -1,7 +1,5 @@
 """Associations of scenes: targets, labels, fused positions, correct tuples, one seed one answer."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A good call of each public function; what is not here is called with wrong arguments alone."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -4,8 +4,6 @@ A new public function is tested at once: with wrong arguments everywhere, and wi
 examples.py has a good call of it.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import warnings

@@ -1,7 +1,5 @@
 """What has become twice as slow is noticed, one bad measurement is not."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments import bench_quick

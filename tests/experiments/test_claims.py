@@ -1,7 +1,5 @@
 """Claims decide, round-trip and print."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

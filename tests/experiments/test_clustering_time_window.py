@@ -1,7 +1,5 @@
 """The experiment on the clustering time window: its yardsticks are sound, and what it must show it shows, in small."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

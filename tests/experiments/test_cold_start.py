@@ -1,7 +1,5 @@
 """What a user waits for after an installation: the clock of the experiment, and its table."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

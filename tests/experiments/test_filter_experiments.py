@@ -1,7 +1,5 @@
 """The experiments with filters as programs: their claims, JSON and figures, at their quick size."""
 
-from __future__ import annotations
-
 import inspect
 import re
 

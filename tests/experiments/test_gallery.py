@@ -1,7 +1,5 @@
 """The pictures of the documentation: each is committed, small, and drawn by a command that works."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rankings of ghost scenes: that a solution left out would be noticed, and what the page shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Our linear programs beside HiGHS's: that bounds which differ are refused, and what the page shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Does the watch of long runs see what it watches for?"""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The experiments on the parts and settings of the metaheuristics."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The oracles agree with each other, with published numbers and with hand counts."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

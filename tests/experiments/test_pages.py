@@ -1,7 +1,5 @@
 """The figures on the pages are those of the published results, and every claim there names its source."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

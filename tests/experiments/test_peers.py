@@ -1,7 +1,5 @@
 """Peers answer the same problems, feasibly, and the exact ones with the optimum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Every experiment is listed and explains itself."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """What a scan takes, part by part: that the parts are timed which the table names."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments import scan_time

@@ -1,7 +1,5 @@
 """Scene families hold what they promise; the problems made of them have the expected size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

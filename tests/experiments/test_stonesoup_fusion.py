@@ -1,7 +1,5 @@
 """The comparison inside Stone Soup, at a small size: its programs run, and the figures mean what they say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

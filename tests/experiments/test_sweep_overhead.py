@@ -1,7 +1,5 @@
 """The measurement of a study's overhead, on the smallest study."""
 
-from __future__ import annotations
-
 from assoc.simulation import simulate
 from assoc.sweeps import Study
 from assoc.sweeps.sources import StudySource

@@ -1,7 +1,5 @@
 """Known optima are what they are said to be; the same seed gives the same problem."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The experiments with trackers, at a small size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Problems in text form that are none: one line that names the file, and no warning of numpy's beside it."""
 
-from __future__ import annotations
-
 import pytest
 
 from assoc import AssignmentProblem

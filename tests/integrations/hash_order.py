@@ -1,7 +1,5 @@
 """Fuse and track a scene, all sets shuffled by the seed given; print the sets' order and every bit of the tracks."""
 
-from __future__ import annotations
-
 import random
 import sys
 

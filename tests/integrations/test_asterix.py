@@ -1,7 +1,5 @@
 """ASTERIX: round trips to the last step, bytes that others wrote, cut and hostile files, midnight, a pcap."""
 
-from __future__ import annotations
-
 import math
 import struct
 import subprocess

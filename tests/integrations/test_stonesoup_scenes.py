@@ -1,7 +1,5 @@
 """Scenes to Stone Soup and back."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """Sensors in both directions: what Stone Soup's models say and what our sensors say must be the same."""
 
-from __future__ import annotations
-
 import math
 from datetime import datetime
 

@@ -1,7 +1,5 @@
 """Inside Stone Soup's trackers: against its own association, exhaustive search, and another hash order."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The definitions of the metrics, written down directly: all permutations, plain loops."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

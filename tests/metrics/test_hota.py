@@ -1,7 +1,5 @@
 """HOTA against its definition written out in loops, and cases known by hand."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identity switches, fragmentation, CT/MT/IT and association accuracy on cases small enough to count by hand."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

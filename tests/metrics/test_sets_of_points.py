@@ -1,7 +1,5 @@
 """OSPA and GOSPA are what their definitions say, and what Stone Soup says."""
 
-from __future__ import annotations
-
 import datetime
 import math
 import warnings

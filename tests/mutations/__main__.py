@@ -5,8 +5,6 @@ as all kernels are. cosmic-ray makes 340 mutants of a file, and kernels must be 
 mutant take 10 to 30 seconds.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

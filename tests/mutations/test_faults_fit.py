@@ -1,7 +1,5 @@
 """Each fault of `make mutants` still fits its file, and its tests exist."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

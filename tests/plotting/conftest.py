@@ -1,7 +1,5 @@
 """One browser for all tests that need one, and a folder where their pictures are kept."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The report of an association in a real browser: it draws, the slider moves, tables and pictures follow."""
 
-from __future__ import annotations
-
 import io
 import time
 

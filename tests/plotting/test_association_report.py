@@ -1,7 +1,5 @@
 """The report of an association as a file: what is in it, that it is safe, and that it needs nothing else."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

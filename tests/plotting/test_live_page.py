@@ -1,7 +1,5 @@
 """The live page in a real browser: the picture moves, and nothing but this machine is asked."""
 
-from __future__ import annotations
-
 import errno
 import http.client
 import io

@@ -1,7 +1,5 @@
 """Reports keep the data: whatever is clicked, no window opens and nothing is asked for from a network."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import re

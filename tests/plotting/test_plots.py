@@ -1,7 +1,5 @@
 """What the figures show, read back from the axes and compared with the arrays it should be."""
 
-from __future__ import annotations
-
 import re
 import sys
 

@@ -1,7 +1,5 @@
 """The report of a registration, and its picture: what they show is what was found."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 
 import numpy as np

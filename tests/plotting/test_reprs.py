@@ -1,7 +1,5 @@
 """What notebooks show of the four things, and that names in it are only text."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 
 import numpy as np

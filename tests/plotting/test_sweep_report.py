@@ -1,7 +1,5 @@
 """The report of a study: the figures are those of the runs, and it works in a browser."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """The report of a tracker: figures against plain readings of the table, and the page in a browser."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

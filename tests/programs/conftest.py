@@ -1,7 +1,5 @@
 """Programs are run as programs: in a process of their own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a program shows a user who sits before it."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Bad input to `python -m assoc.solve`: one line that says what and where, exit code 2 or 3, no file."""
 
-from __future__ import annotations
-
 import os
 import pickle
 

@@ -1,7 +1,5 @@
 """The command `assoc`, `python -m assoc`, and what all programs have in common."""
 
-from __future__ import annotations
-
 import importlib
 import io
 import json

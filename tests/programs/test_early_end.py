@@ -1,7 +1,5 @@
 """Ctrl-C in the middle of a program: what is finished is written, and said; and what `-v` tells meanwhile."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

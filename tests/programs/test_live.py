@@ -1,7 +1,5 @@
 """`python -m assoc.track --live` as a program: lines from stdin, a UDP port, a scene; what is wrong is one line."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """`python -m assoc.simulate` as a program."""
 
-from __future__ import annotations
-
 import pytest
 
 import assoc

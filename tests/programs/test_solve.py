@@ -1,7 +1,5 @@
 """`python -m assoc.solve` as a program: what it prints and writes."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

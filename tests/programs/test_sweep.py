@@ -1,7 +1,5 @@
 """`python -m assoc.sweep` as a program: it goes on after every kind of end, and refuses in one line."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re

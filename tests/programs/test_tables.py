@@ -1,7 +1,5 @@
 """Tables on terminals of several widths: no number is cut; into a pipe: plain columns."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import re

@@ -1,7 +1,5 @@
 """Recordings for tests."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

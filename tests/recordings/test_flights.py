@@ -1,7 +1,5 @@
 """Reports cleaned and resampled: spoiled flights against the flights that they were."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plots from CSV: the paper's table as it is, units, what is mended, and one clear line for what is not."""
 
-from __future__ import annotations
-
 import math
 import os
 

@@ -1,7 +1,5 @@
 """Recordings of several radars as one scene: nothing lost, own times, and sectors that hold the plots."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

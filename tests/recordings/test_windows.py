@@ -1,7 +1,5 @@
 """Windows hold each aircraft once, as the antenna does; rotation times are found; other groupings are as described."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes with biases that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from assoc.registration import with_biases

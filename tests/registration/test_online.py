@@ -1,7 +1,5 @@
 """Online: the biases of a whole recording, drift followed, trackers corrected, saved and restored."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Registration against biases that were put in, against scipy's least squares, and where nothing can be known."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -6,8 +6,6 @@ The kernels are compiled in an empty environment into which the first wheel is i
 installs today gets. The second wheel is for this Python and this system. Both are built from the sdist, not the tree.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -7,8 +7,6 @@ wheel that ships compiled kernels nothing may be compiled; where they do not fit
 kernels that are compiled on the spot.
 """
 
-from __future__ import annotations
-
 import getpass
 import pickle
 import socket

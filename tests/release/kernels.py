@@ -8,8 +8,6 @@ tells which of the files it read: those are the kernels called from Python, and 
 kernel calls itself is a part of its code. FOLDER has the folders of the package, with numba's own files in them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -7,8 +7,6 @@ Packages word their licences in many ways, and in other words from one version t
 names the family ("BSD"), which is what a user has to know.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

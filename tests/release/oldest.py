@@ -3,8 +3,6 @@
 python -m tests.release.oldest > constraints.txt      (make test-oldest)
 """
 
-from __future__ import annotations
-
 from tests.release.requirements import Requirement, read
 
 TOOLS = ("lint", "docs", "build", "release")

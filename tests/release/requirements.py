@@ -1,7 +1,5 @@
 """What pyproject.toml requires: one entry for each package, with the oldest version that is allowed."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from dataclasses import dataclass

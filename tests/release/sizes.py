@@ -6,8 +6,6 @@ downloads the newest packages that fit this Python and this system into a tempor
 installation takes, Python's bytecode included, stands in docs/dependencies.md.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

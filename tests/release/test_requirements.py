@@ -1,7 +1,5 @@
 """What is required, from which version on, and under which licence."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.release import licences

@@ -1,7 +1,5 @@
 """Warnings: each for its mistake, and none on sound input."""
 
-from __future__ import annotations
-
 import datetime
 import re
 import subprocess

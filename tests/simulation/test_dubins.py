@@ -1,7 +1,5 @@
 """Dubins paths: the printed lengths, a brute search, obstacles, and the scenario."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

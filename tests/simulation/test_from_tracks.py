@@ -1,7 +1,5 @@
 """Recorded trajectories: the geometry against independent formulas, resampling, bad files."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

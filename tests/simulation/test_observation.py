@@ -1,7 +1,5 @@
 """The simulator's statistics against theory: detections, noise, clutter, fields of view."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rotating radar reports what an antenna can see, in the steps and with the losses that it promises."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

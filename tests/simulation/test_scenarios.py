@@ -1,7 +1,5 @@
 """Named scenarios: what they promise, one seed one scene, and clear refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trajectories against numerical integration and against the paper's numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

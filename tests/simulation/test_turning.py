@@ -1,7 +1,5 @@
 """Turning radars: when they look, what they see, and what they say they looked at."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

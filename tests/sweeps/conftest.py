@@ -1,7 +1,5 @@
 """Small studies for the tests of sweeps."""
 
-from __future__ import annotations
-
 import pytest
 
 from assoc.simulation import simulate

@@ -1,7 +1,5 @@
 """Every backend and any number of workers give the same results, also when workers die."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

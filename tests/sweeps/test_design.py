@@ -1,7 +1,5 @@
 """Designs: grids, random designs, TOML tables, and what is refused."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

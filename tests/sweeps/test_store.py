@@ -1,7 +1,5 @@
 """The store: nothing finished is lost, whatever happens; nothing is there twice."""
 
-from __future__ import annotations
-
 import json
 import os
 import zlib

@@ -1,7 +1,5 @@
 """Summaries against plain readings of the table, and intervals against what is known of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """Tuning: a search that finds what is there, goes on where it was stopped, and reports on what it never saw."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The time of a run is the solver's own: never that of compiling, loading or importing."""
 
-from __future__ import annotations
-
 import sys
 
 import numba

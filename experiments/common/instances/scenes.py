@@ -3,8 +3,6 @@
 Units are the library's: metres and radians. Problems are made from scenes by ``assoc.build_problem``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

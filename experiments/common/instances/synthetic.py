@@ -1,7 +1,5 @@
 """Problems drawn as numbers, without a scene: axial, planted with dummies, and two-dimensional ones."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

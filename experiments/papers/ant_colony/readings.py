@@ -4,8 +4,6 @@ The walk is written here once more in plain numpy, apart from the solver's: its 
 solver's mean.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, Literal
 

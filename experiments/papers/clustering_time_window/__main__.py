@@ -12,8 +12,6 @@ us); the track-oriented MHT (depth 4, branch_drop 25) stands beside it. Full siz
 pairs of each kind (600 s, 5 nmi apart when parallel), 100 false starts; the IDs are judged by the majority of 6 plots.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A small nearest-neighbour tracker, as strong or as weak as its settings: the yardstick of the experiment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -7,8 +7,6 @@ Here one aircraft appears amid the usual false plots, and one more is put where 
 nautical miles beside, so that a wrong velocity results.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The project's multiple hypothesis trackers on windows of plots."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a tracker did with the plots of a recording, in the form that CT, MT and IT need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

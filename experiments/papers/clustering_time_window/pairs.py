@@ -1,7 +1,5 @@
 """Two aircraft that cross, fly in parallel or meet head-on: do their tracks stay theirs?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from assoc._types import Array

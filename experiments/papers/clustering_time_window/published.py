@@ -4,8 +4,6 @@ G. P. Cahyono, Multitarget tracking using multiple hypothesis tracking with clus
 ITS Surabaya (2014).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from assoc._types import Array

@@ -10,8 +10,6 @@ aircraft has gone further than 220 m/s take it in that time. (Tables 4.25 and 4.
 1,130 s, 6.2 s on average, and 119 windows.)
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import math

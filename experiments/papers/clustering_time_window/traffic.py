@@ -1,7 +1,5 @@
 """Scenario S1: what window, time stamps and hypotheses are each worth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

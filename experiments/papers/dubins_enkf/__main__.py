@@ -8,8 +8,6 @@ filter improves with the number of members up to 200 or 300 does not hold: above
 noise is chosen by us as the paper's reported errors, rounded.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

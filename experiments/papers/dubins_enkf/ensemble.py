@@ -5,8 +5,6 @@ by us. The process noise (sigmas 0.03, 1.7, 0.17, 0.18) is the paper's reported 
 built in, and says nothing. So the same is done with a third and with three times of it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

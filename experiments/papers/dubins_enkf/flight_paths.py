@@ -5,8 +5,6 @@ with one at (-250, 150) of radius 30; turning radius 100, headings pi/3 and 0. I
 figures 1 and 3) is a straight line to a tangent point of the obstacle, an arc along it, a straight line to the goal.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -14,8 +14,6 @@ a grid: no filter fixed in advance could be better. Accepted, chosen by us befor
 the best fixed EKF and at most 1.08 of the IMM; both smoothed over 2 steps too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures 3 to 13 of the paper with ours: flight, errors, membership sets, and q and r over time."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@ by eye, the sets and the base noise tuned on random flights (the stand-in by whi
 the numbers of equations 38 to 40 taken literally, in kilometres.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import warnings

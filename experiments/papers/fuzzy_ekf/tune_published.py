@@ -7,8 +7,6 @@ Without it the comparison would be between tuned filters and one whose parameter
 experiments/papers/fuzzy_ekf/published_rules.json.
 """
 
-from __future__ import annotations
-
 import argparse
 import datetime
 import json

@@ -9,8 +9,6 @@ does not know the angles much better than one measurement tells them. Accepted o
 form / EKF 0.35 to 0.55, NEES at most 9, at most 6 % above a UKF; below beta = 0.1 at most 2 % above the EKF.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -9,8 +9,6 @@ them, R_k = 0.00002 I (table 4.2): it cannot have used both for the same thing, 
     moving      as "sigmas", but the target flies with the velocity of table 4.1, which the paper's model does not do
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
