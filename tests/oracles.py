@@ -4,11 +4,8 @@ Nothing here uses a solver of the package. Exhaustive search is written over bit
 so that "each measurement in exactly one tuple" is one integer comparison.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +14,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common.checking import check_answer, price_list
 from experiments.common.peers import by_milp
+from tests.reliability.exact import exact_optimum
 
 
 @dataclass(frozen=True)
@@ -85,43 +83,8 @@ def all_solutions(problem: AssignmentProblem, limit: int = 300_000) -> list[Rank
 
 
 def brute_force(problem: AssignmentProblem) -> float:
-    """Optimal cost by exhaustive recursion over the sets of covered measurements.
-
-    Raises
-    ------
-    InfeasibleError
-        The problem has no solution.
-    """
-    covering, to_cover = _masks(problem)
-
-    @cache
-    def rest(covered: int) -> float:
-        free = ~covered
-        low = (free & -free).bit_length() - 1
-        if low >= to_cover:
-            return 0.0
-        return min(
-            (price + rest(covered | mask) for mask, _, price in covering[low] if not mask & covered),
-            default=float("inf"),
-        )
-
-    cost = rest(0)
-    if cost == float("inf"):
-        raise InfeasibleError("no solution")
-    return cost
-
-
-def marginals(problem: AssignmentProblem) -> dict[tuple[int, ...], float]:
-    """Probability of each tuple when a solution's weight is exp(-cost), by full enumeration."""
-    solutions = all_solutions(problem)
-    least = solutions[0].cost
-    weights = [float(np.exp(least - s.cost)) for s in solutions]
-    total = sum(weights)
-    result = dict.fromkeys(price_list(problem), 0.0)
-    for solution, weight in zip(solutions, weights, strict=True):
-        for key in solution.tuples:
-            result[key] += weight / total
-    return result
+    """Optimal cost, summed in exact arithmetic; InfeasibleError where there is no solution."""
+    return float(exact_optimum(problem))
 
 
 def milp_optimum(

@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -57,9 +57,15 @@ def show(browser: Any, page: Path, size: tuple[int, int] = DESKTOP, *, fragment:
     browser.get("about:blank")
     browser.get(page.resolve().as_uri() + fragment)
     # the script of a report is unpacked when the page is there
+    in_time(lambda: not browser.execute_script(_UNPACKING))
+
+
+def in_time(condition: Callable[[], Any]) -> Any:
+    """Return what a condition becomes within a minute: machines can be busy."""
     last = time.monotonic() + 60.0
-    while browser.execute_script(_UNPACKING) and time.monotonic() < last:
+    while not (found := condition()) and time.monotonic() < last:
         time.sleep(0.02)
+    return found
 
 
 def complaints(browser: Any) -> list[str]:

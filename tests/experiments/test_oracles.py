@@ -10,6 +10,7 @@ from assoc.errors import InfeasibleError
 from assoc.problem import AssignmentProblem
 from experiments.common.checking import InfeasibleAnswerError, check_answer
 from tests import oracles
+from tests.reliability.exact import exact_marginals
 
 BLACKMAN_POPOLI = (
     "011:10.2 021:4.7 022:5.5 101:6.8 102:5.2 110:6.8 120:10.9 111:18 112:14.8 121:17 122:9.9 "
@@ -90,11 +91,13 @@ def test_oracles_agree_and_answers_check() -> None:
     assert 0 < infeasible < 50
 
 
-def test_marginals_sum_to_one_per_measurement(blackman_popoli: AssignmentProblem) -> None:
-    table = oracles.marginals(blackman_popoli)
-    for sensor in range(3):
-        for index in (1, 2):
-            assert sum(p for key, p in table.items() if key[sensor] == index) == pytest.approx(1.0)
+def test_marginals_are_those_of_the_enumeration(blackman_popoli: AssignmentProblem) -> None:
+    for problem in (blackman_popoli, *oracles.small_problems(20, seed=4, dummy=True)):
+        solutions = oracles.all_solutions(problem)
+        weights = [math.exp(solutions[0].cost - one.cost) for one in solutions]
+        for key, found in exact_marginals(problem).items():
+            holding = (weight for one, weight in zip(solutions, weights, strict=True) if key in one.tuples)
+            assert found == pytest.approx(sum(holding) / sum(weights), abs=1e-9)
 
 
 @pytest.mark.parametrize(

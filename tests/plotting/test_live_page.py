@@ -16,7 +16,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.live import LivePage, server
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, LiveTracker
-from experiments.common.browser import DESKTOP, PHONE, complaints, screenshot
+from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, screenshot
 
 
 @pytest.fixture(scope="module")
@@ -31,13 +31,8 @@ def film(scene):
     return [picture for plot in replayed(scene, 0.0) for picture in tracker.take(*plot)]
 
 
-def wait_for(browser, script, seconds=60.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if browser.execute_script(script):
-            return
-        time.sleep(0.1)
-    raise AssertionError(f"{script} did not come true: {browser.execute_script('return state.textContent')}")
+def wait_for(browser, script):
+    assert in_time(lambda: browser.execute_script(script)), browser.execute_script("return state.textContent")
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from assoc.plotting.report import write_association_report, write_sweep_report, 
 from assoc.simulation import simulate
 from assoc.sweeps import Study, grid
 from assoc.sweeps.sources import StudySource
-from experiments.common.browser import DESKTOP, PHONE, complaints, press, requests, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, press, requests, show
 
 BUTTONS = {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
 SPACE_BUTTONS = {"Orbital rotation", "Turntable rotation", "Reset camera to default"}
@@ -94,14 +94,6 @@ def test_no_click_opens_or_asks_for_anything(browser, pages, tmp_path, name, siz
     assert browser.current_url.partition("#")[0] == address
     assert [one for one in requests(browser) if not one.startswith(LOCAL)] == []
     assert [one for one in complaints(browser) if "willReadFrequently" not in one and "GPU stall" not in one] == []
-
-
-def in_time(condition):
-    """Return what a condition becomes within half a minute: machines can be busy."""
-    last = time.monotonic() + 30.0
-    while not (found := condition()) and time.monotonic() < last:
-        time.sleep(0.05)
-    return found
 
 
 def click_all(browser):

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pandas as pd
@@ -12,7 +11,7 @@ from assoc.errors import InvalidInputError
 from assoc.plotting.report import write_tracking_report
 from assoc.scene import Scene, Truth
 from assoc.simulation import simulate
-from experiments.common.browser import DESKTOP, PHONE, complaints, press, screenshot, show
+from experiments.common.browser import DESKTOP, PHONE, complaints, in_time, press, screenshot, show
 from tests.plotting.test_association_report import EVIL, data_of, parsed
 
 
@@ -155,9 +154,6 @@ def test_a_crowd_fills_the_view(browser, tmp_path):
     low, high = browser.execute_script(f"{layout}.yaxis.range")
     assert high - low < 1.6 * 20.0 < 0.001 * np.ptp([sensor.position[1] for sensor in scene.sensors])
     last = "return document.getElementById('altitude-plot').layout?.showlegend ?? null"
-    for _ in range(100):
-        if browser.execute_script(last) is not None:
-            break
-        time.sleep(0.1)
+    assert in_time(lambda: browser.execute_script(last) is not None)
     assert browser.execute_script(last) is False
     assert complaints(browser) == []

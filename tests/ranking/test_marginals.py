@@ -10,8 +10,8 @@ from assoc.problem import AssignmentProblem
 from assoc.ranking.columns import price_all_columns
 from assoc.ranking.marginals import marginals
 from assoc.ranking.partition_function import log_partition
-from tests import oracles
 from tests.oracles import all_solutions, axial_problem, gated_problem, small_problems
+from tests.reliability.exact import exact_marginals
 from tests.sizes import few_or_all
 
 
@@ -32,7 +32,7 @@ def test_intervals_contain_the_truth(count):
     for number, (problem, found) in enumerate(enumerable(count, 61)):
         k = (1, 3, 20, 5000)[number % 4]
         result = marginals(problem, k)
-        truth = oracles.marginals(problem)
+        truth = exact_marginals(problem)
         assert len(result.tuples) == len(truth)
         for key, p, low, high in zip(
             result.tuples.tolist(), result.probability, result.lower, result.upper, strict=True
@@ -78,7 +78,7 @@ def test_intervals_hold_where_the_bound_is_far_below_the_optimum(k, length, scal
 
 def test_when_time_is_over_the_intervals_say_that_nothing_is_known():
     for problem, _ in enumerable(20, 63):
-        truth = oracles.marginals(problem)
+        truth = exact_marginals(problem)
         try:
             result = marginals(problem, 5, time_limit=1e-9)
         except InfeasibleError:
@@ -203,7 +203,7 @@ def test_two_sensors_without_duals_of_the_packing():
         )
         if not all_solutions(problem):
             continue
-        truth = oracles.marginals(problem)
+        truth = exact_marginals(problem)
         result = marginals(problem, 2)
         for key, low, high in zip(result.tuples.tolist(), result.lower, result.upper, strict=True):
             assert low - 1e-9 <= truth[tuple(key)] <= high + 1e-9

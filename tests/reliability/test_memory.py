@@ -247,16 +247,13 @@ def test_kbest_returns_what_there_is_memory_for(shape: tuple[int, ...], little: 
     assert few[-1].lower_bound <= all_of_them[len(few)].cost + 1e-9
 
 
-def test_a_trace_stays_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    from assoc.packing import run as module
-
-    monkeypatch.setattr(module, "_TRACE", 100)
-    run = Run(0)
-    for step in range(1000):
-        run.record(step, -float(step), -2000.0)
+def test_a_trace_stays_short() -> None:
+    run, steps = Run(0), 250_000
+    for step in range(steps):
+        run.record(step, -float(step), -1e6)
     iterations = [point.iteration for point in run.trace]
-    assert 50 <= len(iterations) <= 100 and iterations == sorted(iterations)
-    assert iterations[0] == 0 and iterations[-1] == 999
+    assert 50_000 <= len(iterations) <= 100_000 and iterations == sorted(iterations)
+    assert iterations[0] == 0 and iterations[-1] == steps - 1
 
 
 # --- estimates are of the right size ----------------------------------------------------------------------------

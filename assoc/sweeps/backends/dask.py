@@ -12,14 +12,13 @@ from assoc.errors import AssocError, InvalidInputError
 from assoc.sweeps.worker import Batch, Job, Result, run_batch
 
 SECONDS_OF_A_BATCH = 0.5
-_CONNECT_SECONDS = 10.0
 _LOST = "--scheduler: the connection is lost; finished runs are kept, and the same command goes on from there"
 _ATTEMPTS = 5
 _BATCHES_PER_THREAD = 3
 
 
-def connect(address: str) -> Any:
-    """Connect to a scheduler.
+def connect(address: str, timeout: float = 10.0) -> Any:
+    """Connect to a scheduler, within so many seconds.
 
     Raises
     ------
@@ -35,7 +34,7 @@ def connect(address: str) -> Any:
     _quiet()
     try:
         client: Any = Client
-        return client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+        return client(address, timeout=timeout, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
         raise InvalidInputError(f"--scheduler: no scheduler answers at {address} ({reason})") from None
