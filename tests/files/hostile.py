@@ -3,8 +3,6 @@
 python -m tests.files.hostile [NAME ...]        a table: the file, its size, the peak, how the program ended
 """
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import json

@@ -1,7 +1,5 @@
 """Small files that want much memory: each is refused by one line, below a gigabyte at the peak."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
