@@ -193,5 +193,5 @@ def test_packed_problems_are_read_and_refused(tmp_path):
     whole = (tmp_path / "p.txt.xz").read_bytes()
     for name, content in (("cut.txt.xz", whole[:-9]), ("plain.txt.xz", b"assoc-problem 1\n")):
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(Exception, match=rf"{name}: is damaged, or not packed by xz"):
+        with pytest.raises(Exception, match=rf"{name}: is damaged, or not packed as its name says"):
             AssignmentProblem.load(tmp_path / name)
