@@ -71,10 +71,7 @@ class Seconds(NamedTuple):
 def measure(python: str, words: list[str], folder: Path, cache: Path) -> Seconds:
     """Run a command at a terminal.
 
-    Raises
-    ------
-    RuntimeError
-        It fails.
+    Raises RuntimeError: It fails.
     """
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "COLUMNS": "80"}
     if python != sys.executable:
@@ -114,10 +111,7 @@ def runs_of(python: str, words: list[str], folder: Path, runs: int) -> dict[str,
 def installation(wheel: Path, folder: Path) -> tuple[str, list[Claim]]:
     """Install a wheel into an empty environment: its Python, how long that took, and what each package weighs.
 
-    Raises
-    ------
-    RuntimeError
-        It cannot be installed.
+    Raises RuntimeError: It cannot be installed.
     """
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = str(folder / "bin" / "python")

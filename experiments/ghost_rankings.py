@@ -36,14 +36,8 @@ _LIMIT, _CHECK = 60.0, 30.0
 class Kind(NamedTuple):
     """Scenes that are alike.
 
-    Attributes
-    ----------
-    targets : int
-    seeds : tuple of int
-    goal : float
-        Seconds that a ranking may take.
-    checked : bool
-        Whether HiGHS looks for something better.
+    goal: Seconds that a ranking may take.
+    checked: Whether HiGHS looks for something better.
     """
 
     targets: int
@@ -71,10 +65,7 @@ def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
 def nothing_better(problem: AssignmentProblem, ranking: list[Solution], limit: float) -> bool:
     """Whether HiGHS ends, with these solutions forbidden.
 
-    Raises
-    ------
-    AssertionError
-        It found something better than the last of them.
+    Raises AssertionError: It found something better than the last of them.
     """
     found = by_milp(problem, limit, [solution.indices for solution in ranking])
     if found.status not in (0, 2):

@@ -106,10 +106,7 @@ def measured(packing: Packing) -> dict[str, float]:
 def check(ours: float, theirs: float) -> None:
     """Refuse bounds that differ.
 
-    Raises
-    ------
-    AssertionError
-        By more than 1e-9 of the optimum.
+    Raises AssertionError: By more than 1e-9 of the optimum.
     """
     if abs(ours - theirs) > 1e-9 * max(1.0, abs(theirs)):
         raise AssertionError(f"the bounds differ: {ours!r}, HiGHS {theirs!r}")

@@ -30,11 +30,7 @@ from experiments.common.peers import highs
 class Kind(NamedTuple):
     """Scenes that are alike.
 
-    Attributes
-    ----------
-    make : callable seed -> Scene
-    goal : float or None
-        Milliseconds that building and solving may take.
+    goal: Milliseconds that building and solving may take.
     """
 
     make: Callable[[int], Scene]

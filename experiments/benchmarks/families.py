@@ -28,14 +28,9 @@ class Instance:
 class Entry:
     """One solver in a case.
 
-    Attributes
-    ----------
-    solver : str
-        Name in ``assoc.solvers.names()`` or in `experiments.common.peers.PEERS`.
-    limit : float
-        Time limit, seconds.
-    stop_gap : float or None
-        Stop as soon as the relative gap is this small (our solvers only).
+    solver: Name in ``assoc.solvers.names()`` or in `experiments.common.peers.PEERS`.
+    limit: Time limit, seconds.
+    stop_gap: Stop as soon as the relative gap is this small (our solvers only).
     """
 
     solver: str

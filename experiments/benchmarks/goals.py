@@ -18,15 +18,9 @@ PROVING_PEERS = ("cp_sat", "cp_sat_1", "highs", "scip", "scip_1")
 class Verdict:
     """A goal of one family and size.
 
-    Attributes
-    ----------
-    family, size, goal : str
-        What was asked.
-    stretch : bool
-        Whether it is a stretch goal (marked * in the report).
-    measured : str
-        What was measured, with the numbers.
-    met : bool
+    family, size, goal: What was asked.
+    stretch: Whether it is a stretch goal (marked * in the report).
+    measured: What was measured, with the numbers.
     """
 
     family: str

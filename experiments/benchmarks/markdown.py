@@ -52,16 +52,8 @@ shorter one, ours and theirs: what else ran on the machine does not count."""
 def render(rows: Sequence[Row], minutes: float | None, command: str, remark: str | None = None) -> str:
     """Return the report.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-        What was measured.
-    minutes : float or None
-        How long the run took.
-    command : str
-        How to repeat it.
-    remark : str, optional
-        What readers should know of these rows.
+    command: How to repeat it.
+    remark: What readers should know of these rows.
     """
     parts = ["# Benchmarks", "", _preface(minutes, command), "", HOW]
     if remark:

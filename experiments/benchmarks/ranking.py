@@ -81,10 +81,7 @@ def _ranked(solver: str, rank: Rank, size: str, problem: AssignmentProblem, k: i
 def compared(rankings: Sequence[Ranking]) -> list[Row]:
     """Rows of the rankings of one problem, `kbest` first, each with how many of its solutions are the next best.
 
-    Raises
-    ------
-    AssertionError
-        `kbest` is not ascending, or another one has something better, or more.
+    AssertionError: `kbest` is not ascending, or another one has something better, or more.
     """
     ours = rankings[0].costs
     allowed = 1e-9 * max(1.0, abs(ours[0]))

@@ -35,10 +35,7 @@ _FAR = 1.0
 def insert(readme: str, rows: Sequence[Row]) -> str:
     """Return README's text with the part between the marks written anew.
 
-    Raises
-    ------
-    ValueError
-        The marks are not there, each once and in order.
+    Raises ValueError: The marks are not there, each once and in order.
     """
     if readme.count(BEGIN) != 1 or readme.count(END) != 1 or readme.index(BEGIN) > readme.index(END):
         raise ValueError(f"README.md: expected the marks {BEGIN} and {END}, each once")

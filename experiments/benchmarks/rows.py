@@ -16,35 +16,20 @@ HIT = 1e-6
 class Row:
     """What one solver did on one instance.
 
-    Attributes
-    ----------
-    family, size : str
-        The instance family and its size, as in ``gated``, ``3x300``.
-    seed, item : int
-        Seed of the instance, and its number where a seed gives several (scans).
-    tuples : int
-        M of the problem.
-    solver : str
-        Name; variants carry a suffix, as in ``lagrangian@0.1%``.
-    peer : bool
-        Whether it is somebody else's.
-    limit : float
-        Time limit it was given, seconds.
-    cost, bound : float
-        Cost as our checker reads it (``inf``: no solution in time), and the solver's lower bound
-        (``-inf``: none).
-    seconds : float
-        Wall time from the tuples to the answer.
-    cpu : float
-        Processor time of that, all threads together; 0: not measured.
-    status : str
-        "optimal" where the solver itself proves it, "feasible", or "none".
-    reference : float
-        The optimum where it is known by construction or was proven, else the best cost anyone found.
-    proven : bool
-        Whether the reference is the optimum.
-    extra : float
-        Peak memory in MB (family scale), solutions ranked (family kbest), share of the optimum by which the linear
+    family, size: The instance family and its size, as in ``gated``, ``3x300``.
+    seed, item: Seed of the instance, and its number where a seed gives several (scans).
+    tuples: M of the problem.
+    solver: Name; variants carry a suffix, as in ``lagrangian@0.1%``.
+    peer: Whether it is somebody else's.
+    limit: Time limit it was given, seconds.
+    cost, bound: Cost as our checker reads it (``inf``: no solution in time), and the solver's lower bound (``-inf``:
+        none).
+    seconds: Wall time from the tuples to the answer.
+    cpu: Processor time of that, all threads together; 0: not measured.
+    status: "optimal" where the solver itself proves it, "feasible", or "none".
+    reference: The optimum where it is known by construction or was proven, else the best cost anyone found.
+    proven: Whether the reference is the optimum.
+    extra: Peak memory in MB (family scale), solutions ranked (family kbest), share of the optimum by which the linear
         program's bound is below it (families of ghosts); 0 elsewhere.
     """
 

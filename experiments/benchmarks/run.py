@@ -66,15 +66,8 @@ def run_all(
 ) -> Iterator[list[Row]]:
     """Yield the rows of each case, in their order.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-    seeds : int or None
-        Number of seeds at the most; None: all of each case.
-    processes : int
-        More than 1: so many seeds at once, each process on a core of its own.
-    log : callable
-        Told what was done, line by line.
+    seeds: Number of seeds at the most; None: all of each case.
+    processes: More than 1: so many seeds at once, each process on a core of its own.
     """
     if processes == 1:
         _warm_up_for(cases)
@@ -128,14 +121,7 @@ def _warm_up_for(cases: Sequence[Case]) -> None:
 def run_case(case: Case, seeds: int | None = None, log: Callable[[str], None] = lambda text: None) -> list[Row]:
     """Run everybody on every instance of a case.
 
-    Parameters
-    ----------
-    case : Case
-        What to run.
-    seeds : int, optional
-        Number of seeds at the most; by default all of the case.
-    log : callable
-        Told what was done, line by line.
+    seeds: Number of seeds at the most; by default all of the case.
     """
     rows: list[Row] = []
     for one in case.by_seed(seeds):

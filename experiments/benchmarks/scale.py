@@ -21,10 +21,7 @@ LIMIT = 120.0
 def measure(targets: int, seed: int) -> dict[str, float | str]:
     """Associate one scan of the radar field, from the scene to the Solution.
 
-    Returns
-    -------
-    dict
-        ``seconds`` in all, of which ``building``; ``tuples``, ``cost``, ``bound``, ``status``, ``peak_mb``.
+    Returns dict: ``seconds`` in all, of which ``building``; ``tuples``, ``cost``, ``bound``, ``status``, ``peak_mb``.
     """
     import assoc
     from experiments.benchmarks.run import one_core

@@ -26,22 +26,8 @@ def price_list(problem: AssignmentProblem) -> dict[Tuple, float]:
 def check_answer(problem: AssignmentProblem, tuples: ArrayLike) -> float:
     """Check that tuples solve the problem and return what they cost.
 
-    Parameters
-    ----------
-    problem : AssignmentProblem
-        The problem that was to be solved.
-    tuples : array_like of int, shape (K, S)
-        The chosen tuples, in any order.
-
-    Returns
-    -------
-    float
-        Their total cost, read from the problem and not from the solver.
-
-    Raises
-    ------
-    InfeasibleAnswerError
-        A tuple that the problem does not list, or a measurement used too often or not at all.
+    Returns their total cost, read from the problem and not from the solver.
+    Raises InfeasibleAnswerError: A tuple that the problem does not list, or a measurement used too often or not at all.
     """
     prices = price_list(problem)
     chosen = [tuple(int(i) for i in row) for row in np.asarray(tuples).reshape(-1, problem.num_sensors)]

@@ -18,29 +18,13 @@ VERSION = 1
 class Claim:
     """One quantity of a paper, and our measurement of it.
 
-    Parameters
-    ----------
-    quantity : str
-        What was measured, in words.
-    unit : str
-        Its unit; "" for a plain number.
-    paper : float or None
-        What the paper (or the goal) says; None where it gives no number.
-    ours : float
-        What we measured.
-    interval : (float, float) or None
-        Confidence interval of ours, low and high.
-    band : (float, float) or None
-        What is accepted, low and high; an open end is None inside.
-    holds : bool or None
-        Whether the claim holds. Left out, it is whether ours lies in the band, or None without a band.
-    source : str
-        Where the paper prints its number or says what is judged (page, table, figure or equation), or "chosen by us".
-
-    Raises
-    ------
-    ValueError
-        A number that is NaN, or an interval or band whose low end is above its high end.
+    paper: What the paper (or the goal) says; None where it gives no number.
+    interval: Confidence interval of ours, low and high.
+    band: What is accepted, low and high; an open end is None inside.
+    holds: Whether the claim holds. Left out, it is whether ours lies in the band, or None without a band.
+    source: Where the paper prints its number or says what is judged (page, table, figure or equation), or "chosen by
+        us".
+    Raises ValueError: A number that is NaN, or an interval or band whose low end is above its high end.
     """
 
     quantity: str
@@ -99,10 +83,7 @@ def save_json(path: str | Path, claims: Iterable[Claim], experiment: str, seed: 
 def load_json(path: str | Path) -> list[Claim]:
     """Read claims written by `save_json`.
 
-    Raises
-    ------
-    ValueError
-        The file is not of this format or of a future version.
+    Raises ValueError: The file is not of this format or of a future version.
     """
     data = json.loads(Path(path).read_text(encoding="utf-8"))
     if not isinstance(data, dict) or data.get("format") != FORMAT:

@@ -68,10 +68,7 @@ def with_false_alarms(problem: AssignmentProblem, chosen: NDArray[np.intp]) -> N
 def conflict_graph(problem: AssignmentProblem) -> tuple[NDArray[np.intp], NDArray[np.int64], Any]:
     """Return the vertices (tuples), their weights as whole numbers, and the adjacency as a sparse array.
 
-    Raises
-    ------
-    ValueError
-        A problem without dummies: its best solution need not be an independent set of greatest weight.
+    Raises ValueError: A problem without dummies: its best solution need not be an independent set of greatest weight.
     """
     if not problem.dummy:
         raise ValueError("expected a problem with dummies")

@@ -45,20 +45,11 @@ DENSE_LIMIT = 8_000_000
 class PeerAnswer:
     """What a peer found.
 
-    Attributes
-    ----------
-    cost : float
-        Cost of its solution as our checker reads it; ``inf`` when it found none in time.
-    bound : float or None
-        Its lower bound, where it gives one.
-    seconds : float
-        Wall time from the tuples to the chosen tuples.
-    tuples : int32 array, shape (K, S)
-        The chosen tuples.
-    proven : bool
-        Whether the peer itself says that this is the optimum.
-    cpu : float
-        The same time as the process's CPU time, all threads together.
+    cost: Cost of its solution as our checker reads it; ``inf`` when it found none in time.
+    bound: Its lower bound, where it gives one.
+    seconds: Wall time from the tuples to the chosen tuples.
+    proven: Whether the peer itself says that this is the optimum.
+    cpu: The same time as the process's CPU time, all threads together.
     """
 
     cost: float
@@ -288,10 +279,7 @@ def sequential(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
 def nrl_tracker(problem: AssignmentProblem, time_limit: float) -> PeerAnswer:
     """N-D relaxation of PyPI's ``nrl-tracker`` with its defaults (100 iterations; it takes no time limit).
 
-    Raises
-    ------
-    MemoryError
-        The dense tensor would exceed `DENSE_LIMIT` elements.
+    Raises MemoryError: The dense tensor would exceed `DENSE_LIMIT` elements.
     """
     if dense_elements(problem) > DENSE_LIMIT:
         raise MemoryError(f"a dense tensor of {dense_elements(problem):.2g} elements")

@@ -16,13 +16,7 @@ def result_file(name: str) -> Path:
 
 
 class Results:
-    """The claims of a result file by their quantity.
-
-    Parameters
-    ----------
-    name : str
-        Of the experiment.
-    """
+    """The claims of a result file by their quantity."""
 
     def __init__(self, name: str) -> None:
         path = result_file(name)

@@ -41,16 +41,10 @@ def of_each_kind(
 ) -> dict[str, Filter[Any]]:
     """Return a filter of each kind for nearly constant velocity.
 
-    Parameters
-    ----------
-    noise : float
-        Of the acceleration, m/s^2.
-    sizes : sequence of int
-        Members of ensembles, a filter for each.
-    rng : numpy.random.Generator
-        Of the ensembles.
-    inner : type
-        Filters of the IMM.
+    noise: Of the acceleration, m/s^2.
+    sizes: Members of ensembles, a filter for each.
+    rng: Of the ensembles.
+    inner: Filters of the IMM.
     """
     motion = ConstantVelocity(noise)
     return {

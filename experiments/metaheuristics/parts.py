@@ -32,18 +32,11 @@ _NEVER = 1_000_000_000
 class Part(NamedTuple):
     """One variant of a solver.
 
-    Attributes
-    ----------
-    words : str
-        What is left out.
-    solvers : tuple of str
-        Which have this part.
-    parameters : dict
-        Of the solver.
-    without : callable
-        Makes the context in which the part is missing.
-    base : str
-        Words of what it is compared with.
+    words: What is left out.
+    solvers: Which have this part.
+    parameters: Of the solver.
+    without: Makes the context in which the part is missing.
+    base: Words of what it is compared with.
     """
 
     words: str

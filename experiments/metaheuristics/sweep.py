@@ -53,14 +53,9 @@ _WALKS = 900
 class Case(NamedTuple):
     """Problems, and how the ants search them.
 
-    Attributes
-    ----------
-    problems : str
-        Name in problems.py.
-    count : int
-        Number of problems.
-    how : str
-        "paper", "mmas, none" or "mmas, full".
+    problems: Name in problems.py.
+    count: Number of problems.
+    how: "paper", "mmas, none" or "mmas, full".
     """
 
     problems: str

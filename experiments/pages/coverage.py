@@ -18,16 +18,10 @@ HOLDS, NOT, ABSENT = "holds", "does not hold", "absent"
 class Row(NamedTuple):
     """One element of a paper.
 
-    Attributes
-    ----------
-    element : str
-        Equation, table, figure or conclusion.
-    where : str
-        Path of the code or experiment.
-    result : str
-        Whether it holds, and with which figures or why not.
-    command : str
-        What shows it.
+    element: Equation, table, figure or conclusion.
+    where: Path of the code or experiment.
+    result: Whether it holds, and with which figures or why not.
+    command: What shows it.
     """
 
     element: str

@@ -26,10 +26,7 @@ def run_command(picked: list[Instance], command: str, seconds: float) -> Iterato
     It may write its solution again whenever it has found a better one: what lies there is judged when it changes. It is
     stopped after so many seconds of CPU time (of wall time where the system does not tell of CPU times).
 
-    Raises
-    ------
-    OSError
-        It cannot be started.
+    Raises OSError: It cannot be started.
     """
     known = store.table()
     with tempfile.TemporaryDirectory() as folder:

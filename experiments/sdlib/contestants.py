@@ -41,14 +41,9 @@ _SAME = 1e-9
 class Log:
     """What was found, and when, in seconds of the process's CPU time.
 
-    Attributes
-    ----------
-    best : float
-        The best cost that is known: a solver that gives no bound has nothing left to find there.
-    tell : callable
-        Called with each point: seconds, cost, and bound or None.
-    keep : callable
-        Called with tuples that are an answer, should no better one follow.
+    best: The best cost that is known: a solver that gives no bound has nothing left to find there.
+    tell: Called with each point: seconds, cost, and bound or None.
+    keep: Called with tuples that are an answer, should no better one follow.
     """
 
     best: float

@@ -23,17 +23,10 @@ DECIMALS = 6
 class Instance:
     """A problem of the set.
 
-    Attributes
-    ----------
-    name : str
-        Of its files.
-    family : str
-    raw : callable
-        Makes the problem before its costs are rounded.
-    recorded : bool
-        Whether the recording of recorded.py is needed to make it.
-    kept : bool
-        Whether the tracker that poses it has changed since: what is stored stays, and `make` makes another one.
+    name: Of its files.
+    raw: Makes the problem before its costs are rounded.
+    recorded: Whether the recording of recorded.py is needed to make it.
+    kept: Whether the tracker that poses it has changed since: what is stored stays, and `make` makes another one.
     """
 
     name: str

@@ -25,16 +25,10 @@ _SHARE = 4
 class Setting(NamedTuple):
     """One kind of scene.
 
-    Attributes
-    ----------
-    flight : str
-        "separate", "formations" or "crossings".
-    noise : tuple of float
-        Standard deviation of the range of each radar, metres; its angles err as much across at 50 km.
-    bearings : int
-        Sensors of azimuth alone (2 mrad) besides the radars.
-    detection_probability, false_alarms
-        Of each sensor; the mean number of false alarms in a scan.
+    flight: "separate", "formations" or "crossings".
+    noise: Standard deviation of the range of each radar, metres; its angles err as much across at 50 km.
+    bearings: Sensors of azimuth alone (2 mrad) besides the radars.
+    detection_probability, false_alarms: Of each sensor; the mean number of false alarms in a scan.
     """
 
     flight: str

@@ -17,12 +17,8 @@ from assoc.tracking.single_scan.base import ScanOutcome, SingleScanTracker
 class OracleTracker(SingleScanTracker):
     """Tracks by the sources of the measurements, with the filter and the life of tracks of any other tracker.
 
-    Parameters
-    ----------
-    scene : Scene
-        With truth.
-    **options
-        As for `Tracker`.
+    scene: With truth.
+    **options: As for `Tracker`.
     """
 
     name = "oracle"

@@ -18,14 +18,10 @@ DETECTION = 0.9
 class Plane:
     """One scenario.
 
-    Attributes
-    ----------
-    sensor : PositionSensor
-    truth : array (K, T, 4)
-        [x, y, vx, vy] at times 0, 1, ..., K - 1 seconds; the trackers know the first with some error.
-    start : array (T, 4)
-        What they are told of time 0.
-    measurements : list over times 1 .. K - 1 of arrays (n, 2)
+    truth: array (K, T, 4). [x, y, vx, vy] at times 0, 1, ..., K - 1 seconds; the trackers know the first with some
+        error.
+    start: array (T, 4). What they are told of time 0.
+    measurements: list over times 1 .. K - 1 of arrays (n, 2).
     """
 
     sensor: PositionSensor

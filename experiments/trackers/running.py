@@ -19,13 +19,9 @@ from experiments.trackers.plane import ACCELERATION, SPEED, START_DEVIATION, Pla
 class Run:
     """A tracker's way through a scene.
 
-    Attributes
-    ----------
-    tracks : Trajectories
-        The confirmed tracks.
-    confirmed : list over scans of (ids (n,), positions (n, 3))
-    seconds : array (K,)
-        CPU time of each scan.
+    tracks: The confirmed tracks.
+    confirmed: list over scans of (ids (n,), positions (n, 3)).
+    seconds: array (K,). CPU time of each scan.
     """
 
     tracks: Trajectories

@@ -42,13 +42,6 @@ def gated(sensors: int, targets: int, seed: int) -> Scene:
 
     Sensors measure x, y, z with 0.1 km, P_d 0.9, and see the whole box; targets are uniform in
     5 x 5 x 2 km (up to 300) or 10 x 10 x 5 km; false alarms are Poisson with mean 0.1 T a sensor.
-
-    Parameters
-    ----------
-    sensors, targets : int
-        S and T.
-    seed : int
-        Same seed, same scene.
     """
     rng = np.random.default_rng(seed)
     extent = np.array([5.0, 5.0, 2.0] if targets <= 300 else [10.0, 10.0, 5.0]) * KM
@@ -72,13 +65,6 @@ def ghost(targets: int, seed: int) -> Scene:
 
     Sensors at (0, 0), (50, -10), (100, 0) km measure azimuth with 5 mrad, P_d 0.95, one false alarm per
     scan in the half circle towards the field, which is 100 x 100 km with targets uniform in it.
-
-    Parameters
-    ----------
-    targets : int
-        T.
-    seed : int
-        Same seed, same scene.
     """
     rng = np.random.default_rng(seed)
     places = np.array([[0.0, 0.0, 0.0], [50.0, -10.0, 0.0], [100.0, 0.0, 0.0]]) * KM
@@ -104,13 +90,6 @@ def radar_field(targets: int, seed: int) -> Scene:
 
     Range noise 50 m, azimuth and elevation 0.5 mrad, P_d 0.9, false alarms 2 % of the targets, heights
     0.5 to 12 km. The radars stand around the middle, so angles grow worse towards the edge.
-
-    Parameters
-    ----------
-    targets : int
-        T.
-    seed : int
-        Same seed, same scene.
     """
     rng = np.random.default_rng(seed)
     side = math.sqrt(targets / 0.1) * KM
@@ -132,13 +111,7 @@ def radar_field(targets: int, seed: int) -> Scene:
 
 
 def three_radar(seed: int) -> Scene:
-    """Return the scene of the ant colony paper: three targets, three radars, 100 scans.
-
-    Parameters
-    ----------
-    seed : int
-        Same seed, same scene.
-    """
+    """Return the scene of the ant colony paper: three targets, three radars, 100 scans."""
     from assoc.simulation import simulate
 
     return simulate("three-radar", seed=seed)

@@ -28,22 +28,9 @@ def axial_known_optimum(n: int, seed: int) -> tuple[AssignmentProblem, float]:
     that would still lose against L_i = a_i + ... + a_n, and costs B(x) less the best compatible B of the
     level below. Along any solution the sum telescopes to at least B(first tuple) >= L_1.
 
-    Parameters
-    ----------
-    n : int
-        Indices per dimension, at least 2.
-    seed : int
-        Same seed, same problem.
-
-    Returns
-    -------
-    problem, optimum
-        The optimum is L_1.
-
-    References
-    ----------
-    Grundel & Pardalos, "Test problem generator for the multidimensional assignment problem",
-    Computational Optimization and Applications 30 (2005).
+    Returns problem, optimum: The optimum is L_1.
+    Grundel & Pardalos, "Test problem generator for the multidimensional assignment problem", Computational Optimization
+        and Applications 30 (2005).
     """
     rng = np.random.default_rng(seed)
     optimal_costs = rng.integers(1, 10, n)
@@ -86,20 +73,9 @@ def planted(sensors: int, seed: int, targets: int | None = None) -> tuple[Assign
     multipliers, all others that sum plus U(0.5, 20), so the multipliers are an optimal dual solution. Every
     singleton is listed (one missing would be added at cost 0, below its multipliers' sum).
 
-    Parameters
-    ----------
-    sensors : int
-        S.
-    seed : int
-        Same seed, same problem.
-    targets : int, optional
-        Targets planted, each seen by each sensor with probability 0.85. By default as many as make about
-        20,000 tuples.
-
-    Returns
-    -------
-    problem, optimum
-        The optimum is the sum of all multipliers.
+    targets: Targets planted, each seen by each sensor with probability 0.85. By default as many as make about 20,000
+        tuples.
+    Returns problem, optimum: The optimum is the sum of all multipliers.
     """
     rng = np.random.default_rng(seed)
     seen = rng.random((targets or _PLANTED_TARGETS[sensors], sensors)) < 0.85

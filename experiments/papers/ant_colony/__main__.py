@@ -64,9 +64,7 @@ TOLERANCE = 0.1
 class Measured:
     """One mode: arrays over settings (the paper's order), scans and seeds.
 
-    Attributes
-    ----------
-    cycles, optimal, seconds : float arrays, shape (24, scans, seeds)
+    cycles, optimal, seconds: float arrays, shape (24, scans, seeds).
     """
 
     cycles: Any

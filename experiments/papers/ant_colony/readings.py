@@ -24,19 +24,11 @@ PAPER = 4.03
 class Reading:
     """What the paper leaves open.
 
-    Parameters
-    ----------
-    words : str
-    transform : "exponential" or "shifted"
-        Of the costs, for equation 7.
-    scale : float
-    start : "own", "any" or "best"
-        Whose tour of the last cycle an ant starts on.
-    nodes : "candidates", "grid" or "priced grid"
-        Candidate tuples and their false alarms; all tuples of the grid with false alarms at 0; with equation 5 for
+    transform: Of the costs, for equation 7.
+    start: Whose tour of the last cycle an ant starts on.
+    nodes: Candidate tuples and their false alarms; all tuples of the grid with false alarms at 0; with equation 5 for
         single measurements too.
-    scene : dict
-        Parameters of the scenario.
+    scene: Parameters of the scenario.
     """
 
     words: str

@@ -14,21 +14,12 @@ from assoc.recordings import Window
 class NearestSettings:
     """What the tracker knows and how it keeps house.
 
-    Parameters
-    ----------
-    clock : "stamps" or a number
-        Each plot's own time stamp, or the same number of seconds from group to group.
-    deletion : "time" or "groups"
-        A track ends after `patience` seconds, or after `patience` groups, without a plot.
-    patience : float
-    confirmation : int
-        Plots that make a track confirmed.
-    gate : float
-        Largest squared Mahalanobis distance, two degrees of freedom.
-    process_noise : float
-        Root of the acceleration's spectral density, m/s^1.5.
-    speed : float
-        Standard deviation of a new track's velocity along each axis, m/s.
+    clock: Each plot's own time stamp, or the same number of seconds from group to group.
+    deletion: A track ends after `patience` seconds, or after `patience` groups, without a plot.
+    confirmation: Plots that make a track confirmed.
+    gate: Largest squared Mahalanobis distance, two degrees of freedom.
+    process_noise: Root of the acceleration's spectral density, m/s^1.5.
+    speed: Standard deviation of a new track's velocity along each axis, m/s.
     """
 
     clock: Literal["stamps"] | float = "stamps"
@@ -43,11 +34,7 @@ class NearestSettings:
 class NearestNeighbourTracker:
     """Global nearest neighbour on a planar Kalman filter: at most one plot a track and group, all others start tracks.
 
-    Parameters
-    ----------
-    range_noise, azimuth_noise : float
-        Standard deviations of a plot, metres and radians.
-    settings : NearestSettings
+    range_noise, azimuth_noise: Standard deviations of a plot, metres and radians.
     """
 
     def __init__(self, range_noise: float, azimuth_noise: float, settings: NearestSettings) -> None:

@@ -34,12 +34,8 @@ CASES = {"none": None, "at the same place": (0.0, 0.0), "1 to 2 nmi beside": (1.
 def with_false_start(recording: Recording, offset: tuple[float, float] | None, rng: np.random.Generator) -> Recording:
     """Let the aircraft appear in the third rotation or later, with a false plot one rotation before.
 
-    Parameters
-    ----------
-    recording : Recording
-        Of one aircraft.
-    offset : (float, float) or None
-        Least and largest distance of the false plot from the aircraft's first, nautical miles; None: no false plot.
+    recording: Of one aircraft.
+    offset: Least and largest distance of the false plot from the aircraft's first, nautical miles; None: no false plot.
     """
     assert recording.sources is not None
     hidden = (recording.sources >= 0) & (recording.times < 2 * ROTATION)
@@ -127,14 +123,9 @@ def _appearing(rng: np.random.Generator) -> Recording:
 def beginning(recording: Recording, taken: Taken) -> tuple[float, float, float]:
     """Judge the confirmed track that holds most of the aircraft's plots, in percent.
 
-    Returns
-    -------
-    own : float
-        Of the aircraft's first 12 plots, those in this track.
-    first : float
-        100 if its first plot is the aircraft's, else 0.
-    identity : float
-        100 if its identity is the aircraft's when the aircraft's 12th plot has come, else 0.
+    own: Of the aircraft's first 12 plots, those in this track.
+    first: 100 if its first plot is the aircraft's, else 0.
+    identity: 100 if its identity is the aircraft's when the aircraft's 12th plot has come, else 0.
     """
     assert recording.sources is not None
     sources = recording.sources[taken.rows]

@@ -15,17 +15,10 @@ from experiments.papers.clustering_time_window.judging import Taken
 class HypothesisTracker:
     """A multiple hypothesis tracker that takes windows.
 
-    Parameters
-    ----------
-    radar : Radar2D
-    clock : float, optional
-        Seconds from window to window; without it each plot has its own time stamp.
-    kind : type
-        `TrackOrientedMHT` or `HypothesisOrientedMHT`.
-    process_noise : float
-        m/s^1.5.
-    options
-        Further settings of the tracker.
+    clock: Seconds from window to window; without it each plot has its own time stamp.
+    kind: `TrackOrientedMHT` or `HypothesisOrientedMHT`.
+    process_noise: m/s^1.5.
+    options: Further settings of the tracker.
     """
 
     def __init__(

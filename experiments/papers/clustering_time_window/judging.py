@@ -22,11 +22,9 @@ class TakesWindows(Protocol):
 class Taken:
     """Every plot that a tracker was given, in that order.
 
-    Attributes
-    ----------
-    windows, rows, tracks : int arrays (n,)
-        The window's place in the list, the plot's row in the recording, the track that took it or -1.
-    confirmed : bool array (n,)
+    windows, rows, tracks: int arrays (n,). The window's place in the list, the plot's row in the recording, the track
+        that took it or -1.
+    confirmed: bool array (n,).
     """
 
     windows: Array

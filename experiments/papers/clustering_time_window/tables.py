@@ -39,10 +39,7 @@ PIXEL = 5.0 / 7.0
 def read(folder: Path, number: int) -> list[dict[str, float]]:
     """Rows of table 4.number.
 
-    Raises
-    ------
-    SystemExit
-        The folder has no such file.
+    Raises SystemExit: The folder has no such file.
     """
     found = sorted([*folder.glob(f"t4_{number}_*.csv"), *folder.glob(f"t4_{number:02}_*.csv")])
     if not found:

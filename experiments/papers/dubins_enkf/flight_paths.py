@@ -25,12 +25,8 @@ OBSTACLE = (-250.0, 150.0, 30.0)
 def srs(start: Pose, goal: Pose, circle: tuple[float, float, float]) -> tuple[Array, Array, float]:
     """The paper's path: straight, right turn along the obstacle, straight.
 
-    Returns
-    -------
-    first, second : (2,) arrays
-        Tangent points T1 and T2 on the circle.
-    length : float
-        Metres.
+    first, second: (2,) arrays. Tangent points T1 and T2 on the circle.
+    length: Metres.
     """
     centre, r = np.array(circle[:2]), circle[2]
     touches = []
