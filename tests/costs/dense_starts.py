@@ -7,8 +7,6 @@ how much the chi-square value at the position found exceeds the best of all star
 position and the best one lies at the heights of the region.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterator

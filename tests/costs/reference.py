@@ -1,7 +1,5 @@
 """Equations 1-5 read plainly with numpy and scipy, and small scenes to hold the compiled costs against."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The full grid of tuples: nothing dropped, each at the price of equation 5, and the same optimum."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

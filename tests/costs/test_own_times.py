@@ -1,7 +1,5 @@
 """Costs of measurements of different times, against one big Gaussian and against simultaneous ones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Costs with a prior of positions, against integrals done by numerical quadrature, and what is grown with them."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

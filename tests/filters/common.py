@@ -1,7 +1,5 @@
 """Sensors, states and plain numpy filters that the tests of filters share."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kalman filter, EKF and UKF give what filterpy and Stone Soup give, to 1e-9."""
 
-from __future__ import annotations
-
 import datetime
 import math
 import warnings

@@ -1,7 +1,5 @@
 """Fuzzy inference against scikit-fuzzy, and the filter that it adapts."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kalman filter and EKF: against the textbook in plain numpy, batches, and refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal

@@ -1,7 +1,5 @@
 """Many steps in one call, thousands of steps, and all of it without the compiler."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

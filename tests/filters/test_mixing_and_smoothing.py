@@ -1,7 +1,5 @@
 """IMM, ensemble, smoother, motion models, the UAV and consistency: each against something independent."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

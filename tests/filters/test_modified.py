@@ -1,7 +1,5 @@
 """The modified EKF: its bias and covariance against a million samples, and what it is for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

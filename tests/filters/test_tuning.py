@@ -1,7 +1,5 @@
 """The search that tunes the fuzzy rules and the IMM: its vectors, its flights, and a run from end to end."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's model of the modified EKF: derivatives of spherical coordinates that grow by one unit a second."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
