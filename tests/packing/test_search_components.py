@@ -229,7 +229,9 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
     weight = one.weight
 
     class Ended:
-        def __init__(self):
+        nodes = 7
+
+        def __init__(self, *_, **__):
             self.columns, self.weight = one.best_columns().astype(np.int32), weight
 
         @property
@@ -239,10 +241,9 @@ def test_what_a_search_beside_ended_with_is_known_to_be_the_best(ghosts, monkeyp
         def run(self, nodes):
             pass
 
-    monkeypatch.setattr(closing, "_search", lambda *_: Ended())
+    monkeypatch.setattr(closing, "BranchAndBound", Ended)
     one.weight = weight + 0.5 * one.tolerance
-    branching = closing.Branching(one, Run(0))
-    branching.advance()
+    assert closing.Branching(one, Run(0)).advance(10) == 0
     assert one.closed and one.weight == weight
 
 
@@ -273,13 +274,16 @@ def test_few_nodes_at_a_time_where_each_takes_long(columns, most, ghosts, monkey
     asked = []
 
     class Counting:
-        done, nodes, lower_bound = False, 0, -np.inf
+        done, nodes, lower_bound, weight = False, 0, -np.inf, np.inf
+
+        def __init__(self, *_, **__):
+            pass
 
         def run(self, nodes):
             asked.append(nodes)
             self.done = True
 
-    monkeypatch.setattr(closing, "_search", lambda *_: Counting())
+    monkeypatch.setattr(closing, "BranchAndBound", Counting)
     monkeypatch.setattr(type(one.packing), "num_columns", columns)
     closing.close(one, Run(0))
     assert asked == [most]

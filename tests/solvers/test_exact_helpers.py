@@ -20,7 +20,7 @@ def test_they_join_a_long_search_of_a_small_component(monkeypatch, alone):
 
     def noted(task):
         joined.append(task.age)
-        return usual(task)
+        usual(task)
 
     monkeypatch.setattr(exact, "_ALONE", alone)
     # not split on counts: then it is over at once

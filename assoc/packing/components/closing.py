@@ -1,4 +1,4 @@
-"""Branch and bound beside a metaheuristic and after it: proofs, and the covers that it meets on the way."""
+"""Branch and bound on a component, beside other searches and after them: what it proves, and the covers it meets."""
 
 from __future__ import annotations
 
@@ -16,72 +16,65 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
-# nodes of the proof of what a metaheuristic leaves open, and of the search beside it, after each of its iterations
-_PROOF_NODES = 2000
-_NODES = 10
+# nodes of the proof of what a metaheuristic leaves open
+_NODES = 2000
 # nodes times columns between two looks at the user
 _AT_ONCE = 20_000
-# rows for which the search beside it pays: fewer are bounded before, and with more it seldom ends in time
-_LEAST, _MOST = 30, 150
 
 
 class Branching:
-    """Branch and bound on one component, some nodes at a time; it takes over the best cover, and gives what it finds.
+    """Branch and bound on one component, some nodes at a time.
 
     Parameters
     ----------
     component : Component
     run : Run
+    to_the_end : bool
+        As in `BranchAndBound`.
+
+    Attributes
+    ----------
+    search : BranchAndBound
     """
 
-    def __init__(self, component: Component, run: Run) -> None:
-        self._component, self._run = component, run
-        self._search: BranchAndBound | None = None
+    def __init__(self, component: Component, run: Run, *, to_the_end: bool = True) -> None:
+        self._component = component
+        self.search = BranchAndBound(
+            component.packing,
+            component.duals,
+            component.weight,
+            component.tolerance,
+            run.deadline(),
+            run.memory_allows,
+            to_the_end=to_the_end,
+            floor=component.proven,
+        )
 
-    @staticmethod
-    def pays(component: Component) -> bool:
-        """Whether a component is large enough for a search beside the metaheuristic, and small enough."""
-        return component.refinement == "full" and _LEAST <= component.packing.num_rows < _MOST
+    def advance(self, nodes: int, *, gives: bool = True) -> int:
+        """Take over the best cover, and do some nodes; what is proved then is the component's.
 
-    def advance(self) -> None:
-        """Do some nodes; what is known then is the component's."""
-        component = self._component
-        if component.best is None or component.closed or self._run.should_stop():
-            return
-        if self._search is None:
-            self._search = _search(component, self._run)
-        search = self._search
+        So is a better cover, if the search ``gives`` what it finds. Returns the number of nodes done.
+        """
+        component, search, before = self._component, self.search, self.search.nodes
         search.weight = min(search.weight, component.weight)
-        search.run(_NODES)
-        if search.columns is not None and search.weight < component.weight:
+        search.run(nodes)
+        if gives and search.columns is not None and search.weight < component.weight:
             # where it is better by less than the tolerance, too: a search that ended so has proved this cover alone
             owner = Cover.of(component.packing, search.columns).owner
             component.best, component.weight = owner, component.weight_of(owner)
         component.proven = max(component.proven, min(search.lower_bound, component.weight))
+        return search.nodes - before
 
 
 def close(component: Component, run: Run) -> None:
     """Raise what is proved of an open component by a short branch and bound; its cover stays."""
     if component.closed or run.should_stop():
         return
-    search = _search(component, run)
+    branching = Branching(component, run)
     # kernels do not hear Ctrl-C: few nodes at a time where each takes long
     at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
-    while not search.done and search.nodes < _PROOF_NODES and not run.should_stop():
-        search.run(at_once)
-    component.proven = max(component.proven, search.lower_bound)
-
-
-def _search(component: Component, run: Run) -> BranchAndBound:
-    return BranchAndBound(
-        component.packing,
-        component.duals,
-        component.weight,
-        component.tolerance,
-        run.deadline(),
-        run.memory_allows,
-        to_the_end=True,
-    )
+    while not branching.search.done and branching.search.nodes < _NODES and not run.should_stop():
+        branching.advance(at_once, gives=False)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:

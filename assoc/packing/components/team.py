@@ -18,6 +18,11 @@ from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 
+# rows for which branch and bound beside pays: fewer are bounded before, and with more it seldom ends in time
+_LEAST, _MOST = 30, 150
+# its nodes after each iteration
+_NODES = 10
+
 
 class Searcher(Protocol):
     """A metaheuristic at work on one component."""
@@ -55,8 +60,8 @@ class Team:
         workers: int,
         pool: ThreadPoolExecutor | None,
     ) -> None:
-        self._component, self._clusters, self._pool = component, clusters, pool
-        self._branching = Branching(component, run) if Branching.pays(component) else None
+        self._component, self._run, self._clusters, self._pool = component, run, clusters, pool
+        self._branching: Branching | None = None
         if pool is None:
             self._members = [(component, make(component, run.rng), run)]
             return
@@ -83,11 +88,20 @@ class Team:
         for own, _, _ in self._members:
             if own.best is not None:
                 whole.offer(own.best, own.weight)
-        if self._branching is not None:
-            self._branching.advance()
+        self._branch()
         for own, _, _ in self._members:
             if whole.best is not None:
                 own.offer(whole.best, whole.weight)
+
+    def _branch(self) -> None:
+        """Some nodes of branch and bound, where that pays."""
+        component = self._component
+        pays = component.refinement == "full" and _LEAST <= component.packing.num_rows < _MOST
+        if not pays or component.best is None or component.closed or self._run.should_stop():
+            return
+        if self._branching is None:
+            self._branching = Branching(component, self._run)
+        self._branching.advance(_NODES)
 
     def _step(self, number: int) -> None:
         component, searcher, run = self._members[number]

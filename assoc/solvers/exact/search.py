@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from assoc.packing.bounds.dual_ascent import dual_bound
 from assoc.packing.branching.compiling import compile_branching_ahead
 from assoc.packing.branching.feasibility import infeasible
-from assoc.packing.branching.search import BranchAndBound
+from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.components.splitting import split_component
 from assoc.packing.components.turns import Turns
-from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Outcome, Run
 from assoc.solvers.exact.reduction import Reduction
@@ -53,7 +52,7 @@ class _Task:
 
     component: Component
     all: _Searches
-    search: BranchAndBound | None = None
+    branching: Branching | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
     # of branching: since the last iteration of a metaheuristic, and in all
@@ -67,24 +66,24 @@ class _Task:
             if self._improves:
                 self._search_better()
                 return False
-            if self.search is None:
-                self.search = self._branching()
+            if self.branching is None:
+                self.branching = Branching(component, self.all.run)
                 component.stalled = 0
             # some ten milliseconds of work between two looks at the clock
-            self._branch(max(1, 20_000 // max(component.packing.num_columns, 1)))
-            if not self.search.done:
+            if not self._branch(self.branching, max(1, 20_000 // max(component.packing.num_columns, 1))):
                 self._join()
                 return False
-        if self.search is not None and self.search.done:
-            self.all.out_of_memory |= self.search.out_of_memory
-            if component.best is None and not self.search.out_of_memory:
+        if self.branching is not None and self.branching.search.done:
+            short = self.branching.search.out_of_memory
+            self.all.out_of_memory |= short
+            if component.best is None and not short:
                 raise infeasible(component.packing)
         return True
 
     def split(self) -> list[_Task]:
         """Tasks for what the component falls apart into: in one search the nodes of independent components multiply."""
         # branching should start on as few columns as the incumbent allows
-        share = 0.9 if self.search is None and not self._improves else 2 / 3
+        share = 0.9 if self.branching is None and not self._improves else 2 / 3
         return [_Task(one, self.all) for one in split_component(self.component, share) or ()]
 
     def branch_shortly(self) -> bool:
@@ -92,42 +91,21 @@ class _Task:
         component, nodes = self.component, min(_SHORT, self.all.nodes_left)
         if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
             return component.closed
-        self.search = self._branching(to_the_end=False)
-        self._branch(nodes)
-        return component.closed or self.search.done
+        self.branching = Branching(component, self.all.run, to_the_end=False)
+        return self._branch(self.branching, nodes) or component.closed
+
+    def _branch(self, branching: Branching, nodes: int) -> bool:
+        """Do some nodes; whether nothing is left to search."""
+        self.all.iterations += branching.advance(min(nodes, self.all.nodes_left))
+        return branching.search.done
 
     @property
     def _improves(self) -> bool:
         """Whether the incumbent is to be brought near the optimum before any branching."""
         component, patience = self.component, self.all.patience
         # small components are branched at once, and without an incumbent there is nothing to improve
-        large = self.search is None and component.best is not None and component.packing.num_rows >= _LARGE
+        large = self.branching is None and component.best is not None and component.packing.num_rows >= _LARGE
         return large and component.stalled * 60 < patience * component.packing.num_rows
-
-    def _branching(self, *, to_the_end: bool = True) -> BranchAndBound:
-        component, run = self.component, self.all.run
-        return BranchAndBound(
-            component.packing,
-            component.duals,
-            component.weight,
-            component.tolerance,
-            run.deadline(),
-            run.memory_allows,
-            to_the_end=to_the_end,
-            floor=component.proven,
-        )
-
-    def _branch(self, nodes: int) -> None:
-        """Search some nodes; a better incumbent is the component's then."""
-        search, component = self.search, self.component
-        assert search is not None
-        before = search.nodes
-        search.run(min(nodes, self.all.nodes_left))
-        self.all.iterations += search.nodes - before
-        if search.columns is not None and search.weight < component.weight:
-            component.weight = search.weight
-            component.best = Cover.of(component.packing, search.columns).owner
-        component.proven = max(component.proven, search.lower_bound)
 
     def _join(self) -> None:
         """Give metaheuristics half the time as long as they improve the incumbent; then less and less."""
@@ -137,18 +115,16 @@ class _Task:
         alone = component.packing.num_rows < _LARGE and self.age < _ALONE
         if not alone and self.turns >= _TURNS * min(1 + component.stalled, 10):
             self.turns = 0
-            if self._search_better():
-                assert self.search is not None
-                self.search.weight = component.weight
+            self._search_better()
 
-    def _search_better(self) -> bool:
-        """One iteration of a metaheuristic and exact sub-steps on the incumbent; whether it became better.
+    def _search_better(self) -> None:
+        """One iteration of a metaheuristic, and exact sub-steps on the incumbent.
 
         Tabu search and breeding take turns: they get stuck in different places.
         """
         component, run = self.component, self.all.run
         if component.best is None:
-            return False
+            return
         if self.heuristics is None:
             self.heuristics = TabuSearch(component, TabuParameters()), Breeding(component, GeneticParameters())
         before = component.weight
@@ -156,7 +132,6 @@ class _Task:
         self.improvements += 1
         component.refine(run, TabuParameters.clusters)
         component.stalled = 0 if component.weight < before - component.tolerance else component.stalled + 1
-        return component.stalled == 0
 
 
 def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run) -> Outcome:
