@@ -48,7 +48,6 @@ test: $(VENV)/.installed-test
 test-all: $(VENV)/.installed-test
 	$(PY) -m tests.compile_first
 	$(PY) -m pytest -n 2 --dist worksteal -q --cov --cov-report=
-	@echo "lines of assoc that the tests run: $$($(PY) -m coverage report --format=total) %"
 
 lint: $(VENV)/.installed-lint
 	$(PY) -m ruff check .
