@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,9 +58,10 @@ def draw_study(folder: str | os.PathLike[str], frame: pd.DataFrame | None = None
     for solver, part in parts:
         if not varied(part):
             continue
-        name = "heatmap.png" if len(parts) == 1 else f"heatmap-{solver}.png"
-        drawn.append(save_png(Path(folder) / name, heat_maps(part, new_figure())))
-    drawn.append(save_png(Path(folder) / "convergence.png", convergence(frame, load_traces(folder), new_figure())))
+        # the name of a solver comes from the study's log: it must not lead elsewhere
+        name = "heatmap.png" if len(parts) == 1 else "heatmap-" + re.sub(r"[^\w.-]", "_", solver) + ".png"
+        drawn.append(_save(folder, name, heat_maps(part, new_figure())))
+    drawn.append(_save(folder, "convergence.png", convergence(frame, load_traces(folder), new_figure())))
     return drawn
 
 
@@ -76,9 +78,14 @@ def new_figure() -> Any:
     return figure
 
 
+def _save(folder: Any, name: str, figure: Any) -> Path:
+    path = Path(folder) / name
+    check_regular(path)  # others may have put a link into the folder of a study
+    return save_png(path, figure)
+
+
 def save_png(path: Path, figure: Any) -> Path:
     """Write a figure, whole or not at all; returns the path."""
-    check_regular(path)  # into the folder of a study, where others may have put a link
     write_atomically(path, lambda file: figure.savefig(file, format="png", dpi=130))
     return path
 

@@ -7,8 +7,8 @@ import assoc
 from assoc import AssignmentProblem
 from assoc.packing.prepare import prepare
 from assoc.packing.run import Run
-from assoc.solvers.exact.proof import prove
 from assoc.solvers.exact.reduction import Reduction, best_of_both
+from assoc.solvers.exact.search import search_to_the_end
 
 
 def _problem(seed: int, whole: bool) -> AssignmentProblem:
@@ -54,4 +54,4 @@ def test_columns_are_dropped_by_reduced_costs_computed_anew():
     """Those that the passes had updated were wrong beside 1e18: the optimum was dropped, 0.2 called optimal."""
     tuples = [[1, 1, 1], [1, 2, 1], [2, 1, 1], [2, 2, 1], [3, 1, 1]]
     problem = AssignmentProblem(tuples, [1e18, 1.0, 0.2, 0.4, 0.0], [3, 2, 1], dummy=False)
-    assert prove(prepare(problem).packing, 1000, 10, Run(0)).lower_bound <= 0.0
+    assert search_to_the_end(prepare(problem).packing, 1000, 10, Run(0)).lower_bound <= 0.0
