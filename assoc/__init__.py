@@ -3,8 +3,7 @@
 The public names below are loaded on first use, so that ``import assoc`` stays quick.
 """
 
-# first of all: it decides where all others are looked for
-from assoc._system import current_folder as _current_folder  # noqa: F401
+from assoc._system import first_import as _first_import  # noqa: F401
 
 # isort: split
 

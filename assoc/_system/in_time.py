@@ -11,7 +11,7 @@ from typing import TypeVar, cast
 Answer = TypeVar("Answer")
 
 # seconds that work which was told to stop is given when Python ends
-_FAREWELL = 10.0
+_FAREWELL = 60.0
 _LOOK = 0.05
 # bytes: what a main thread has; some systems give other threads too little for a compiler
 _STACK = 16 << 20

@@ -33,10 +33,6 @@ _LOOK = 0.5
 _switched_on = os.environ.get("ASSOC_INTERPRET", "1") != "0"
 
 
-class NotCompiled(Exception):  # noqa: N818  (it is no error)
-    """The kernel is in no cache, and may be interpreted."""
-
-
 @contextlib.contextmanager
 def compiled_only() -> Iterator[None]:
     """Interpret nothing in this thread: for those who want the compiled code now."""
@@ -71,12 +67,16 @@ class _Thread(threading.local):
 thread = _Thread()
 
 
-def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) -> Callable[..., Any]:
+def first_small(
+    kernel: Any, compiled: Callable[..., Any], small: int, stand_in: Callable[..., Any] | None
+) -> Callable[..., Any]:
     """Return what a kernel does on arguments of new types: load, interpret or compile.
 
     Parameters
     ----------
     kernel : Dispatcher
+    compiled : callable
+        What loads or compiles it; returns None where it is to be interpreted.
     small : int
         Elements of the arguments up to which a call may be interpreted.
     stand_in : callable, optional
@@ -87,9 +87,7 @@ def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) ->
     callable
         For ``kernel._compile_for_args``; it returns what is then called with the same arguments.
     """
-    compiled = kernel._compile_for_args
-    function_of = kernel.py_func
-    function = stand_in or function_of
+    function = stand_in or kernel.py_func
     spent = 0.0
     looked = -_LOOK
 
@@ -120,7 +118,8 @@ def first_small(kernel: Any, small: int, stand_in: Callable[..., Any] | None) ->
             thread.may_interpret = False
         if found is None:
             looked = time.monotonic()
-            beside.ask(function_of.__module__, function_of.__qualname__, tuple(map(kernel.typeof_pyval, arguments)))
+            kinds = tuple(map(kernel.typeof_pyval, arguments))
+            beside.ask(kernel.py_func.__module__, kernel.py_func.__qualname__, kinds)
             return interpreted
         return found
 

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from assoc._system import memory, temporary
-from assoc._system.current_folder import path_without
+from assoc._system.first_import import path_without
 from assoc.errors import InvalidInputError, LimitExceededError
 
 # bytes of a process with numpy, scipy and compiled kernels, and a small task

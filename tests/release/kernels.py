@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 PROCESSOR = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""}
-"""What the kernels are compiled for; ``assoc/_system/shipped.py`` says the same."""
+"""What the kernels are compiled for; ``assoc/_system/numba_private.py`` says the same."""
 
 _SCENES = {
     "radars": ("three-radar", "--scans", "12"),

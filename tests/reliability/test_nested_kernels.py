@@ -90,12 +90,3 @@ def test_a_kept_inner_kernel_is_linked_into_a_new_one(tmp_path):
     # the new one alone is compiled; the inner one is loaded for it
     assert compiled == 1
     assert overloads == [0, 0, 0, 1, 1]
-
-
-def test_an_inner_kernel_is_not_translated_by_itself(tmp_path):
-    run(tmp_path)
-    kept = {path.name: path.read_bytes() for path in tmp_path.rglob("*.nbc")}
-    # object files begin with this
-    translated = {name.split("-")[0].split(".")[-1]: b"\x7fELF" in code for name, code in kept.items()}
-    assert translated["outer"]
-    assert not translated["inner"]

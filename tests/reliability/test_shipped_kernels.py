@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from llvmlite.binding import get_host_cpu_features, parse_bitcode
 
-from assoc._system.shipped import NEEDED
+from assoc._system.numba_private import NEEDED
 from tests.release.kernels import PROCESSOR, pack
 
 _PROGRAM = """
@@ -20,11 +20,11 @@ import sys
 from pathlib import Path
 import numpy as np
 from numba.core import event
-from assoc._system import shipped
+from assoc._system import numba_private
 from assoc.packing.kernels.matching import match
 from assoc.packing.kernels.sorting import ascending
 
-shipped.FOLDER = Path(sys.argv[1])
+numba_private.SHIPPED = Path(sys.argv[1])
 seen = event.RecordingListener()
 event.register("numba:compile", seen)
 rng = np.random.default_rng(4)

@@ -10,7 +10,6 @@ import time
 import pytest
 
 import assoc
-from assoc._system import compile_time
 from assoc._system.compile_time import compile_seconds, is_compiling, loading
 from assoc.simulation import simulate
 
@@ -107,13 +106,13 @@ def test_only_the_own_thread_counts():
 
 def test_what_was_interrupted_counts_no_further():
     before = compile_seconds()
-    # Ctrl-C between a compilation's beginning and its lock: its end is never told
-    compile_time.entered()
-    assert compile_seconds() == before
-    compile_time.left()
+    with pytest.raises(KeyboardInterrupt), loading():
+        raise KeyboardInterrupt
+    stopped = compile_seconds()
+    time.sleep(0.02)
     with loading():
         time.sleep(0.01)
-    assert 0.01 <= compile_seconds() - before < 5.0
+    assert before <= stopped and 0.01 <= compile_seconds() - stopped < 5.0
 
 
 def test_who_shows_progress_can_ask_whether_a_thread_compiles():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assoc._system.ahead import compile_ahead
+from assoc._system.compiled import compile_for
 from assoc._system.interpreted import interpreted_only
 from assoc.packing.branching.depth_first import search_depth_first
 from assoc.packing.branching.node import new_work
@@ -46,7 +47,7 @@ def _compile_trials() -> None:
     root = plain_root(packing, np.zeros(packing.num_rows))
     work = new_work(packing.arrays, root.program, root.slack)
     arguments = (work.program, work.cols, work.node, work.basis, work.trials, 1, Effort(0.0, 0, np.inf))
-    decide.compile(tuple(map(decide.typeof_pyval, arguments)))
+    compile_for(decide, *arguments)
 
 
 def _on_three(to_the_end: bool) -> None:

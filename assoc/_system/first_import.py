@@ -1,9 +1,10 @@
-"""Programs, and the processes that are started, import nothing from the current folder: data of others may lie there.
+"""The package's first import: what programs do before they import anything else.
 
-`python -m` puts it before all other folders. So this module is the package's first import, and imports nothing that
-Python has not loaded by then.
+Programs, and the processes that are started, import nothing from the current folder, where data of others may lie:
+`python -m` puts it before all other folders. And until a program handles Ctrl-C itself, it ends without a traceback.
 """
 
+import _signal  # type: ignore[import-not-found]
 import os
 import sys
 
@@ -30,3 +31,6 @@ def _is_program() -> bool:
 
 if _is_program():
     sys.path[:] = path_without()
+    # where programs do not handle it they need the exception
+    if hasattr(_signal, "pthread_sigmask") and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
