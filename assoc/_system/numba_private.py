@@ -52,7 +52,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 SHIPPED = PACKAGE / "_kernels"
 """Compiled kernels that came with the package; a wheel may hold them (``tests/release/kernels.py``)."""
 # where kernels are kept if numba finds no folder; for the processes that this one starts, too
-_FOLDER = "ASSOC_KERNELS"
+_FOLDER = "ASSOC_CACHE_DIR"
 # nobody calls kernels as functions of C, and inner ones not from Python: what would let them is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# a marker may follow: where a package exists for some versions of Python alone
-_FORM = re.compile(r"([A-Za-z0-9._-]+)>=([0-9]+(?:\.[0-9]+)*)(?:; *[^;]+)?")
+# the first version that is not allowed may follow, and a marker: where a package exists for some Pythons alone
+_FORM = re.compile(r"([A-Za-z0-9._-]+)>=([0-9]+(?:\.[0-9]+)*)(?:,<[0-9.]+)?(?:; *[^;]+)?")
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def read() -> list[Requirement]:
     Raises
     ------
     ValueError
-        A requirement has another form than ``name>=version`` (and a marker): its oldest version could not be tested.
+        A requirement has another form than ``name>=version`` (with an end, and a marker): its oldest version could not be tested.
     """
     with open(ROOT / "pyproject.toml", "rb") as file:
         content = tomllib.load(file)
