@@ -34,7 +34,8 @@ def read() -> list[Requirement]:
     Raises
     ------
     ValueError
-        A requirement has another form than ``name>=version`` (with an end, and a marker): its oldest version could not be tested.
+        A requirement has another form than ``name>=version`` (then an end, a marker): its oldest version could not
+        be tested.
     """
     with open(ROOT / "pyproject.toml", "rb") as file:
         content = tomllib.load(file)
