@@ -90,7 +90,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
         if parsed["report"]:
             from assoc.plotting.report import write_tracking_report
 
-            asked = tracker.solver if tracker.solver_calls else "none"
+            asked = tracker.settings.solver if tracker.solver_calls else "none"
             used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
             more: dict[str, Any] = {"name": file, "settings": used, "cutoff": cutoff, "words": words}
             more["plots"] = plots
@@ -289,7 +289,7 @@ def _report(output: str, count: int, tracker: Tracker, table: TrackTable, elapse
     print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
     each = 1e3 * elapsed / max(count, 1)
     # several trackers never need one, or only for what their own search leaves open
-    used = tracker.solver if tracker.solver_calls else "no solver used"
+    used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
 

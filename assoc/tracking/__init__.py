@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from assoc.tracking.associate.joint_probabilistic import PairProbabilities
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.identity_evidence import IdentityParameters
-from assoc.tracking.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
 from assoc.tracking.life_cycle import LifeCycle
 from assoc.tracking.live.late_plots import LatePlots
 from assoc.tracking.live.live_tracker import LiveTracker
 from assoc.tracking.live.pictures import Picture
-from assoc.tracking.mht.hypothesis_oriented import HypothesisOrientedMHT
-from assoc.tracking.mht.track_oriented import TrackOrientedMHT
-from assoc.tracking.nearest_neighbour import NearestNeighbourTracker
-from assoc.tracking.single_scan.multi_sensor import MultiSensorTracker
-from assoc.tracking.single_scan.static import StaticFusionTracker
 from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
+from assoc.tracking.trackers import (
+    HypothesisOrientedMHT,
+    JointProbabilisticTracker,
+    MultiSensorTracker,
+    NearestNeighbourTracker,
+    StaticFusionTracker,
+    TrackOrientedMHT,
+)
 
 TRACKERS: dict[str, type[Tracker]] = {
     kind.name: kind

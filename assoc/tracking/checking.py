@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from assoc._parameters import is_number
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.sensors import Sensor
@@ -15,6 +16,16 @@ from assoc.sensors.base import ANGLES, finite_array
 _NOISE = 10.0
 # metres, radians, m/s: what is beyond them is no measurement, and would leave no digits in what follows
 _LENGTH, _ANGLE, _SPEED = 1e9, 1e3, 3e8
+
+
+def checked_time(time: object, last: float | None) -> float:
+    """Seconds, not before those of the last scan."""
+    if not is_number(time):
+        raise InvalidInputError(f"time must be a finite number of seconds, got {time!r}")
+    when = float(time)  # type: ignore[arg-type]
+    if last is not None and when < last:
+        raise InvalidInputError(f"time must not run backwards: got {when:g} s after {last:g} s")
+    return when
 
 
 def checked_measurements(measurements: Sequence[Array], sensors: Sequence[Sensor]) -> list[Array]:

@@ -49,7 +49,7 @@ def smoothed(tracker: Tracker, scene: Scene, decisions: Sequence[Decision]) -> T
         Measurements have times of their own, the tracker corrects biases of sensors, or the decisions are those of
         other scans.
     """
-    check_smoothable(scene, corrects=tracker.registration is not None)
+    check_smoothable(scene, corrects=tracker.settings.registration is not None)
     for one in decisions:
         scan = scene.scan(one.scan)
         if one.time != scan.time or [len(ids) for ids in one.assigned] != scan.sizes.tolist():
@@ -124,4 +124,4 @@ def check_smoothable(scene: Scene, *, corrects: bool) -> None:
 def _begun(tracker: Tracker, smoother: FixedLagSmoother[Any], scene: Scene, scan: Scan, rows: Array) -> Window[Any]:
     """The window at a track's first detection, which tells the position; a later one will tell the velocity."""
     positions, covariances = positions_and_covariances(scene, scan, rows[None])
-    return Window(tracker.initiation.start(smoother.filter, positions, covariances))
+    return Window(tracker.settings.initiation.start(smoother.filter, positions, covariances))

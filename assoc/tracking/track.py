@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -115,7 +116,26 @@ class Step(Decision):
     refused: int = 0
 
 
-def decision(scan: int, time: float, assigned: list[Array], confirmed_ids: Array) -> Decision:
+def owners(rows: Array, values: Array, sizes: Array) -> list[Array]:
+    """Of each measurement of each sensor the value (int64) of the track that took it, 0 where none did.
+
+    Parameters
+    ----------
+    rows : int array (T, S)
+        Measurements of the tracks, 1-based, 0: none.
+    values : int64 array (T,)
+    sizes : int array (S,)
+        Measurements of each sensor.
+    """
+    found = []
+    for s, size in enumerate(sizes.tolist()):
+        own = np.zeros(size + 1, dtype=np.int64)
+        own[rows[:, s]] = values
+        found.append(own[1:])
+    return found
+
+
+def decision(scan: int, time: float, assigned: Sequence[Array], confirmed_ids: Array) -> Decision:
     """Make a decision from track ids and the ids that are confirmed."""
     ids = tuple(np.asarray(one, dtype=np.int64) for one in assigned)
     return Decision(scan, time, ids, tuple(np.isin(one, confirmed_ids) & (one > 0) for one in ids))

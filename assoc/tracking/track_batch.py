@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -200,7 +200,7 @@ class TrackBatch:
         found = {f"{prefix}{name}": value for name, value in self._columns().items()}
         return found | {f"{prefix}state.{name}": value for name, value in arrays_of(self.states).items()}
 
-    def restored(self, arrays: dict[str, Array], prefix: str = "") -> TrackBatch:
+    def restored(self, arrays: Mapping[str, Array], prefix: str = "") -> TrackBatch:
         """A batch of the kind of this one, made of the arrays of another."""
         numbers = np.stack([arrays[f"{prefix}{name}"] for name in _NUMBERS], axis=1)
         counts = np.stack([arrays[f"{prefix}{name}"].astype(np.int64) for name in _COUNTS], axis=1)
@@ -227,9 +227,13 @@ class TrackBatch:
         ]
 
 
+def one_state(filter: Filter[Any]) -> Any:
+    """A state of the filter's kind, of one target."""
+    n = filter.motion.dim
+    return filter.start(gaussian(np.zeros((1, n)), np.eye(n)[None]))
+
+
 def empty_batch(filter: Filter[Any]) -> TrackBatch:
     """No tracks, with states of the filter's kind."""
-    n = filter.motion.dim
-    one = filter.start(gaussian(np.zeros((1, n)), np.eye(n)[None]))
     nothing = np.zeros(0, dtype=np.int64)
-    return TrackBatch.new(one[nothing], nothing, np.zeros(0), np.zeros(0))
+    return TrackBatch.new(one_state(filter)[nothing], nothing, np.zeros(0), np.zeros(0))

@@ -23,7 +23,7 @@ from assoc.errors import InvalidInputError
 from assoc.scene import Scene
 from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker
-from assoc.tracking.checkpoint import described
+from assoc.tracking.file import described
 from assoc.tracking.filter_choice import manoeuvre_noise, two_speeds
 from tests.tracking.crossing import crossing, radar
 

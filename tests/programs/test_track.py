@@ -250,11 +250,9 @@ def test_bad_input_is_one_line_and_code_2(case, scene_file, tmp_path, monkeypatc
 
 def test_too_many_tuples_is_code_3(scene_file, tmp_path, monkeypatch, capsys):
     from assoc.tracking import tracker
-    from assoc.tracking.single_scan import base
 
     begin = inspect.unwrap(tracker.Tracker.__init__)
     monkeypatch.setattr(begin, "__kwdefaults__", {**begin.__kwdefaults__, "max_tuples": 5})
-    assert base
     assert track.main([str(scene_file), "-o", str(tmp_path / "tracks.csv")]) == 3
     assert "more than max_tuples = 5" in capsys.readouterr().err
 

@@ -8,7 +8,6 @@ from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.problem import AssignmentProblem
 from assoc.scene import Scan, Scene
 from assoc.sensors import BearingSensor, PositionSensor, Radar2D, Radar3D
-from assoc.tracking.mht import branches as module_of_branches
 from assoc.tracking.mht.best_hypothesis import VISITS, choose
 from assoc.tracking.mht.branches import Hits, Roots, Tables, extend
 from assoc.tracking.mht.losses import priced
@@ -79,9 +78,8 @@ def test_a_group_that_takes_too_long_costs_others_nothing():
     assert score[chosen & own].tolist() == [8.0, 9.5]
 
 
-def test_a_solver_is_asked_where_the_search_takes_too_long(monkeypatch):
+def test_a_solver_is_asked_where_the_search_takes_too_long():
     """Branches are cut around the best hypothesis, also where it is hard to find."""
-    monkeypatch.setattr(module_of_branches, "VISITS", 20)
     tree, score, history = branches(1, trees=12, measurements=9)
     numbers, counts = np.zeros((len(tree), 5)), np.zeros((len(tree), 5), dtype=np.int64)
     numbers[:, SCORE], counts[:, ID] = score, tree
@@ -99,7 +97,7 @@ def test_a_solver_is_asked_where_the_search_takes_too_long(monkeypatch):
 
     hits = Hits(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
     roots = Roots(np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int32), np.zeros(0), np.zeros(0))
-    kept, after, chosen = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve)
+    kept, after, chosen = extend(tables, np.zeros(len(tree)), hits, roots, 0, 0, 30, 15.0, solve, 20)
     assert asked
     assert -after.numbers[chosen, SCORE].sum() == pytest.approx(by_solver(tree, score, history), abs=1e-9)
 

@@ -138,7 +138,7 @@ def test_a_restored_tracker_knows_the_codes(name, tmp_path):
     track_plots(one, recording, windows[:24])
     one.save(tmp_path / "state.npz")
     two.restore(tmp_path / "state.npz")
-    assert len(two.identities.arrays()["identity.ids"]) >= 2
+    assert len(two.state.identities.arrays()["identity.ids"]) >= 2
     np.testing.assert_array_equal(
         track_plots(one, recording, windows[24:]).tracks, track_plots(two, recording, windows[24:]).tracks
     )

@@ -23,6 +23,12 @@ def tracker_of(sensor, **options):
     )
 
 
+def survived(score, seconds):
+    """Logarithm of the odds that a target is there so many seconds later; it stays for 600 s on average."""
+    there = math.exp(-seconds / 600.0) / (1.0 + math.exp(-score))
+    return math.log(there / (1.0 - there))
+
+
 def close_targets(rng, count=3):
     """States of targets side by side, and a scan with one false alarm."""
     mean = np.concatenate([rng.uniform(420, 450, (count, 3)), rng.normal(0, 10, (count, 3))], axis=1)
@@ -104,7 +110,7 @@ def test_measurements_of_own_times_are_compared_at_these(seed):
     tracker.begin(0.0, Gaussian(mean, np.repeat(cov[None], len(mean), axis=0)), score=SCORE)
     times = rng.uniform(0.0, 2.0, len(z))
     # targets leave: the tracks of the step exist a little less likely than before it
-    before = tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence
+    before = np.full(len(mean), survived(SCORE, 2.0))
     tracker.step(2.0, [z], [times])
     P, density = sensor.detection_probability, sensor.false_alarm_rate / sensor.volume
     p = 1 / (1 + np.exp(-before))
@@ -148,7 +154,7 @@ def test_sensors_are_taken_in_in_the_order_of_their_times(seed):
         initiation=Initiation(birth_rate=1e-9),
     )  # fmt: skip
     tracker.begin(0.0, Gaussian(mean[None], cov[None]), score=SCORE)
-    before = float(tracker._batch.survived(2.0 / tracker.life_cycle.lifetime).existence[0])
+    before = survived(SCORE, 2.0)
     p = 1 / (1 + math.exp(-before))
     times = [np.array([1.6, 1.7]), np.array([0.4, 0.7])]
     # near enough to be doubted; as good as no new targets, which would contend for the second sensor's plots

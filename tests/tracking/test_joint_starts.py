@@ -14,7 +14,6 @@ from assoc.simulation import simulate
 from assoc.simulation.observation import observe
 from assoc.simulation.radars import azimuth_interval, on_circle, padded_azimuth
 from assoc.tracking import TRACKERS, track_scene
-from assoc.tracking.births.joint_starts import crossings
 from tests.sizes import sample
 
 REGION = np.array([[-10e3, 10e3], [-10e3, 10e3], [0.0, 100.0]])
@@ -64,17 +63,18 @@ def test_crossings_are_the_tuples_of_what_is_free():
     whole = build_problem(one, scan)
     several = np.count_nonzero(whole.tuples, axis=1) > 1
     free = [np.ones(len(z), dtype=np.bool_) for z in scan.measurements]
-    found = crossings(one, scan, free)
+    crossings = TRACKERS["mht"].for_scene(one).settings.births.crossings
+    found = crossings(scan, free)
     assert sorted(map(tuple, found.rows)) == sorted(map(tuple, whole.tuples[several]))
     free[0][0] = False
-    left = crossings(one, scan, free)
+    left = crossings(scan, free)
     without = several & (whole.tuples[:, 0] != 1)
     assert sorted(map(tuple, left.rows)) == sorted(map(tuple, whole.tuples[without]))
     costs = dict(zip(map(tuple, whole.tuples), whole.costs, strict=True))
     np.testing.assert_allclose(left.costs, [costs[tuple(row)] for row in left.rows], rtol=1e-9)
     nothing = [np.zeros(len(z), dtype=np.bool_) for z in scan.measurements]
-    assert crossings(one, scan, nothing) is None
-    assert crossings(one, Scan(0, 0.0, tuple(z[:0] for z in scan.measurements)), [z[:0] for z in nothing]) is None
+    assert crossings(scan, nothing) is None
+    assert crossings(Scan(0, 0.0, tuple(z[:0] for z in scan.measurements)), [z[:0] for z in nothing]) is None
 
 
 @pytest.mark.parametrize("name", TRACKERS)

@@ -143,7 +143,7 @@ def test_late_plots_keep_their_identities():
         found.append(sorted(mean[1] for mean in expected.values()))
         if identity is not None:
             # what was told of tracks is what was told in order
-            kept = [one.identities.arrays()["identity.told"] for one in (plain, late.tracker)]
+            kept = [one.state.identities.arrays()["identity.told"] for one in (plain, late.tracker)]
             np.testing.assert_array_equal(*(np.sort(one, axis=0) for one in kept))
             assert kept[0].any()
     with pytest.raises(InvalidInputError, match="identities of sensor 0"):
@@ -169,11 +169,10 @@ def test_what_is_final_is_told_once(scene, kind):
 
 
 def test_tracks_of_the_past_keep_their_ids_when_names_are_forgotten(scene):
-    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene))
+    late = LatePlots(TRACKERS["nearest-neighbour"].for_scene(scene), many=0)
     known = []
     for k in range(6):
         scan = scene.scan(k)
-        late._many = 0
         late.step(scan.time, scan.measurements, scan.times, scan.sectors)
         known.append([track.track_id for track in late.tracks])
         assert [[track.track_id for track in late.past_tracks(j)] for j in range(k + 1)] == known

@@ -30,7 +30,7 @@ def test_a_smoothed_track_is_the_least_squares_of_all_its_measurements():
     # information form over all five states: prior, motion, measurements
     n = 6 * len(times)
     A, b = np.zeros((n, n)), np.zeros(n)
-    speed = tracker.initiation.speed
+    speed = tracker.settings.initiation.speed
     prior = np.linalg.inv(np.diag([100.0] * 3 + [speed**2] * 3))
     A[:6, :6] += prior
     b[:6] += prior @ np.concatenate([z[0][0], np.zeros(3)])

@@ -15,6 +15,7 @@ from assoc.tracking import (
     StaticFusionTracker,
     TrackOrientedMHT,
 )
+from assoc.tracking.file import file_arrays
 from assoc.tracking.life_cycle import count_bits
 from assoc.tracking.track_table import TrackTable
 from tests.sizes import sample
@@ -136,7 +137,7 @@ def test_memory_does_not_grow(kind):
     tracker = kind.for_scene(one)
 
     def size():
-        return sum(value.nbytes for value in tracker._arrays().values())
+        return sum(value.nbytes for value in file_arrays(tracker.settings, tracker.state).values())
 
     run(tracker, one, 0, 10)
     sizes = [size()]

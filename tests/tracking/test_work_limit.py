@@ -8,8 +8,8 @@ import pytest
 
 from assoc import simulation
 from assoc.tracking import TRACKERS, MultiSensorTracker, TrackTable, track_scene
-from assoc.tracking import tracker as module
 from assoc.tracking.filter_choice import two_speeds
+from assoc.tracking.progress import solver_options
 
 
 @pytest.fixture
@@ -36,41 +36,25 @@ def test_a_slow_clock_changes_nothing(name, scene, monkeypatch):
     assert rows(TRACKERS[name].for_scene(crowd), crowd) == quick
 
 
-def test_a_clock_that_is_asked_for_counts(scene, monkeypatch):
-    seen = []
-    inner = module.assign
-
-    def spy(problem, solver, **options):
-        seen.append(options)
-        return inner(problem, solver, **options)
-
-    monkeypatch.setattr(module, "assign", spy)
-    options = [
-        {}, {"time_limit": 7.0}, {"solver_parameters": {"nodes": 3}}, {"solver": "greedy"}
-    ]  # fmt: skip
-    limits = []
-    for one in options:
-        seen.clear()
-        tracker = MultiSensorTracker.for_scene(scene, **one)
-        tracker.step(0.0, scene.scan(0).measurements)
-        limits.append([(call["time_limit"], call.get("nodes"), call.get("patience")) for call in seen])
-    # the tracker itself asks, and its nursery of tracks
-    assert all(clock is None and nodes >= 10 and patience == 0 for clock, nodes, patience in limits[0])
-    assert [set(calls) for calls in limits[1:]] == [{(7.0, None, None)}, {(None, 3, 0)}, {(None, None, None)}]
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"time_limit": 7.0}, {"time_limit": 7.0}),
+        ({"solver_parameters": {"nodes": 3}}, {"time_limit": None, "nodes": 3, "patience": 0}),
+        ({"solver": "greedy"}, {"time_limit": None}),
+    ],
+)
+def test_a_clock_that_is_asked_for_counts(scene, options, expected):
+    assert solver_options(MultiSensorTracker.for_scene(scene, **options).settings, 100) == expected
 
 
-def test_the_work_is_less_for_large_problems(monkeypatch):
-    nodes = []
-    monkeypatch.setattr(module, "assign", lambda problem, solver, **o: nodes.append(o["nodes"]))
-    tracker = MultiSensorTracker.for_scene(simulation.simulate("crowd", 1, targets=2))
-
-    class Problem:
-        def __init__(self, count):
-            self.num_tuples = count
-
-    for count in (0, 10, 10_000, 10_000_000):
-        tracker._assign(Problem(count))
-    assert nodes == [500_000, 50_000, 50, 10]
+def test_the_work_is_less_for_large_problems(scene):
+    settings = MultiSensorTracker.for_scene(scene).settings
+    # the nursery of tracks asks the solver, too
+    for one in (settings, settings.nursery):
+        found = [solver_options(one, count) for count in (0, 10, 10_000, 10_000_000)]
+        assert [each.pop("nodes") for each in found] == [500_000, 50_000, 50, 10]
+        assert all(each == {"time_limit": None, "patience": 0} for each in found)
 
 
 @pytest.mark.parametrize("seed", (200, 201))

@@ -1,21 +1,47 @@
-"""What measurements that no track takes begin: where their targets are, and what they score as new tracks."""
+"""What measurements that no track takes begin: where their targets are, and what they score as new tracks.
+
+A bearing alone tells no position. What tracks leave over of sensors that measure angles alone is taken together: tuples
+of two measurements or more that may be one target. Most are ghosts, crossings of bearings of different targets or of
+false alarms. They die as false tracks do: the measurements of later scans do not follow them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from assoc._types import Array
+from assoc.costs.build import build_problem
 from assoc.costs.positions import positions_and_covariances, single_positions
 from assoc.costs.tracks.own_times import Places
 from assoc.costs.tracks.scores import ScoreTerms, log_birth
 from assoc.filters.base import Filter
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
 from assoc.tracking.births.initiation import Initiation
-from assoc.tracking.births.joint_starts import Crossings, angles_alone, crossings
+
+
+def angles_alone(sensors: Sequence[Sensor]) -> bool:
+    """Whether no sensor tells a distance, so that none starts a track alone."""
+    return all(all(sensor.angular[: sensor.dim]) for sensor in sensors)
+
+
+class Crossings(NamedTuple):
+    """Tuples of measurements that may be one target each."""
+
+    rows: Array
+    """1-based measurement of each sensor, 0: none; int32 (K, S)."""
+    costs: Array
+    """Against false alarms, (K,); see `assoc.build_problem`."""
+    scores: Array
+    """As new targets, (K,)."""
+    positions: Array
+    """Metres, (K, 3)."""
+    states: Any
+    """Of new tracks."""
 
 
 class NewTracks:
@@ -29,16 +55,22 @@ class NewTracks:
     initiation : Initiation
     terms : ScoreTerms
         What detections and misses of each sensor add to a score.
+    limits : mapping
+        gate_probability and max_tuples of `assoc.build_problem`.
     """
 
-    def __init__(self, place: Scene, filter: Filter[Any], initiation: Initiation, terms: ScoreTerms) -> None:
-        self._place = place
-        self._filter = filter
-        self._initiation = initiation
-        self._terms = terms
+    def __init__(
+        self, place: Scene, filter: Filter[Any], initiation: Initiation, terms: ScoreTerms, limits: Mapping[str, Any]
+    ) -> None:
+        self._place, self._filter, self._initiation, self._terms, self._limits = (
+            place,
+            filter,
+            initiation,
+            terms,
+            limits,
+        )
         # a target that appears with a sensor's measurement was missed by the sensors before it
         self._appears = terms.birth + np.cumsum(terms.miss) - terms.miss
-        initiation.prior(filter.motion)  # refuses what does not suit the filter now, not in the first scan
         self._widest = initiation.widest * float(np.linalg.norm(np.diff(place.region, axis=1)))
 
     def fused(self, scan: Scan, tuples: Array) -> tuple[Array, Array, Array]:
@@ -73,10 +105,6 @@ class NewTracks:
         scores = self._appears[s] + self._log_birth(covariances)
         return self._initiation.start(self._filter, positions, covariances), fit, positions, scores
 
-    def any_alone(self, measurements: Sequence[Array]) -> bool:
-        """Whether any measurement tells alone where to start a track."""
-        return any(one.any() for one in self.places(measurements).fit)
-
     def places(self, measurements: Sequence[Array]) -> Places:
         """Where each measurement of a scan alone says that its target is."""
         positions, covariances, fit, births = [], [], [], []
@@ -88,17 +116,32 @@ class NewTracks:
             births.append(self._terms.birth[s] + self._log_birth(covariances[s]))
         return Places(positions, covariances, fit, births)
 
-    def crossings(self, scan: Scan, free: Sequence[Array], **options: Any) -> tuple[Crossings, Array] | None:
-        """Tuples that may start tracks where all sensors measure angles alone, and their scores as new targets.
+    def crossings(self, scan: Scan, free: Sequence[Array]) -> Crossings | None:
+        """Tuples of two free measurements or more that may start tracks.
 
-        `free` are masks over the measurements of each sensor, `options` those of `assoc.build_problem`; see
-        `assoc.tracking.births.joint_starts`.
+        Parameters
+        ----------
+        scan : Scan
+        free : sequence over sensors of bool arrays (n_s,)
+            Measurements that may be used.
+
+        Returns
+        -------
+        Crossings or None
+            None where there are no such tuples, or sensors tell distances.
         """
-        if not angles_alone(self._place.sensors):
+        numbers = [np.flatnonzero(one) for one in free]
+        if not angles_alone(self._place.sensors) or sum(len(one) > 0 for one in numbers) < 2:
             return None
-        found = crossings(self._place, scan, free, speed=self._initiation.speed, **options)
-        if found is None:
+        left = Scan(scan.index, scan.time, tuple(z[own] for z, own in zip(scan.measurements, numbers, strict=True)))
+        problem = build_problem(self._place, left, speed=self._initiation.speed, **self._limits)
+        several = np.count_nonzero(problem.tuples, axis=1) > 1
+        if not several.any():
             return None
-        fit = self._narrow(found.covariances)
-        kept = Crossings(*(one[fit] for one in found))
-        return kept, self.scores(kept.rows, kept.costs, kept.covariances)
+        tuples, costs = problem.tuples[several], problem.costs[several]
+        positions, covariances, fit = self.fused(left, tuples)
+        given = [np.concatenate([[0], own + 1]) for own in numbers]
+        rows = np.stack([one[tuples[:, s]] for s, one in enumerate(given)], axis=1).astype(np.int32)
+        rows, costs, positions, covariances = rows[fit], costs[fit], positions[fit], covariances[fit]
+        states = self._initiation.start(self._filter, positions, covariances)
+        return Crossings(rows, costs, self.scores(rows, costs, covariances), positions, states)

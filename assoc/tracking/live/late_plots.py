@@ -1,15 +1,16 @@
 """Measurements that arrive late: the tracker goes back to the scan that they belong to, and comes again.
 
-What a tracker was before each of the last scans is kept, and so are the scans. A late measurement is put into its scan,
-and all scans since are taken in anew: the tracks are those of a tracker that got everything in order, with any filter
-and any way to associate. Tracks keep their ids: one that is found anew has the id under which it was known.
+The tracker's state before each of the last scans is kept, and so are the scans. A late measurement is put into its
+scan, and all scans since are taken in anew: the tracks are those of a tracker that got everything in order, with any
+filter and any way to associate. Tracks keep their ids: one that is found anew has the id under which it was known.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,9 +19,10 @@ from assoc._system.door import doors
 from assoc._types import Array
 from assoc.errors import InvalidInputError
 from assoc.scene.own_times import checked_times
+from assoc.tracking.births.nursery import current
 from assoc.tracking.checking import checked_measurements
-from assoc.tracking.checkpoint import Memory
 from assoc.tracking.identity_evidence import checked_identities, no_identities
+from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.tracker import Tracker
 
@@ -31,17 +33,40 @@ HORIZON = 30.0
 _MANY = 1_000
 
 
-@dataclass(eq=False)
-class _Kept:
-    """A scan of the past, what the tracker was before it, and what it said then."""
+class _Past(NamedTuple):
+    """A scan of the past, the tracker's state before it, and what it said then."""
 
-    before: Memory
+    before: TrackerState
     time: float
-    measurements: list[Array]
-    times: list[Array] | None
+    measurements: Sequence[Array]
+    times: Sequence[Array] | None
     sectors: Array | None
-    identities: list[Array] | None = None
-    assigned: tuple[Array, ...] = ()
+    identities: Sequence[Array] | None
+    assigned: tuple[Array, ...]
+
+    def with_late(self, s: int, z: Array, times: Array, codes: Array | None) -> _Past:
+        """The scan with more measurements of sensor s, behind its own."""
+        own, identities = self.times or [np.full(len(one), self.time) for one in self.measurements], self.identities
+        if codes is not None or identities is not None:
+            known = identities or no_identities(self.measurements)
+            identities = _appended(known, s, np.zeros((len(z), 2), dtype=np.int64) if codes is None else codes)
+        measurements, own = _appended(self.measurements, s, z), _appended(own, s, times)
+        return self._replace(measurements=measurements, times=own, identities=identities)
+
+
+def _appended(arrays: Sequence[Array], s: int, more: Array) -> list[Array]:
+    return [np.concatenate([one, more]) if r == s else one for r, one in enumerate(arrays)]
+
+
+class _Move(NamedTuple):
+    """Late measurements of a sensor that were put into a scan of the past."""
+
+    scan: int
+    sensor: int
+    rows: Array
+    """Their numbers among those of the sensor that came in."""
+    place: int
+    """Where they stand in the scan."""
 
 
 @doors
@@ -65,17 +90,18 @@ class LatePlots:
         Of the next new track.
     """
 
-    def __init__(self, tracker: Tracker, horizon: float = HORIZON, *, first_id: int = 1) -> None:
+    def __init__(self, tracker: Tracker, horizon: float = HORIZON, *, first_id: int = 1, many: int = _MANY) -> None:
         if not isinstance(tracker, Tracker):
             raise InvalidInputError(f"tracker must be a tracker of assoc.tracking, got {type(tracker).__name__}")
         self.tracker, self.horizon = tracker, positive(horizon, "horizon")
         self.late = self.refused = 0
-        self._kept: deque[_Kept] = deque()
+        self._past: list[_Past] = []
         self._names: dict[int, int] = {track.track_id: track.track_id for track in tracker.tracks}
+        """By the tracker's own ids: those under which tracks are known outside."""
         self.next_id = max(first_id, max(self._names, default=0) + 1)
         self._decided: dict[int, tuple[int, Decision]] = {}
         """By scan: the scan whose step has decided it, and how."""
-        self._many = _MANY
+        self._many = self._most = many
 
     @property
     def time(self) -> float | None:
@@ -85,13 +111,19 @@ class LatePlots:
     @property
     def tracks(self) -> list[Track]:
         """The tracks that live now, by their ids."""
-        named = [track.named(self._name(track.track_id)) for track in self.tracker.tracks]
-        return sorted(named, key=lambda track: track.track_id)
+        return self._tracks(self.tracker.state)
+
+    def _tracks(self, state: TrackerState) -> list[Track]:
+        if state.time is None:
+            return []
+        settings = self.tracker.settings
+        inner = current(settings, state).tracks(settings.filter, state.time)
+        return sorted((track.named(self._name(track.track_id)) for track in inner), key=lambda track: track.track_id)
 
     @property
     def scans(self) -> list[float]:
         """Times of the scans that may still be revised, the oldest first, seconds."""
-        return [kept.time for kept in self._kept]
+        return [past.time for past in self._past]
 
     def past_tracks(self, scan: int) -> list[Track]:
         """The tracks at the end of one of `scans`, as they are by all that has arrived since.
@@ -101,18 +133,11 @@ class LatePlots:
         scan : int
             Number in `scans`; negative from the end.
         """
-        count = len(self._kept)
+        count = len(self._past)
         if not -count <= scan < count:
             raise InvalidInputError(f"scan must be a number in the {count} scans that are kept, got {scan}")
-        following = scan % count + 1
-        if following == count:
-            return self.tracks
-        now = self.tracker.remember()
-        self.tracker.go_back(self._kept[following].before)
-        try:
-            return self.tracks
-        finally:
-            self.tracker.go_back(now)
+        states = [*(past.before for past in self._past[1:]), self.tracker.state]
+        return self._tracks(states[scan])
 
     def step(
         self,
@@ -143,92 +168,79 @@ class LatePlots:
         InvalidInputError
             As `Tracker.step`; the tracker is then as it was before.
         """
-        tracker = self.tracker
+        tracker, now = self.tracker, self.tracker.time
         checked = checked_measurements(measurements, tracker.sensors)
-        now = tracker.time
         codes = None
-        if identities is not None and tracker.identities is not None:
+        if identities is not None and tracker.settings.identity is not None:
             codes = checked_identities(identities, [len(z) for z in checked])
         if times is None or now is None:
-            return self._finish(self._advance(time, checked, times, sectors, codes), [], 0)
+            return self._finish(self._advance(time, checked, times, sectors, codes), 0, 0)
         stamps = checked_times(times, checked, float(time), "times")
         on_time = [one >= now for one in stamps]
         if all(one.all() for one in on_time):
-            return self._finish(self._advance(time, checked, list(stamps), sectors, codes), [], 0)
-        start = tracker.remember(), list(self._kept), dict(self._names), dict(self._decided), self.next_id
+            return self._finish(self._advance(time, checked, stamps, sectors, codes), 0, 0)
+        before = tracker.state, self._past, self._names, self._decided, self.next_id
+        self._past, self._names, self._decided = list(self._past), dict(self._names), dict(self._decided)
         confirmed = {track.track_id for track in self.tracks if track.confirmed}
         try:
             moves, refused = self._insert(checked, stamps, codes, on_time)
             if moves:
-                self._again(min(k for k, *_ in moves))
-            fresh = [z[one] for z, one in zip(checked, on_time, strict=True)]
-            own = [t[one] for t, one in zip(stamps, on_time, strict=True)]
-            told = None if codes is None else [i[one] for i, one in zip(codes, on_time, strict=True)]
+                self._again(min(move.scan for move in moves))
+            fresh, own, told = (
+                None if arrays is None else [array[one] for array, one in zip(arrays, on_time, strict=True)]
+                for arrays in (checked, stamps, codes)
+            )
+            assert fresh is not None
             step = self._advance(time, fresh, own, sectors, told)
         except BaseException:
-            tracker.go_back(start[0])
-            self._kept, self._names, self._decided, self.next_id = deque(start[1]), *start[2:]
+            tracker.state, self._past, self._names, self._decided, self.next_id = before
             raise
         assigned = [np.zeros(len(z), dtype=np.int64) for z in checked]
         for s, one in enumerate(on_time):
             assigned[s][one] = step.assigned[s]
         for k, s, rows, place in moves:
-            assigned[s][rows] = self._kept[k].assigned[s][place:][: len(rows)]
+            assigned[s][rows] = self._past[k].assigned[s][place:][: len(rows)]
         sure = [track.track_id for track in self.tracks if track.confirmed]
         known = tuple(np.isin(one, sure) & (one > 0) for one in assigned)
         ended = np.array(sorted(confirmed - {track.track_id for track in self.tracks}), dtype=np.int64)
         done = replace(step, assigned=tuple(assigned), confirmed=known, ended=ended)
-        return self._finish(done, [rows for _, _, rows, _ in moves], refused)
+        return self._finish(done, sum(len(move.rows) for move in moves), refused)
 
     def _insert(
         self, measurements: list[Array], stamps: Sequence[Array], codes: list[Array] | None, on_time: list[Array]
-    ) -> tuple[list[tuple[int, int, Array, int]], int]:
-        """Put late measurements into their scans: scan, sensor, rows and place there; and how many are too old."""
-        assert self.tracker.time is not None
-        ends = np.array([kept.time for kept in self._kept])
+    ) -> tuple[list[_Move], int]:
+        """Put late measurements into their scans; also how many are too old."""
+        ends = np.array([past.time for past in self._past])
+        first = self._past[0].before.time if self._past else None
         moves, refused = [], 0
-        copies: dict[int, _Kept] = {}
         for s, (z, times) in enumerate(zip(measurements, stamps, strict=True)):
             rows = np.flatnonzero(~on_time[s])
             # a time on the border of two scans belongs to the later one, as it does in time
             scan = np.searchsorted(ends, times[rows], side="right")
-            first = self._kept[0].before.time if self._kept else None
             good = scan < len(ends)
             if first is not None:
                 good &= times[rows] >= first
             refused += int((~good).sum())
             for k in np.unique(scan[good]).tolist():
                 mine = rows[good & (scan == k)]
-                old = copies.setdefault(k, replace(self._kept[k]))
-                if old.times is None:
-                    old.times = [np.full(len(one), old.time) for one in old.measurements]
-                old.measurements, old.times = list(old.measurements), list(old.times)
-                if codes is not None or old.identities is not None:
-                    known = no_identities(old.measurements) if old.identities is None else list(old.identities)
-                    told = no_identities(measurements) if codes is None else codes
-                    known[s] = np.concatenate([known[s], told[s][mine]])
-                    old.identities = known
-                moves.append((k, s, mine, len(old.measurements[s])))
-                old.measurements[s] = np.concatenate([old.measurements[s], z[mine]])
-                old.times[s] = np.concatenate([old.times[s], times[mine]])
-        for k, changed in copies.items():
-            self._kept[k] = changed
+                moves.append(_Move(k, s, mine, len(self._past[k].measurements[s])))
+                told = None if codes is None else codes[s][mine]
+                self._past[k] = self._past[k].with_late(s, z[mine], times[mine], told)
         return moves, refused
 
     def _again(self, first: int) -> None:
         """Take the scans from this one on in anew, and find the tracks' ids again."""
-        past = list(self._kept)
-        self.tracker.go_back(past[first].before)
+        tracker = self.tracker
+        tracker.state = self._past[first].before
         # tracks that began since are called otherwise inside now
-        names = {inner: outer for inner, outer in self._names.items() if inner < past[first].before.next_id}
+        names = {inner: outer for inner, outer in self._names.items() if inner < tracker.state.next_id}
         votes: Counter[tuple[int, int]] = Counter()
         steps = []
-        for k in range(first, len(past)):
-            kept = past[k]
-            self._kept[k] = kept = replace(kept, before=self.tracker.remember())
-            step = self.tracker.step(kept.time, kept.measurements, kept.times, kept.sectors, kept.identities)
+        for k, past in enumerate(self._past[first:], start=first):
+            self._past[k] = past._replace(before=tracker.state)
+            step = tracker.step(past.time, past.measurements, past.times, past.sectors, past.identities)
             steps.append(step)
-            for new, old in zip(step.assigned, kept.assigned, strict=True):
+            for new, old in zip(step.assigned, past.assigned, strict=True):
                 votes.update(zip(new[: len(old)].tolist(), old.tolist(), strict=True))
         taken = set(names.values())
         for (inner, outer), _ in sorted(votes.items(), key=lambda one: (-one[1], one[0])):
@@ -237,42 +249,41 @@ class LatePlots:
                 taken.add(outer)
         self._names = names
         for k, step in enumerate(steps, start=first):
-            self._kept[k].assigned = self._named(step.assigned)
+            self._past[k] = self._past[k]._replace(assigned=self._named(step.assigned))
             self._decide(step)
 
     def _advance(
-        self, time: float, measurements: list[Array], times: Sequence[Array] | None, sectors: Array | None,
-        codes: list[Array] | None,
+        self, time: float, measurements: Sequence[Array], times: Sequence[Array] | None, sectors: Array | None,
+        codes: Sequence[Array] | None,
     ) -> Step:  # fmt: skip
         """Take in a scan that is in time."""
-        before = self.tracker.remember()
+        before = self.tracker.state
         step = self.tracker.step(time, measurements, times, sectors, codes)
-        kept = _Kept(before, step.time, measurements, None if times is None else list(times), sectors, codes)
-        kept.assigned = self._named(step.assigned)
-        self._kept.append(kept)
+        assigned = self._named(step.assigned)
+        self._past.append(_Past(before, step.time, measurements, times, sectors, codes, assigned))
         self._decide(step)
         ended = np.array(sorted(self._name(i) for i in step.ended.tolist()), dtype=np.int64)
-        return replace(step, assigned=kept.assigned, ended=ended)
+        return replace(step, assigned=assigned, ended=ended)
 
     def _decide(self, step: Step) -> None:
         for one in step.final:
             self._decided[one.scan] = step.scan, self._outside(one)
 
-    def _finish(self, step: Step, late: list[Array], refused: int) -> Step:
+    def _finish(self, step: Step, late: int, refused: int) -> Step:
         """Forget what nothing can be late for any more, and the names of tracks that are gone."""
-        count = sum(len(rows) for rows in late)
-        self.late, self.refused = self.late + count, self.refused + refused
-        while self._kept and self._kept[0].time < step.time - self.horizon:
-            self._kept.popleft()
-        open_scans = step.scan - len(self._kept)
+        self.late, self.refused = self.late + late, self.refused + refused
+        self._past = [past for past in self._past if past.time >= step.time - self.horizon]
+        open_scans = step.scan - len(self._past)
         # what a scan that is kept has decided, it may decide otherwise when it is taken in anew
         done = [scan for scan in sorted(self._decided) if self._decided[scan][0] <= open_scans]
         final = tuple(self._decided.pop(scan)[1] for scan in done)
-        if len(self._names) > self._many:
-            living = self.tracker.remember().track_ids.union(*(kept.before.track_ids for kept in self._kept))
+        if len(self._names) > self._most:
+            living = set().union(
+                *(_ids(state) for state in (self.tracker.state, *(past.before for past in self._past)))
+            )
             self._names = {inner: outer for inner, outer in self._names.items() if inner in living}
-            self._many = _MANY + 2 * len(self._names)
-        return replace(step, final=final, late=count, refused=refused)
+            self._most = self._many + 2 * len(self._names)
+        return replace(step, final=final, late=late, refused=refused)
 
     def flush(self) -> tuple[Decision, ...]:
         """What is said of the scans that are not final yet, oldest first; for the end of a recording."""
@@ -293,3 +304,9 @@ class LatePlots:
         return tuple(
             np.array([self._name(i) if i else 0 for i in one.tolist()], dtype=np.int64).reshape(-1) for one in assigned
         )
+
+
+def _ids(state: TrackerState) -> set[int]:
+    """Ids of the tracks that live, those in the nursery included."""
+    own = set(state.tracks.track_id.tolist())
+    return own if state.nursery is None else own | set(state.nursery.state.tracks.track_id.tolist())

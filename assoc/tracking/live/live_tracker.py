@@ -344,7 +344,7 @@ class LiveTracker:
         told = ""
         if known:
             # what was used says nothing of how good the result is
-            used = " (identities were used to make them)" if self._tracker.tracker.identities is not None else ""
+            used = " (identities were used to make them)" if self._tracker.tracker.settings.identity is not None else ""
             told = f"; {kept} of {known} tracks with an identity kept one{used}"
         return (
             f"{self.counts['plots']} plots in {len(self.seconds)} steps; a step takes {middle:.3g} ms, "

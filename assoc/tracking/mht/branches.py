@@ -49,7 +49,7 @@ class Roots(NamedTuple):
 
 def extend(
     tables: Tables, miss: Array, hits: Hits, roots: Roots, column: int, scan: int, most: int, drop: float,
-    solve: Callable[[Array, Array, Array], Array],
+    solve: Callable[[Array, Array, Array], Array], visits: int = VISITS,
 ) -> tuple[Array, Tables, Array]:  # fmt: skip
     """Next branches, cut to those that matter to good global hypotheses.
 
@@ -71,6 +71,8 @@ def extend(
         As for `keep_best`.
     solve
         The best global hypothesis of branches, by their trees, scores and histories, as a mask.
+    visits
+        As for `choose`.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def extend(
     chosen
         Which of them are the best global hypothesis found.
     """
-    limits = _Limits(most, drop, VISITS)
+    limits = _Limits(most, drop, visits)
     history, doubtful, grown, *cut = _extend(tables, miss, hits, roots, column, scan, limits)
     if doubtful.size:
         tree, score, _, chosen = grown

@@ -15,25 +15,26 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan, score_costs
-from assoc.costs.tracks.scores import ScoreTerms
 from assoc.costs.tracks.tuples import gate_of, require_states, track_pairs
-from assoc.filters.base import Filter
 from assoc.filters.batches import concatenate
-from assoc.scene.scan import Scan
-from assoc.sensors import Sensor
-from assoc.tracking.births.new_tracks import NewTracks
-from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.progress import Progress
+from assoc.tracking.track_batch import TrackBatch
+
+_MOST_CROSSINGS = 100
+"""The most new targets in a scan where several sensors together tell a position."""
 
 
 class Births(NamedTuple):
     """New targets that may be."""
 
+    ids: Array
+    """By time and place, so that the order of the measurements does not matter; int64 (N,)."""
     rows: Array
     """1-based measurement of each sensor, int32 (N, S)."""
+    when: Array
+    """Seconds, (N,)."""
     score: Array
     """(N,)."""
-    turn: Array
-    """The order in which they are given ids: by time and place, so that that of the measurements does not matter."""
 
 
 class Offers(NamedTuple):
@@ -47,7 +48,21 @@ class Offers(NamedTuple):
     """0-based, (K,)."""
     gain: Array
     """What it adds to the score, (K,)."""
+    when: Array
+    """Its time, seconds, (K,)."""
     births: Births
+
+
+class Grown(NamedTuple):
+    """B branches at the end of a scan."""
+
+    states: Any
+    first: Array
+    """Time of the first measurement in the scan; where there is none, not finite; (B,)."""
+    last: Array
+    """Time of the last measurement in the scan, NaN where there is none, (B,)."""
+    looked: Array
+    """Whether a sensor looked at it, bool (B,)."""
 
 
 class Growth(ABC):
@@ -55,10 +70,7 @@ class Growth(ABC):
 
     Parameters
     ----------
-    batch : TrackBatch
-        The branches before the scan.
-    sensors : int
-        How many.
+    progress : Progress
 
     Attributes
     ----------
@@ -68,150 +80,135 @@ class Growth(ABC):
         Row before the scan, -1 for new targets.
     rows : int32 array (B, S)
         1-based measurement of each sensor in this scan, 0: none.
-    ids : int64 array (B,)
-        Tracks.
     """
 
     order: Sequence[int]
 
-    def __init__(self, batch: TrackBatch, sensors: int) -> None:
-        self._before = batch
-        self.origin, self.ids = np.arange(len(batch)), batch.track_id.copy()
-        self.rows, self._gained = np.zeros((len(batch), sensors), dtype=np.int32), np.zeros(len(batch))
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._before: TrackBatch = progress.state.tracks
+        self.origin = np.arange(len(self._before))
+        self.rows = np.zeros((len(self._before), len(progress.settings.sensors)), dtype=np.int32)
 
     @abstractmethod
     def offers(self, s: int) -> Offers:
         """What the measurements of sensor s may mean."""
 
-    def take(self, s: int, offers: Offers, kept: Array, new_ids: Array) -> None:
-        """Go on with these rows of what was offered; `new_ids` are those of the births."""
+    def take(self, s: int, offers: Offers, kept: Array) -> None:
+        """Go on with these rows of what was offered."""
         require_states(self._before.states, len(kept))
         hit = self.rows[offers.branch]
         hit[:, s] = offers.measurement + 1
-        births = offers.births
-        self.rows = np.concatenate([self.rows, hit, births.rows])[kept]
-        self.origin = np.concatenate([self.origin, self.origin[offers.branch], np.full(len(new_ids), -1)])[kept]
-        self.ids = np.concatenate([self.ids, self.ids[offers.branch], new_ids])[kept]
-        gained = self._gained
-        self._gained = np.concatenate([gained + offers.missed, gained[offers.branch] + offers.gain, births.score])[kept]
+        self.rows = np.concatenate([self.rows, hit, offers.births.rows])[kept]
+        new = np.full(len(offers.births.ids), -1)
+        self.origin = np.concatenate([self.origin, self.origin[offers.branch], new])[kept]
         self._take_states(s, offers, kept)
 
     @abstractmethod
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         """Let what else is known of the branches follow."""
 
-    def _batch(self, states: Any, first: Array, last: Array) -> TrackBatch:
-        """Tracks of these states; times of the first and the last measurement in this scan, NaN for none."""
-        fresh = self.origin < 0
-        old, new = np.flatnonzero(~fresh), np.flatnonzero(fresh)
-        known = self._before[self.origin[old]].scored(states[old], self._gained[old], last[old])
-        begun = TrackBatch.new(states[new], self.ids[new], self._gained[new], last[new])
-        begun.numbers[:, STARTED] = first[new]
-        back = np.argsort(np.concatenate([old, new]), kind="stable")
-        return TrackBatch.concatenate([known, begun])[back]
-
     @abstractmethod
-    def finished(self) -> tuple[TrackBatch, Array]:
-        """The branches at the end of the scan, and which were looked at or seen, bool (B,)."""
+    def finished(self) -> Grown:
+        """The branches at the end of the scan."""
+
+    def _births(self, numbers: Array, s: int, turn: Array, when: Array, score: Array) -> Births:
+        """Single measurements (numbers from 0) of sensor s; `turn` is the order in which they are given ids."""
+        ids = np.empty(len(numbers), dtype=np.int64)
+        ids[turn] = self._progress.work.new_ids(len(numbers))
+        rows = np.zeros((len(numbers), self.rows.shape[1]), dtype=np.int32)
+        rows[:, s] = numbers + 1
+        return Births(ids, rows, when, score)
 
 
 class AtOnce(Growth):
-    """All sensors looked everywhere at one instant: branches are predicted to it, and corrected sensor by sensor.
+    """All sensors looked everywhere at one instant: predicted branches are corrected sensor by sensor."""
 
-    Parameters
-    ----------
-    batch : TrackBatch
-    scan : Scan
-    predicted
-        States of the batch at the time of the scan.
-    filter, sensors, terms, new_tracks, gate_probability
-        The tracker's.
-    """
-
-    def __init__(
-        self, batch: TrackBatch, scan: Scan, predicted: Any, filter: Filter[Any], sensors: Sequence[Sensor],
-        terms: ScoreTerms, new_tracks: NewTracks, gate_probability: float,
-    ) -> None:  # fmt: skip
-        super().__init__(batch, len(sensors))
-        self.order = range(len(sensors))
-        self._scan, self._filter, self._sensors, self._terms = scan, filter, sensors, terms
-        self._new_tracks, self._gates = new_tracks, [gate_of(one, gate_probability) for one in sensors]
-        self._states = predicted
+    def __init__(self, progress: Progress) -> None:
+        super().__init__(progress)
+        self.order = range(self.rows.shape[1])
+        self._states = self._before.states
         self._offered: list[Any] = []
 
     def offers(self, s: int) -> Offers:
         """What the measurements of sensor s may mean."""
-        z, sensor = self._scan.measurements[s], self._sensors[s]
-        pairs = track_pairs(self._filter, self._states, z, sensor, self._gates[s])
-        begun, fit, positions, score = self._new_tracks.singles(s, z)
+        settings, time = self._progress.settings, self._progress.scan.time
+        z, sensor, terms = self._progress.scan.measurements[s], settings.sensors[s], settings.terms
+        gate = gate_of(sensor, settings.gate_probability)
+        pairs = track_pairs(settings.filter, self._states, z, sensor, gate)
+        begun, fit, positions, score = settings.births.singles(s, z)
         self._offered = [self._states, pairs.states, begun]
-        births = Births(_single(np.flatnonzero(fit), s, self.rows.shape[1]), score, np.lexsort(positions.T))
-        missed = np.full(len(self.rows), self._terms.miss[s])
-        return Offers(missed, pairs.track, pairs.measurement, pairs.log_likelihood + self._terms.detection[s], births)
+        numbers = np.flatnonzero(fit)
+        births = self._births(numbers, s, np.lexsort(positions.T), np.full(len(numbers), time), score)
+        missed, gain = np.full(len(self.rows), terms.miss[s]), pairs.log_likelihood + terms.detection[s]
+        return Offers(missed, pairs.track, pairs.measurement, gain, np.full(len(gain), time), births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         self._states = concatenate(self._offered)[kept]
 
-    def take_crossings(self, births: Births, states: Any, kept: Array, new_ids: Array) -> None:
-        """Go on with these rows of the branches and new targets that several sensors together tell of."""
+    def crossings(self, taken: Array) -> Offers | None:
+        """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone."""
+        scan = self._progress.scan
+        free = [np.isin(np.arange(1, size + 1), taken[:, s], invert=True) for s, size in enumerate(scan.sizes.tolist())]
+        found = self._progress.settings.births.crossings(scan, free)
+        if found is None:
+            return None
+        # by far the most are ghosts
+        best = np.argsort(-found.scores, kind="stable")[:_MOST_CROSSINGS]
+        ids = np.empty(len(best), dtype=np.int64)
+        ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
+        births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
+        self._offered = [self._states, found.states[best]]
         nothing = np.zeros(0, dtype=np.int64)
-        self._offered = [self._states, states]
-        self.take(0, Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), births), kept, new_ids)
+        return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
-    def finished(self) -> tuple[TrackBatch, Array]:
-        """The branches at the end of the scan, and which were looked at: all."""
-        seen = np.where(self.rows.any(axis=1), self._scan.time, np.nan)
-        return self._batch(self._states, seen, seen), np.ones(len(seen), dtype=np.bool_)
+    def finished(self) -> Grown:
+        """The branches at the end of the scan; all were looked at."""
+        seen = np.where(self.rows.any(axis=1), self._progress.scan.time, np.nan)
+        return Grown(self._states, seen, seen, np.ones(len(seen), dtype=np.bool_))
 
 
 class InOrder(Growth):
-    """Measurements have times of their own, or sensors looked at sectors: each branch is filtered in their order.
+    """Measurements have times of their own, or sensors looked at sectors: each branch is filtered in their order."""
 
-    Parameters
-    ----------
-    batch : TrackBatch
-    timed : TimedScan
-    terms : ScoreTerms
-    """
-
-    def __init__(self, batch: TrackBatch, timed: TimedScan, terms: ScoreTerms) -> None:
-        super().__init__(batch, len(timed.sensors))
-        self.order, self._timed, self._terms = timed.order, timed, terms
+    def __init__(self, progress: Progress, timed: TimedScan) -> None:
+        super().__init__(progress)
+        self.order, self._timed = timed.order, timed
         self._looked = timed.looked()
         # the sensors that have been taken in: only they can have missed a branch
         self._past = np.zeros_like(self._looked)
         self._anchor, self._done = self.origin, list[int]()
+        self._gained, self._total = np.zeros(len(self.origin)), np.zeros(0)
 
     def offers(self, s: int) -> Offers:
         """What the measurements of sensor s may mean, each at its time among those of the sensors before."""
-        timed, terms, past = self._timed, self._terms, self._past
+        timed, terms, past = self._timed, self._progress.settings.terms, self._past
         past[:, s] = self._looked[:, s]
         grown = timed.grown(s, self._done, self._anchor, self.origin, self.rows)
-        total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
+        self._total = -score_costs(timed, grown.followed, grown.rows, terms, past[self._anchor[grown.parent]])
         self._own = np.flatnonzero(timed.places.fit[s])
-        anchor = timed.offsets[s] + self._own
+        anchor, when = timed.offsets[s] + self._own, timed.times[s][self._own]
         score = timed.places.births[s][self._own] + past[anchor] @ terms.miss - terms.miss[s]
-        turn = np.lexsort((*timed.places.positions[s][self._own].T, timed.times[s][self._own]))
-        births = Births(_single(self._own, s, self.rows.shape[1]), score, turn)
+        turn = np.lexsort((*timed.places.positions[s][self._own].T, when))
+        births = self._births(self._own, s, turn, when, score)
         missed = self._looked[self._anchor, s] * terms.miss[s]
-        return Offers(missed, grown.parent, grown.measurement, total - self._gained[grown.parent], births)
+        gain = self._total - self._gained[grown.parent]
+        return Offers(missed, grown.parent, grown.measurement, gain, grown.followed.when, births)
 
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         anchor = self._anchor
         self._anchor = np.concatenate([anchor, anchor[offers.branch], self._timed.offsets[s] + self._own])[kept]
+        self._gained = np.concatenate([self._gained + offers.missed, self._total, offers.births.score])[kept]
         self._done.append(s)
 
-    def finished(self) -> tuple[TrackBatch, Array]:
-        """The branches at the end of the scan, and which of them a sensor looked at."""
+    def finished(self) -> Grown:
+        """The branches at the end of the scan."""
         followed = self._timed.follow(self.origin, self.rows)
-        seen = self.rows.any(axis=1)
-        last = np.where(seen, followed.when, np.nan)
-        batch = self._batch(self._timed.at_end(followed, self.origin), followed.first, last)
-        return batch, np.asarray(self._looked[self._anchor].any(axis=1))
+        last = np.where(self.rows.any(axis=1), followed.when, np.nan)
+        looked = np.asarray(self._looked[self._anchor].any(axis=1))
+        return Grown(self._timed.at_end(followed, self.origin), followed.first, last, looked)
 
 
-def _single(numbers: Array, s: int, sensors: int) -> Array:
-    """Rows of single measurements (0-based numbers) of sensor s."""
-    rows = np.zeros((len(numbers), sensors), dtype=np.int32)
-    rows[:, s] = numbers + 1
-    return rows
+def growth_of(progress: Progress, timed: TimedScan | None) -> AtOnce | InOrder:
+    """The branches before the scan's first sensor."""
+    return AtOnce(progress) if timed is None else InOrder(progress, timed)

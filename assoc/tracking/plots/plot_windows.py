@@ -57,6 +57,6 @@ def step_windows(tracker: Tracker, windows: Iterable[PlotWindow], *, stamps: boo
             times = np.maximum(times, early)
         end = float(times[-1]) if len(times) else float(early or 0.0)
         known = None
-        if tracker.identities is not None:
+        if tracker.settings.identity is not None:
             known = [np.stack([window.identities, window.addresses], axis=1)]
         yield tracker.step(end, [window.measurements], [times] if stamps else None, identities=known)

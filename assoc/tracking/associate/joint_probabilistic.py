@@ -12,7 +12,8 @@ of its existence, which the events update as well.
 
 Where measurements have times of their own, a track is not merged after each sensor but at the end of the scan: until
 then it is several parts, each with measurements of its own, filtered in the order of their times
-(`assoc.tracking.track_parts`). The pair of a track and a measurement then weighs by the density averaged over parts.
+(`assoc.tracking.associate.track_parts`). The pair of a track and a measurement then weighs by the density averaged over
+parts.
 
 References
 ----------
@@ -24,23 +25,27 @@ Systems 40, 2004.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from assoc._system.door import doors
+from assoc._parameters import is_whole
 from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
 from assoc.costs.tracks.tuples import TrackPairs, gate_of, track_pairs
 from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
-from assoc.scene.scan import Scan
-from assoc.tracking.nursing import NursingTracker
-from assoc.tracking.track import Step, decision
+from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import TrackerState
+from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
-from assoc.tracking.track_parts import ScoredPairs, TrackParts
 
 _SURE = 30.0
 """Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
@@ -82,99 +87,84 @@ class _Update(NamedTuple):
         return np.maximum(self.detected + self.missed, 1e-300)
 
 
-@doors
-class JointProbabilisticTracker(NursingTracker):
-    """Joint integrated probabilistic data association, with certified probabilities.
+@dataclass(frozen=True)
+class JointProbabilistic(Method):
+    """Settings of `assoc.tracking.JointProbabilisticTracker`, and what it does with a scan.
 
-    Parameters
-    ----------
-    sensors, filter, ...
-        As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
-    max_events : int
-        Joint events, as far as they are summed, that are kept apart at a time in a cluster of tracks and measurements.
-        Where a cluster would need more, its least likely pairs are left out: more make the intervals narrower.
-    **options
-        As for `Tracker`.
-
-    Attributes
-    ----------
-    probabilities : tuple over sensors of PairProbabilities
-        Of the last step.
+    Its own part of a state are the probabilities of the last scan, `PairProbabilities` of each sensor.
     """
 
-    name = "joint-probabilistic"
+    max_events: int = 4096
 
-    def __init__(self, *arguments: Any, max_events: int = 4096, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)) or max_events < 1:
-            raise InvalidInputError(f"max_events must be a whole number above 0, got {max_events!r}")
-        self.max_events = int(max_events)
-        self.probabilities: tuple[PairProbabilities, ...] = ()
+    def __post_init__(self) -> None:
+        if not is_whole(self.max_events, 1):
+            raise InvalidInputError(f"max_events must be a whole number above 0, got {self.max_events!r}")
+
+    def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> tuple[PairProbabilities, ...]:
+        """No probabilities."""
         # refuse a filter that cannot merge now, not in the first scan
-        merged(self._batch.states, np.zeros(0, dtype=np.int64), np.zeros(0), 0)
+        merged(tracks.states[:0], np.zeros(0, dtype=np.int64), np.zeros(0), 0)
+        return ()
 
-    def _decide(self, scan: Scan) -> Step:
-        batch, assigned, found = self._at_once(scan) if scan.at_once else self._in_order(scan)
-        batch = batch.confirm(self.life_cycle)
-        now = decision(self._scan, scan.time, assigned, batch.track_id[batch.confirmed])
-        gone = self._to_delete(batch, scan.time)
-        self._batch, self.probabilities = batch[~gone], tuple(found)
-        ended = np.sort(batch.track_id[gone & batch.confirmed])
-        return Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
+    def arrays(self, own: Any) -> Mapping[str, Array]:
+        """Nothing: no scan depends on them."""
+        return {}
 
-    def _detected(self, step: Step) -> Array:
-        ids = self._batch.track_id[:, None]
-        shares = [(ids == one.track_id) @ one.probability for one in self.probabilities]
+    def detected(self, state: TrackerState, step: Step) -> Array:
+        """Probability with which each sensor has detected each track, (T, S)."""
+        ids = state.tracks.track_id[:, None]
+        shares = [(ids == one.track_id) @ one.probability for one in state.own]
         return np.minimum(np.stack(shares, axis=1), 1.0)
 
-    def _at_once(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
-        """Take in a scan of one instant: tracks, each measurement's track, and probabilities of each sensor."""
-        time, batch = scan.time, self._predicted(self._batch, self._elapsed(scan.time))
-        seen = np.zeros(len(batch), dtype=np.bool_)
+    def at_once(self, progress: Progress) -> Association:
+        """Take in sensor after sensor; what is rather no track's starts tracks."""
+        settings, time, tracks = progress.settings, progress.scan.time, progress.state.tracks
+        terms = settings.terms
+        seen = np.zeros(len(tracks), dtype=np.bool_)
         assigned, found = [], []
-        for s, (z, sensor) in enumerate(zip(scan.measurements, self.sensors, strict=True)):
-            pairs = track_pairs(self.filter, batch.states, z, sensor, gate_of(sensor, self.gate_probability))
-            missed = np.full(len(batch), self.terms.miss[s])
-            scored = ScoredPairs(pairs.track, pairs.measurement, self.terms.detection[s] + pairs.log_likelihood)
-            known, update = self._probabilities(batch.track_id, batch.existence, missed, scored, len(z))
-            batch, hit = self._take_in(batch, pairs, known.probability, update, time)
-            ids, taken = self._owners(known, len(z))
+        for s, (z, sensor) in enumerate(zip(progress.scan.measurements, settings.sensors, strict=True)):
+            gate = gate_of(sensor, settings.gate_probability)
+            pairs = track_pairs(settings.filter, tracks.states, z, sensor, gate)
+            missed = np.full(len(tracks), terms.miss[s])
+            scored = ScoredPairs(pairs.track, pairs.measurement, terms.detection[s] + pairs.log_likelihood)
+            known, update = self._probabilities(tracks.track_id, tracks.existence, missed, scored, len(z))
+            tracks, hit = _take_in(tracks, pairs, known.probability, update, time)
+            ids, taken = _owners(known, len(z))
             free = np.flatnonzero(taken < 0.5)
-            states, fit, positions, score = self._new_tracks.singles(s, z[free])
+            states, fit, positions, score = settings.births.singles(s, z[free])
             free = free[fit]
             order = np.lexsort(positions.T)
             score = np.clip(score + np.log1p(-taken[free]), -_SURE, _SURE)
-            ids[free[order]] = new = self._new_ids(len(free))
-            batch = TrackBatch.concatenate([batch, TrackBatch.new(states[order], new, score[order], time)])
+            ids[free[order]] = new = progress.work.new_ids(len(free))
+            tracks = TrackBatch.concatenate([tracks, TrackBatch.new(states[order], new, score[order], time)])
             seen = np.concatenate([seen | hit, np.ones(len(free), dtype=np.bool_)])
             found.append(known)
             assigned.append(ids)
-        return batch.counted(seen), assigned, found
+        return Association(tracks.counted(seen), assigned, tuple(found))
 
-    def _in_order(self, scan: Scan) -> tuple[TrackBatch, list[Array], list[PairProbabilities]]:
-        """Take in a scan whose measurements have times of their own; as `_at_once`."""
-        timed, old = self._timed(scan), len(self._batch)
-        looked = timed.looked()
+    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
+        """The same where measurements have times of their own."""
+        terms, tracks, looked = progress.settings.terms, progress.state.tracks, timed.looked()
         # the sensors that have been taken in: only they can have missed a track
-        past = np.zeros_like(looked)
-        parts = TrackParts.of_tracks(old, len(self.sensors))
-        track_id, odds = self._batch.track_id, self._batch.existence
+        past, old, sensors = np.zeros_like(looked), len(tracks), range(looked.shape[1])
+        parts = TrackParts.of_tracks(old, len(sensors))
+        track_id, odds = tracks.track_id, tracks.existence
         seen, anchor = np.zeros(old, dtype=np.bool_), np.arange(old)
         assigned, found, done = {}, {}, list[int]()
         for s in timed.order:
             past[:, s] = looked[:, s]
-            grown = parts.grown(timed, s, done, self.terms, past)
-            missed = looked[anchor, s] * self.terms.miss[s]
+            grown = parts.grown(timed, s, done, terms, past)
+            missed = looked[anchor, s] * terms.miss[s]
             count = len(timed.times[s])
             known, update = self._probabilities(track_id, odds, missed, grown.pairs, count)
             of_pair = known.probability / update.after[grown.pairs.track]
             parts = parts.after(grown, of_pair, update.missed / update.after, missed)
-            ids, taken = self._owners(known, count)
+            ids, taken = _owners(known, count)
             own = np.flatnonzero((taken < 0.5) & timed.places.fit[s])
             own = own[np.lexsort((*timed.places.positions[s][own].T, timed.times[s][own]))]
             first = timed.offsets[s] + own
-            begun = timed.places.births[s][own] + past[first] @ self.terms.miss - self.terms.miss[s]
-            ids[own] = self._new_ids(len(own))
+            begun = timed.places.births[s][own] + past[first] @ terms.miss - terms.miss[s]
+            ids[own] = progress.work.new_ids(len(own))
             parts = parts.begun(len(odds), first, s, own, begun)
             anchor, track_id = np.append(anchor, first), np.append(track_id, ids[own])
             odds = np.append(update.odds, np.clip(begun + np.log1p(-taken[own]), -_SURE, _SURE))
@@ -185,11 +175,10 @@ class JointProbabilisticTracker(NursingTracker):
         when = np.where(seen, when, np.nan)
         new = TrackBatch.new(states[old:], track_id[old:], odds[old:], when[old:])
         new.numbers[:, STARTED] = started[old:]
-        known_before = self._batch.scored(states[:old], odds[:old] - self._batch.existence, when[:old])
+        known_before = tracks.scored(states[:old], odds[:old] - tracks.existence, when[:old])
         at_all = np.concatenate([looked[:old].any(axis=1), np.ones(len(new), dtype=np.bool_)])
         batch = TrackBatch.concatenate([known_before, new]).counted(seen, at_all)
-        sensors = range(len(self.sensors))
-        return batch, [assigned[s] for s in sensors], [found[s] for s in sensors]
+        return Association(batch, [assigned[s] for s in sensors], tuple(found[s] for s in sensors))
 
     def _probabilities(
         self, track_id: Array, existence: Array, missed: Array, pairs: ScoredPairs, count: int
@@ -217,26 +206,24 @@ class JointProbabilisticTracker(NursingTracker):
         update = _Update(detected, there, np.clip(odds, -_SURE, _SURE))
         return PairProbabilities(track_id[track], measurement, *known), update
 
-    def _take_in(
-        self, batch: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
-    ) -> tuple[TrackBatch, Array]:
-        """Tracks after a sensor's scan, and which of them were rather detected than not."""
-        count = len(batch)
-        if not count:
-            return batch, np.zeros(0, dtype=np.bool_)
-        target = np.concatenate([pairs.track, np.arange(count)])
-        weights = np.concatenate([share, update.missed]) / update.after[target]
-        states = merged(concatenate([pairs.states, batch.states]), target, weights, count)
-        hit = update.detected > 0.5
-        return batch.scored(states, update.odds - batch.existence, np.where(hit, time, np.nan)), hit
 
-    @staticmethod
-    def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
-        """The track that each measurement belongs to rather than not, 0 for none, and how surely it is some track's."""
-        ids = np.zeros(count, dtype=np.int64)
-        likely = pairs.probability > 0.5
-        ids[pairs.measurement[likely]] = pairs.track_id[likely]
-        return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
+def _take_in(
+    tracks: TrackBatch, pairs: TrackPairs, share: Array, update: _Update, time: float
+) -> tuple[TrackBatch, Array]:
+    """Tracks after a sensor's scan, and which of them were rather detected than not."""
+    count = len(tracks)
+    if not count:
+        return tracks, np.zeros(0, dtype=np.bool_)
+    target = np.concatenate([pairs.track, np.arange(count)])
+    weights = np.concatenate([share, update.missed]) / update.after[target]
+    states = merged(concatenate([pairs.states, tracks.states]), target, weights, count)
+    hit = update.detected > 0.5
+    return tracks.scored(states, update.odds - tracks.existence, np.where(hit, time, np.nan)), hit
 
-    def _settings(self) -> dict[str, str]:
-        return super()._settings() | {"max_events": repr(self.max_events)}
+
+def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
+    """The track that each measurement belongs to rather than not, 0 for none, and how surely it is some track's."""
+    ids = np.zeros(count, dtype=np.int64)
+    likely = pairs.probability > 0.5
+    ids[pairs.measurement[likely]] = pairs.track_id[likely]
+    return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)

@@ -12,7 +12,7 @@ from assoc._files.npz import save_npz
 from assoc.errors import AssocError, InvalidInputError
 from assoc.filters import ConstantVelocity, CoordinatedTurn, EnsembleKalmanFilter, FuzzyAdaptiveEKF, tuned_data
 from assoc.tracking import TRACKERS
-from assoc.tracking.checkpoint import FORMAT, VERSION
+from assoc.tracking.file import FORMAT, VERSION, file_arrays
 from assoc.tracking.filter_choice import two_speeds
 from tests.reliability.mutations import MARKER, spoil
 from tests.sizes import few_or_all, sample
@@ -28,6 +28,10 @@ def saved(kind, path, filter_=None):
         tracker.step(scan.time, scan.measurements)
     tracker.save(path)
     return tracker
+
+
+def arrays_of(tracker):
+    return file_arrays(tracker.settings, tracker.state)
 
 
 def step(tracker):
@@ -73,13 +77,13 @@ LIES = {
     "scan": lambda a: a.update(scan=np.array(-1)),
     "pace": lambda a: a.update(pace=np.array(np.inf)),
     "next_id": lambda a: a.update(next_id=np.array(0)),
-    "bank.score": lambda a: a["bank.score"].__setitem__(0, np.nan),
-    "bank.hits": lambda a: a.update({"bank.hits": a["bank.hits"][:-1]}),
-    "bank.missed": lambda a: a["bank.missed"].__setitem__(0, -3),
-    "bank.track_id": lambda a: a["bank.track_id"].__setitem__(0, 0),
-    "bank.state.weights": lambda a: a["bank.state.weights"].__setitem__(0, [-1.0, 2.0]),
-    "bank.state.means": lambda a: a.update({"bank.state.means": a["bank.state.means"][:, :, :3]}),
-    "bank.state.covariances": lambda a: a["bank.state.covariances"].__setitem__(0, np.inf),
+    "tracks.score": lambda a: a["tracks.score"].__setitem__(0, np.nan),
+    "tracks.hits": lambda a: a.update({"tracks.hits": a["tracks.hits"][:-1]}),
+    "tracks.missed": lambda a: a["tracks.missed"].__setitem__(0, -3),
+    "tracks.track_id": lambda a: a["tracks.track_id"].__setitem__(0, 0),
+    "tracks.state.weights": lambda a: a["tracks.state.weights"].__setitem__(0, [-1.0, 2.0]),
+    "tracks.state.means": lambda a: a.update({"tracks.state.means": a["tracks.state.means"][:, :, :3]}),
+    "tracks.state.covariances": lambda a: a["tracks.state.covariances"].__setitem__(0, np.inf),
 }
 OF_MHT = {
     "history": lambda a: a["history"].__setitem__((0, 0), 999),
@@ -89,7 +93,7 @@ OF_MHT = {
 OF_TREES = {
     "born": lambda a: a["born"].__setitem__(0, 99),
     "chosen": lambda a: a.update(chosen=a["chosen"][1:]),
-    "bank.track_id": lambda a: a.update({"bank.track_id": a["bank.track_id"][::-1].copy()}),
+    "tracks.track_id": lambda a: a.update({"tracks.track_id": a["tracks.track_id"][::-1].copy()}),
 }
 OF_HYPOTHESES = {
     "cluster_hypotheses": lambda a: a["cluster_hypotheses"].__setitem__(0, 0),
@@ -113,7 +117,7 @@ OF_HYPOTHESES = {
 def test_each_lie_is_named(name, lies, tmp_path):
     tracker, path = saved(TRACKERS[name], tmp_path / "good.npz"), tmp_path / "bad.npz"
     for field, lie in lies.items():
-        arrays = {key: np.array(value) for key, value in tracker._arrays().items()}
+        arrays = {key: np.array(value) for key, value in arrays_of(tracker).items()}
         lie(arrays)
         save_npz(path, FORMAT, VERSION, arrays)
         again = TRACKERS[name].for_scene(SCENE)
@@ -145,7 +149,7 @@ def test_the_state_of_a_random_generator(text, tmp_path):
     kind, path = TRACKERS["multi-sensor"], tmp_path / "bad.npz"
     make = lambda: EnsembleKalmanFilter(ConstantVelocity(20.0, kind="continuous"), 20, 1)  # noqa: E731
     tracker = saved(kind, path, make())
-    save_npz(path, FORMAT, VERSION, tracker._arrays() | {"filter_rng": np.array(text)})
+    save_npz(path, FORMAT, VERSION, arrays_of(tracker) | {"filter_rng": np.array(text)})
     again = kind.for_scene(SCENE, make())
     if not text:
         again.restore(path)
@@ -158,7 +162,7 @@ def test_the_state_of_a_random_generator(text, tmp_path):
 def test_settings_that_cannot_be_read(settings, tmp_path):
     kind, path = TRACKERS["multi-sensor"], tmp_path / "bad.npz"
     tracker = saved(kind, path)
-    save_npz(path, FORMAT, VERSION, tracker._arrays() | {"settings": np.array(settings)})
+    save_npz(path, FORMAT, VERSION, arrays_of(tracker) | {"settings": np.array(settings)})
     with pytest.raises(InvalidInputError, match="was saved by a tracker with other settings"):
         kind.for_scene(SCENE).restore(path)
 

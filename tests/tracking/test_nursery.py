@@ -10,7 +10,9 @@ from assoc.errors import InvalidInputError
 from assoc.filters import Gaussian
 from assoc.scene import Scan
 from assoc.tracking import TRACKERS, LatePlots
-from assoc.tracking.ghosts import Unseen
+from assoc.tracking.births.ghosts import Unseen
+from assoc.tracking.births.nursery import partners
+from assoc.tracking.progress import Progress, Work
 from assoc.tracking.track import Step
 from tests.sizes import sample
 
@@ -95,10 +97,10 @@ def test_going_back_takes_the_nursery_along(name):
     scene = bearings(1001, 8)
     plain, other = (TRACKERS[name].for_scene(scene) for _ in range(2))
     stepped(other, scene, 0, 3)
-    memory, tracks = other.remember(), [track.mean.tolist() for track in other.tracks]
+    state, tracks = other.state, [track.mean.tolist() for track in other.tracks]
     for last in (4, 7):
         stepped(other, scene, 3, last)
-        other.go_back(memory)
+        other.state = state
         assert [track.mean.tolist() for track in other.tracks] == tracks
     # a step that fails changes nothing either
     with pytest.raises(InvalidInputError):
@@ -186,16 +188,17 @@ def test_partners_of_a_ghost_are_those_that_swapped():
     targets = np.array([[40e3, 70e3, 5e3], [60e3, 50e3, 5e3], [25e3, 30e3, 5e3]])
     tracker = TRACKERS["nearest-neighbour"].for_scene(scene)
     scan = Scan(0, 0.0, tuple(sensor.measure(targets) for sensor in scene.sensors))
+    progress = Progress(tracker.settings, tracker.state, scan, Work(tracker.settings, tracker.state))
     ids = (np.array([58, 67, 47]), np.array([67, 58, 47]), np.array([0, 58, 47]))
     step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
-    assert tracker._partners(scan, step, np.array([67])).tolist() == [58, 67]
+    assert partners(progress, step, np.array([67])).tolist() == [58, 67]
     # where nothing is swapped there is no partner
     ids = (np.array([0, 58, 47]), np.array([67, 58, 47]), np.array([67, 58, 47]))
     step = Step(0, 0.0, ids, tuple(one > 0 for one in ids))
-    assert tracker._partners(scan, step, np.array([67])).tolist() == []
+    assert partners(progress, step, np.array([67])).tolist() == []
 
 
 def test_sensors_that_start_tracks_have_no_nursery():
     scene = simulation.simulate("three-radar", 0, scans=2)
-    assert not any(TRACKERS[name].for_scene(scene).has_nursery for name in NURSING)
-    assert all(TRACKERS[name].for_scene(bearings(0, 2)).has_nursery for name in NURSING)
+    assert not any(TRACKERS[name].for_scene(scene).settings.nursery for name in NURSING)
+    assert all(TRACKERS[name].for_scene(bearings(0, 2)).settings.nursery for name in NURSING)

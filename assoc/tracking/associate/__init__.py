@@ -1,0 +1,1 @@
+"""How a scan is associated with tracks: one file for each tracker."""

@@ -1,0 +1,102 @@
+"""What trackers have in common that associate all sensors of a scan together: tracks and new tracks by their tuples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.build import build_problem
+from assoc.costs.positions import tuple_costs
+from assoc.costs.tracks.own_times import TimedScan, score_costs
+from assoc.problem import AssignmentProblem
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.track import owners
+from assoc.tracking.track_batch import STARTED, TrackBatch
+
+
+def scan_problem(progress: Progress) -> AssignmentProblem:
+    """Which measurements of the scan may be a target, whether there is a track of it or not."""
+    settings = progress.settings
+    return build_problem(
+        settings.place, progress.scan, gate_probability=settings.gate_probability, max_tuples=settings.max_tuples,
+        speed=settings.initiation.speed,
+    )  # fmt: skip
+
+
+def associated(progress: Progress, states: Any, gain: Array, rows: Array, born: Array) -> Association:
+    """What becomes of a scan of one instant.
+
+    Parameters
+    ----------
+    progress : Progress
+        Its T tracks are predicted to the scan.
+    states
+        The tracks' states after it, in their order.
+    gain : array (T,)
+        What their scores gain.
+    rows : int array (T, S)
+        Their measurements, 1-based, 0 missed.
+    born : int array (K, S)
+        Tuples of the measurements that no track took.
+    """
+    tracks = progress.state.tracks.scored(states, gain, np.where(rows.any(axis=1), progress.scan.time, np.nan))
+    return _joined(progress, tracks, rows, _begin(progress, born), None)
+
+
+def associated_in_order(progress: Progress, timed: TimedScan, looked: Array, rows: Array, born: Array) -> Association:
+    """What becomes of a scan with times of its own; `looked` is `TimedScan.looked`, else as `associated`."""
+    track, terms = np.arange(len(rows)), progress.settings.terms
+    followed = timed.follow(track, rows)
+    gain = -score_costs(timed, followed, rows, terms, looked[track])
+    when = np.where(rows.any(axis=1), followed.when, np.nan)
+    tracks = progress.state.tracks.scored(timed.at_end(followed, track), gain, when)
+    return _joined(
+        progress, tracks, rows, _begin_in_order(progress, timed, born), np.asarray(looked[track].any(axis=1))
+    )
+
+
+def _joined(
+    progress: Progress, tracks: TrackBatch, rows: Array, new: tuple[TrackBatch, Array], looked: Array | None
+) -> Association:
+    """Tracks and new tracks, at the end of the scan; which of the tracks any sensor looked at (None: all)."""
+    begun = np.ones(len(new[0]), dtype=np.bool_)
+    looked = None if looked is None else np.concatenate([looked, begun])
+    batch = TrackBatch.concatenate([tracks, new[0]]).counted(np.concatenate([rows.any(axis=1), begun]), looked)
+    return Association(batch, owners(np.concatenate([rows, new[1]]), batch.track_id, progress.scan.sizes))
+
+
+def _begin(progress: Progress, born: Array) -> tuple[TrackBatch, Array]:
+    """New tracks of tuples that tell a position, numbered by place."""
+    settings, scan = progress.settings, progress.scan
+    tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
+    if not len(tuples) or settings.nursery is not None:
+        return progress.state.tracks[:0], tuples[:0]
+    positions, covariances, fit = settings.births.fused(scan, tuples)
+    order = np.flatnonzero(fit)
+    order = order[np.lexsort(positions[order].T)]
+    rows, positions, covariances = tuples[order], positions[order], covariances[order]
+    states = settings.initiation.start(settings.filter, positions, covariances)
+    costs = tuple_costs(settings.place, scan, rows, speed=settings.initiation.speed)
+    score = settings.births.scores(rows, costs, covariances)
+    return TrackBatch.new(states, progress.work.new_ids(len(order)), score, scan.time), rows
+
+
+def _begin_in_order(progress: Progress, timed: TimedScan, born: Array) -> tuple[TrackBatch, Array]:
+    """`_begin` where measurements have times of their own."""
+    settings = progress.settings
+    tuples = np.asarray(born, dtype=np.int32).reshape(-1, len(settings.sensors))
+    fit = [np.append(one, False)[tuples[:, s] - 1] for s, one in enumerate(timed.places.fit)]
+    rows = tuples[np.any(fit, axis=0)]
+    if not len(rows):
+        return progress.state.tracks[:0], rows
+    fresh = np.full(len(rows), -1)
+    followed = timed.follow(fresh, rows)
+    states = timed.at_end(followed, fresh)
+    looked = timed.looked()[timed.anchors(rows, followed.lead)]
+    score = -score_costs(timed, followed, rows, settings.terms, looked)
+    order = np.lexsort(states.mean[:, list(settings.filter.motion.position)].T)
+    batch = TrackBatch.new(states[order], progress.work.new_ids(len(order)), score[order], followed.when[order])
+    batch.numbers[:, STARTED] = followed.first[order]
+    return batch, rows[order]

@@ -1,0 +1,79 @@
+"""What a tracker says of itself: how it associates a scan with its tracks. Everything else is in `assoc.tracking.step`.
+
+A method is a frozen dataclass of the tracker's own settings. Its functions take a step under way and return records;
+they keep nothing. A tracker that decides each scan at once writes `at_once` and `in_order` alone.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
+from assoc.scene.scan import Scan
+from assoc.tracking.file import Saved
+from assoc.tracking.looks import to_delete
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import TrackerState
+from assoc.tracking.track import Decision, Step, decision
+from assoc.tracking.track_batch import TrackBatch
+
+
+@dataclass(frozen=True)
+class Method(ABC):
+    """How a kind of tracker associates."""
+
+    needs_nursery: ClassVar[bool] = True
+    """Whether its tracks begin in a nursery where all sensors measure angles alone."""
+
+    def arranged(self, scan: Scan) -> Scan:
+        """The scan as its measurements are to be numbered inside."""
+        return scan
+
+    @abstractmethod
+    def at_once(self, progress: Progress) -> Association:
+        """Associate a scan of one instant with the tracks of the state, which have been predicted to it."""
+
+    @abstractmethod
+    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
+        """Associate a scan whose measurements have times of their own with the tracks as of the last scan."""
+
+    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+        """Confirm tracks, say what was decided, delete tracks."""
+        settings, scan = progress.settings, progress.scan
+        tracks = found.tracks.confirm(settings.life_cycle)
+        now = decision(scan.index, scan.time, found.assigned, tracks.track_id[tracks.confirmed])
+        gone = to_delete(progress, tracks)
+        ended = np.sort(tracks.track_id[gone & tracks.confirmed])
+        step = Step(now.scan, now.time, now.assigned, now.confirmed, final=(now,), ended=ended)
+        return progress.with_state(tracks=tracks[~gone], own=found.own)._replace(step=step)
+
+    def detected(self, state: TrackerState, step: Step) -> Array:
+        """Probability with which each sensor has detected each track in a step, (T, S)."""
+        return np.stack([np.isin(state.tracks.track_id, one) for one in step.assigned], axis=1).astype(np.float64)
+
+    def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> Any:
+        """The tracker's own part of the state before the first scan, with tracks that are known."""
+        return None
+
+    def current(self, state: TrackerState) -> TrackBatch:
+        """The tracks to hand out."""
+        return state.tracks
+
+    def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
+        """What is said now of the scans that are not final yet, oldest first."""
+        return ()
+
+    def arrays(self, own: Any) -> Mapping[str, Array]:
+        """The tracker's own part of a state as arrays for a file."""
+        return {} if own is None else own._asdict()
+
+    def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Any:
+        """The tracker's own part of a state read from a file, checked; `state` is the rest."""
+        return self.begun(settings, state.tracks)

@@ -1,0 +1,223 @@
+"""Track-oriented multiple hypothesis tracking: a tree of branches for each possible target.
+
+Every measurement may start a tree; every branch grows by each measurement in its gate and by a miss. The best
+global hypothesis takes at most one branch of each tree and each measurement of the window at most once: it is
+an assignment problem over the trees and the sensors of the last N scans, which any solver answers. What it says
+of the oldest scan of the window is then final (N-scan pruning). After each sensor the branches are cut by what
+they cost the best global hypothesis (`assoc.tracking.mht.losses`), not by their tree's own scores: of close targets
+the best branches of one tree may all want measurements that the others need more.
+
+References
+----------
+T. Kurien, Issues in the design of practical multitarget tracking algorithms, in Y. Bar-Shalom (ed.),
+Multitarget-Multisensor Tracking: Advanced Applications, 1990.
+A. Poore, Multidimensional assignment formulation of data association problems arising from multitarget and
+multisensor tracking, Computational Optimization and Applications 3, 1994.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
+from assoc.errors import LimitExceededError
+from assoc.problem import AssignmentProblem
+from assoc.tracking.file import Saved
+from assoc.tracking.looks import to_delete
+from assoc.tracking.mht.branches import Hits, Roots, Tables, count_scan, extend
+from assoc.tracking.mht.growth import AtOnce, Offers, growth_of
+from assoc.tracking.mht.pruning import decide, same_tree
+from assoc.tracking.mht.window import DeferringMethod, Window
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import TrackerState
+from assoc.tracking.track import Decision, Step
+from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
+
+
+class Trees(NamedTuple):
+    """What is known of B branches besides their scores and states."""
+
+    window: Window
+    born: Array
+    """Scan in which each branch's tree began, int64 (B,)."""
+    chosen: Array
+    """Branches of the best global hypothesis, bool (B,)."""
+
+    def of(self, rows: Array) -> Trees:
+        """These branches alone."""
+        return Trees(self.window.of(rows), self.born[rows], self.chosen[rows])
+
+
+@dataclass(frozen=True)
+class TrackTrees(DeferringMethod):
+    """Settings of `assoc.tracking.TrackOrientedMHT`, and what it does with a scan."""
+
+    name: ClassVar[str] = "mht"
+
+    max_branches: int = 30
+    branch_drop: float = 7.0
+
+    def __post_init__(self) -> None:
+        self._check("max_branches", "branch_drop")
+
+    def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> Trees:
+        """Trees of one branch each, all of them in the best hypothesis."""
+        count = len(tracks)
+        window = Window.empty(count, self.depth, len(settings.sensors))
+        return Trees(window, np.full(count, -1), np.ones(count, dtype=np.bool_))
+
+    def current(self, state: TrackerState) -> TrackBatch:
+        """The branches of the best hypothesis, by their ids."""
+        rows = np.flatnonzero(state.own.chosen)
+        return state.tracks[rows[np.argsort(state.tracks.track_id[rows], kind="stable")]]
+
+    def at_once(self, progress: Progress) -> Association:
+        """Grow branches by the measurements in their gates and by misses, start trees, choose the best hypothesis."""
+        return self._grown(progress, None)
+
+    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
+        """`at_once` where measurements have times of their own."""
+        return self._grown(progress, timed)
+
+    def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
+        growth, count = growth_of(progress, timed), len(progress.settings.sensors)
+        tables, chosen = _tables(progress.state, count), progress.state.own.chosen
+        for s in growth.order:
+            offers = growth.offers(s)
+            kept, tables, chosen = self._extended(progress, tables, offers, s)
+            growth.take(s, offers, kept)
+        if isinstance(growth, AtOnce):
+            crossed = growth.crossings(tables.history[chosen & (tables.counts[:, SURE] > 0), :count])
+            if crossed is not None:
+                kept, tables, chosen = self._extended(progress, tables, crossed, 0)
+                growth.take(0, crossed, kept)
+        grown = growth.finished()
+        if timed is not None:
+            new = np.flatnonzero(growth.origin < 0)
+            tables.numbers[new, STARTED] = grown.first[new]
+        count_scan(tables.counts, tables.history, count, grown.looked)
+        tracks = TrackBatch(grown.states, tables.numbers, tables.counts)
+        if progress.settings.solver != "exact" or progress.settings.solver_parameters:
+            other = _solved(progress, tracks.track_id, tracks.score, tables.history)
+            if tracks.score[other].sum() >= tracks.score[chosen].sum():
+                chosen = other
+        window = progress.state.own.window.opened(progress.scan, tables.history)
+        return Association(tracks, (), Trees(window, tables.born, chosen))
+
+    def _extended(self, progress: Progress, tables: Tables, offers: Offers, s: int) -> tuple[Array, Tables, Array]:
+        scan, most = progress.state.scan, progress.settings.max_tuples
+        hits = Hits(offers.branch, offers.measurement, offers.gain, offers.when)
+
+        def solve(tree: Array, score: Array, history: Array) -> Array:
+            return _solved(progress, tree, score, history)
+
+        limits = self.max_branches, self.branch_drop
+        done = extend(tables, offers.missed, hits, Roots(*offers.births), s, scan, *limits, solve)
+        if len(done[0]) > most:
+            raise LimitExceededError(
+                f"scan {scan}: {len(done[0])} branches, more than max_tuples = {most}; "
+                "lower gate_probability, depth or max_branches, or raise max_tuples"
+            )
+        return done
+
+    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+        """Confirm trees, decide the oldest scan of the window, delete branches that contradict it, and tracks."""
+        tracks, own, scan = found.tracks, found.own, progress.state.scan
+        new = own.chosen & ~tracks.confirmed
+        new &= progress.settings.life_cycle.confirms(tracks.score, tracks.detections)
+        if new.any():
+            tracks = tracks.with_confirmed(tracks.confirmed | same_tree(tracks.track_id.copy(), new))
+        now = own.window.decision(0, scan, tracks, np.flatnonzero(own.chosen))
+        final: tuple[Decision, ...] = ()
+        stay = ~to_delete(progress, tracks)
+        if len(own.window.times) == self.depth:
+            kept, speakers = self._decided(tracks, own, scan)
+            final = (own.window.decision(self.depth - 1, scan, tracks, speakers),)
+            own = own._replace(window=own.window.closed())
+            stay &= kept
+        ids, lost = tracks.track_id.copy(), np.zeros(0, dtype=np.int64)
+        if not stay.all():
+            lost = np.unique(ids[tracks.confirmed & ~same_tree(ids, stay)])
+            tracks, own = tracks[stay], own.of(stay)
+        step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=lost)
+        return progress.with_state(tracks=tracks, own=own)._replace(step=step)
+
+    def _decided(self, tracks: TrackBatch, own: Trees, scan: int) -> tuple[Array, Array]:
+        """Branches that do not contradict what is decided of the oldest scan, and those that decide it."""
+        sizes = own.window.sizes[-1]
+        oldest = np.ascontiguousarray(own.window.history[:, -sizes.size :])
+        old = own.born <= scan - self.depth + 1
+        return decide(tracks.track_id.copy(), tracks.score.copy(), own.chosen, old, oldest, sizes)
+
+    @staticmethod
+    def hand_over(state: TrackerState, age: int) -> tuple[TrackerState, TrackBatch]:
+        """Give away confirmed tracks, as the best hypothesis knows them; branches that contradict them go, too.
+
+        Parameters
+        ----------
+        state : TrackerState
+        age : int
+            Scans since a track began after which it is given away.
+
+        Returns
+        -------
+        state, tracks
+            Without these tracks; and the tracks, at the time of the last scan.
+        """
+        tracks, own = state.tracks, state.own
+        grown = own.chosen & tracks.confirmed & (own.born <= state.scan - age)
+        stay = ~np.isin(tracks.track_id, tracks.track_id[grown])
+        for row in own.window.history[grown]:
+            stay &= ~((own.window.history == row) & (row > 0)).any(axis=1)
+        return state._replace(tracks=tracks[stay], own=own.of(stay)), tracks[grown]
+
+    def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
+        """What the best hypothesis says of the scans that are not final yet, oldest first."""
+        return state.own.window.decisions(state.scan - 1, state.tracks, np.flatnonzero(state.own.chosen))
+
+    def arrays(self, own: Trees) -> Mapping[str, Array]:
+        """The trees for a file."""
+        return {**own.window.arrays(), "born": own.born, "chosen": own.chosen}
+
+    def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Trees:
+        """The trees that a file holds, checked."""
+        ids, born, chosen = state.tracks.track_id, saved["born"], saved["chosen"]
+        window = Window.restored(saved, len(ids), self.depth, len(settings.sensors))
+        saved.require((np.diff(ids) >= 0).all(), "tracks.track_id", "the branches of one tree side by side")
+        saved.require(born.shape == ids.shape and (born <= state.scan).all(), "born", "a scan for each branch")
+        saved.require(chosen.shape == ids.shape, "chosen", "a mark for each branch")
+        return Trees(window, born, chosen)
+
+
+def _tables(state: TrackerState, sensors: int) -> Tables:
+    """The branches, with room for this scan in their histories."""
+    before = state.own.window.history
+    history = np.zeros_like(before)
+    history[:, sensors:] = before[:, : before.shape[1] - sensors]
+    return Tables(state.tracks.numbers, state.tracks.counts, history, state.own.born)
+
+
+def _solved(progress: Progress, tree: Array, score: Array, history: Array) -> Array:
+    """Branches of the best global hypothesis by the tracker's solver, as a mask."""
+    chosen = np.zeros(len(score), dtype=np.bool_)
+    # a branch of no positive score is better left to false alarms
+    rows = np.flatnonzero(score > 0)
+    if not len(rows):
+        return chosen
+    # of each list only what some branch uses takes part
+    tuples = np.empty((len(rows), 1 + history.shape[1]), dtype=np.int64)
+    trees, numbers = np.unique(tree[rows], return_inverse=True)
+    tuples[:, 0], sizes = numbers + 1, [len(trees)]
+    for c, column in enumerate(history[rows].T):
+        used = np.unique(column[column > 0])
+        tuples[:, c + 1] = np.where(column > 0, np.searchsorted(used, column) + 1, 0)
+        sizes.append(len(used))
+    solution = progress.work.assign(AssignmentProblem(tuples, -score[rows], sizes))
+    chosen[rows[solution.indices[solution.indices < len(rows)]]] = True
+    return chosen

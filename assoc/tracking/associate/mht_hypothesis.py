@@ -1,0 +1,263 @@
+"""Hypothesis-oriented multiple hypothesis tracking: Reid's clusters and generation, Murty's m best, n-scan pruning.
+
+A hypothesis says of every measurement so far: false alarm, one of the existing targets, or a new target. Its
+probability is equation 2.1 of the thesis on clustering time windows,
+
+    p = 1/c  P_D^N_d  (1 - P_D)^(N_t - N_d)  P_FA^N_fa  P_NT^N_nt  prod p(z | t)  p_parent,
+
+with N_d the targets that were detected, densities for P_FA and P_NT. Relative to "all false alarms" its
+logarithm is the sum of the scores of the hypothesis' tracks (`assoc.costs.tracks.scores`), so that both forms
+of the tracker count alike. Tracks that contend for no measurement stand in clusters of their own, each with its own m
+best hypotheses (`assoc.tracking.mht.clusters`).
+
+References
+----------
+D. B. Reid, An algorithm for tracking multiple targets, IEEE Trans. Automatic Control 24, 1979.
+I. J. Cox, S. L. Hingorani, An efficient implementation of Reid's multiple hypothesis tracking algorithm,
+IEEE Trans. Pattern Analysis and Machine Intelligence 18, 1996.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
+from assoc.scene.scan import Scan
+from assoc.tracking.file import Saved
+from assoc.tracking.looks import to_delete
+from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
+from assoc.tracking.mht.crossed_births import with_births
+from assoc.tracking.mht.generation import generated
+from assoc.tracking.mht.growth import AtOnce, Grown, Growth, Offers, growth_of
+from assoc.tracking.mht.window import DeferringMethod, Window
+from assoc.tracking.progress import Association, Progress
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import TrackerState
+from assoc.tracking.track import Decision, Step
+from assoc.tracking.track_batch import STARTED, TrackBatch
+
+
+class Hypotheses(NamedTuple):
+    """What is known of B branches besides their scores and states."""
+
+    window: Window
+    clusters: tuple[Cluster, ...]
+    """Their branches are all rows of the tracks, cluster after cluster."""
+
+    @property
+    def best(self) -> Array:
+        """Rows of the best hypothesis."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(one.best for one in self.clusters)])
+
+
+@dataclass(frozen=True)
+class ClusteredHypotheses(DeferringMethod):
+    """Settings of `assoc.tracking.HypothesisOrientedMHT`, and what it does with a scan."""
+
+    max_hypotheses: int = 50
+    hypothesis_drop: float = 15.0
+
+    def __post_init__(self) -> None:
+        self._check("max_hypotheses", "hypothesis_drop")
+
+    def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> Hypotheses:
+        """Each track in a cluster of its own, and certain."""
+        there = np.ones((1, 1), dtype=np.bool_)
+        clusters = tuple(cluster(np.array([row]), there, np.zeros(1)) for row in range(len(tracks)))
+        return Hypotheses(Window.empty(len(tracks), self.depth, len(settings.sensors)), clusters)
+
+    def current(self, state: TrackerState) -> TrackBatch:
+        """The branches of the best hypothesis, by their ids."""
+        rows = state.own.best
+        return state.tracks[rows[np.argsort(state.tracks.track_id[rows], kind="stable")]]
+
+    def probabilities(self, own: Hypotheses) -> Array:
+        """Probabilities of the best hypotheses about everything, the best first."""
+        logarithms = np.zeros(1)
+        for one in own.clusters:
+            both = (logarithms[:, None] + np.log(one.probabilities)).ravel()
+            logarithms = -np.sort(-both)[: self.max_hypotheses]
+        return np.exp(logarithms)
+
+    def arranged(self, scan: Scan) -> Scan:
+        """The scan with its measurements by value: of hypotheses of equal weight those of lower numbers are kept."""
+        return _by_value(scan, _orders(scan))
+
+    def at_once(self, progress: Progress) -> Association:
+        """Generate the hypotheses about the scan, sensor by sensor."""
+        return self._grown(progress, None)
+
+    def in_order(self, progress: Progress, timed: TimedScan) -> Association:
+        """`at_once` where measurements have times of their own."""
+        return self._grown(progress, timed)
+
+    def _grown(self, progress: Progress, timed: TimedScan | None) -> Association:
+        tracks, own = progress.state.tracks, progress.state.own
+        orders = _orders(progress.scan)
+        growth = growth_of(progress._replace(scan=_by_value(progress.scan, orders)), timed)
+        clusters = list(own.clusters)
+        ids, gained = tracks.track_id, np.zeros(len(tracks))
+        limits = self.max_hypotheses, self.hypothesis_drop
+
+        def taken(s: int, offers: Offers, grown: Iterable[Cluster]) -> None:
+            nonlocal clusters, ids, gained
+            clusters, kept = _renumbered(grown)
+            ids = np.concatenate([ids, ids[offers.branch], offers.births.ids])[kept]
+            hit = gained[offers.branch] + offers.gain
+            gained = np.concatenate([gained + offers.missed, hit, offers.births.score])[kept]
+            growth.take(s, offers, kept)
+
+        for s in growth.order:
+            offers = growth.offers(s)
+            born, count = offers.births.rows[:, s] - 1, len(progress.scan.measurements[s])
+            taken(s, offers, generated(clusters, offers, born, count, *limits))
+        if isinstance(growth, AtOnce):
+            rows = Hypotheses(own.window, tuple(clusters)).best
+            sure = np.append(tracks.confirmed, False)[growth.origin[rows]]
+            crossed = growth.crossings(growth.rows[rows[sure]])
+            if crossed is not None:
+                taken(0, crossed, with_births(clusters, growth.rows, crossed.births, progress.scan.sizes, *limits))
+        grown = growth.finished()
+        batch = _batch(tracks, growth, grown, ids, gained)
+        batch = batch.counted(np.asarray(growth.rows.any(axis=1)), grown.looked)
+        older = np.concatenate([own.window.history, np.zeros((1, own.window.history.shape[1]), dtype=np.int32)])
+        older = older[growth.origin]
+        given = [np.append(0, order + 1) for order in orders]
+        rows = np.stack([one[growth.rows[:, s]] for s, one in enumerate(given)], axis=1).astype(np.int32)
+        history = np.concatenate([rows, older], axis=1)[:, : older.shape[1]]
+        return Association(batch, (), Hypotheses(own.window.opened(progress.scan, history), tuple(clusters)))
+
+    def life_cycle(self, progress: Progress, found: Association) -> Progress:
+        """Confirm tracks, decide the oldest scan of the window, delete tracks, let clusters fall apart."""
+        before, scan = progress.state.tracks, progress.state.scan
+        tracks, own = found.tracks, found.own
+        known = before.track_id[before.confirmed]
+        good = own.best[tracks.confirm(progress.settings.life_cycle).confirmed[own.best]]
+        tracks = tracks.with_confirmed(tracks.confirmed | np.isin(tracks.track_id, tracks.track_id[good]))
+        now = own.window.decision(0, scan, tracks, own.best)
+        known = np.union1d(known, tracks.track_id[tracks.confirmed])
+        final: tuple[Decision, ...] = ()
+        if len(own.window.times) == self.depth:
+            tracks, own = _kept(tracks, own, _agreeing(tracks, own))
+            final = (own.window.decision(self.depth - 1, scan, tracks, own.best),)
+            own = own._replace(window=own.window.closed())
+        # a track is deleted where all its branches say so
+        ids = tracks.track_id
+        gone = ~np.isin(ids, ids[~to_delete(progress, tracks)])
+        if gone.any():
+            left = [one for one in own.clusters if not gone[one.branches].all()]
+            tracks, own = _kept(tracks, own, [without(one, gone[one.branches]) for one in left])
+        tracks, own = _kept(tracks, own, _split(tracks, own))
+        ended = np.setdiff1d(known, tracks.track_id)
+        step = Step(now.scan, now.time, now.assigned, now.confirmed, final=final, ended=ended)
+        return progress.with_state(tracks=tracks, own=own)._replace(step=step)
+
+    def open_decisions(self, state: TrackerState) -> tuple[Decision, ...]:
+        """What the best hypothesis says of the scans that are not final yet, oldest first."""
+        return state.own.window.decisions(state.scan - 1, state.tracks, state.own.best)
+
+    def arrays(self, own: Hypotheses) -> Mapping[str, Array]:
+        """The hypotheses for a file."""
+        shapes = np.array([one.holds.shape for one in own.clusters], dtype=np.int64).reshape(-1, 2)
+        return {
+            **own.window.arrays(),
+            "cluster_hypotheses": shapes[:, 0],
+            "cluster_branches": shapes[:, 1],
+            "holds": np.concatenate([np.zeros(0, np.bool_), *(one.holds.ravel() for one in own.clusters)]),
+            "weight": np.concatenate([np.zeros(0), *(one.weight for one in own.clusters)]),
+        }
+
+    def restored(self, settings: TrackerSettings, saved: Saved, state: TrackerState) -> Hypotheses:
+        """The hypotheses that a file holds, checked."""
+        count = len(state.tracks)
+        window = Window.restored(saved, count, self.depth, len(settings.sensors))
+        hypotheses, branches = saved["cluster_hypotheses"], saved["cluster_branches"]
+        some = ((hypotheses >= 1) & (hypotheses <= self.max_hypotheses)).all()
+        saved.require(some, "cluster_hypotheses", f"1 to {self.max_hypotheses} hypotheses of each cluster")
+        good = branches.shape == hypotheses.shape and ((branches >= 1) & (branches <= count)).all()
+        good = good and int(branches.sum()) == count
+        saved.require(good, "cluster_branches", "how many branches each cluster has")
+        holds, weight, row = saved["holds"], saved["weight"], 0
+        saved.require(len(holds) == int((hypotheses * branches).sum()), "holds", "which hypothesis holds which branch")
+        weighed = len(weight) == int(hypotheses.sum()) and np.isfinite(weight).all()
+        saved.require(weighed, "weight", "a number for each hypothesis")
+        clusters = []
+        for h, b in zip(hypotheses.tolist(), branches.tolist(), strict=True):
+            clusters.append(Cluster(np.arange(row, row + b), holds[: h * b].reshape(h, b), weight[:h]))
+            weight, holds, row = weight[h:], holds[h * b :], row + b
+        return Hypotheses(window, tuple(clusters))
+
+
+def _orders(scan: Scan) -> list[Array]:
+    """The measurements of each sensor by value, and by time."""
+    times = scan.times or [None] * len(scan.measurements)
+    pairs = zip(scan.measurements, times, strict=True)
+    return [np.lexsort((*z.T[::-1], *(() if stamps is None else (stamps,)))) for z, stamps in pairs]
+
+
+def _by_value(scan: Scan, orders: list[Array]) -> Scan:
+    """The scan with its measurements in these orders."""
+
+    def sort(arrays: tuple[Array, ...] | None) -> tuple[Array, ...] | None:
+        return None if arrays is None else tuple(one[order] for one, order in zip(arrays, orders, strict=True))
+
+    measurements = sort(scan.measurements)
+    assert measurements is not None
+    return replace(scan, measurements=measurements, times=sort(scan.times), identities=sort(scan.identities))
+
+
+def _batch(before: TrackBatch, growth: Growth, grown: Grown, ids: Array, gained: Array) -> TrackBatch:
+    """The branches as tracks, with what their scores have gained in the scan."""
+    fresh = growth.origin < 0
+    old, new = np.flatnonzero(~fresh), np.flatnonzero(fresh)
+    known = before[growth.origin[old]].scored(grown.states[old], gained[old], grown.last[old])
+    begun = TrackBatch.new(grown.states[new], ids[new], gained[new], grown.last[new])
+    begun.numbers[:, STARTED] = grown.first[new]
+    return TrackBatch.concatenate([known, begun])[np.argsort(np.concatenate([old, new]), kind="stable")]
+
+
+def _renumbered(clusters: Iterable[Cluster]) -> tuple[list[Cluster], Array]:
+    """Clusters whose branches are new rows, cluster after cluster; and their rows before."""
+    clusters = [one for one in clusters if len(one.branches)]
+    kept = np.concatenate([np.zeros(0, dtype=np.int64), *(one.branches for one in clusters)])
+    rows, end, found = np.arange(len(kept)), 0, []
+    for branches, holds, weight in clusters:
+        begin, end = end, end + len(branches)
+        found.append(Cluster(rows[begin:end], holds, weight))
+    return found, kept
+
+
+def _kept(tracks: TrackBatch, own: Hypotheses, clusters: Iterable[Cluster]) -> tuple[TrackBatch, Hypotheses]:
+    """Go on with these clusters."""
+    found, kept = _renumbered(clusters)
+    return tracks[kept], Hypotheses(own.window.of(kept), tuple(found))
+
+
+def _agreeing(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
+    """Clusters without the hypotheses that disagree with the best one about the oldest scan of the window."""
+    said = own.window.history[:, -own.window.sizes.shape[1] :].astype(np.int64)
+    owner = np.where(said > 0, tracks.track_id[:, None] * (said.max(initial=0) + 1) + said, 0)
+    decided = np.asarray(owner.any(axis=1))
+    return [agreeing(one, owner[one.branches]) if decided[one.branches].any() else one for one in own.clusters]
+
+
+def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
+    """Let clusters fall apart: branches hang together that are of one track or want the same measurement."""
+    count, history = len(tracks), own.window.history
+    ids, track = np.unique(tracks.track_id, return_inverse=True)
+    branch, column = np.nonzero(history)
+    wanted = column * (history.max(initial=0) + np.int64(1)) + history[branch, column]
+    wants, want = np.unique(wanted, return_inverse=True)
+    first, second = np.append(np.arange(count), branch), np.append(count + track, count + len(ids) + want)
+    label = linked(first, second, count + len(ids) + len(wants))
+    found: list[Cluster] = []
+    for one in own.clusters:
+        mine = label[one.branches]
+        together = len(mine) == 1 or bool((mine == mine[0]).all())
+        found += [one] if together else parts(one, mine, tracks.score[one.branches])
+    return found

@@ -1,0 +1,256 @@
+"""A tracker's state as an npz file: written, checked when read, since kernels do not check indices."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from assoc._files.npz import Field, load_npz, save_npz
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Filter
+from assoc.filters.batches import arrays_of
+from assoc.filters.motion.models import LinearMotion, Motion
+from assoc.tracking.births.ghosts import Unseen
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import Nursery, TrackerState
+from assoc.tracking.track_batch import one_state
+
+FORMAT = "assoc.tracker"
+VERSION = 2
+_KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
+
+
+class Saved:
+    """Arrays of a file, those with a prefix by what follows it.
+
+    Parameters
+    ----------
+    arrays : mapping
+    prefix : str
+    """
+
+    def __init__(self, arrays: Mapping[str, Array], prefix: str = "") -> None:
+        self.arrays, self.prefix = arrays, prefix
+
+    def __getitem__(self, name: str) -> Array:
+        return self.arrays[self.prefix + name]
+
+    def require(self, good: object, name: str, expected: str) -> None:
+        """Refuse a field by name."""
+        if not bool(good):
+            what = f"the field {self.prefix + name!r} is not that of a saved tracker"
+            raise InvalidInputError(f"{what}: expected {expected}")
+
+    def part(self, prefix: str) -> Saved:
+        """Those with a longer prefix."""
+        return Saved(self.arrays, self.prefix + prefix)
+
+    def plain(self) -> dict[str, Array]:
+        """All of them by their short names."""
+        return {
+            name.removeprefix(self.prefix): value for name, value in self.arrays.items() if name.startswith(self.prefix)
+        }
+
+
+def save(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> None:
+    """Write a state, whole or not at all."""
+    save_npz(path, FORMAT, VERSION, file_arrays(settings, state))
+
+
+def file_arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
+    """What `save` writes."""
+    return {"settings": np.array(json.dumps(settings_as_text(settings))), **_arrays(settings, state)}
+
+
+def restore(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> TrackerState:
+    """Read a state that a tracker of these settings has saved; `state` is any of its states, for the kinds of arrays.
+
+    Raises
+    ------
+    InvalidInputError
+        The file is not a saved tracker, or damaged, of another version, or of a tracker with other settings.
+    """
+    own = file_arrays(settings, state)
+    spec = {name: Field(_KINDS[value.dtype.kind], value.ndim) for name, value in own.items()}
+    found = load_npz(path, FORMAT, VERSION, {"version": Field("int", 0), "settings": spec["settings"]})
+    if int(found["version"]) != VERSION:
+        raise InvalidInputError(
+            f"{path}: has version {int(found['version'])} of {FORMAT!r}, this program reads version {VERSION} only; "
+            "save the tracker anew"
+        )
+    if str(found["settings"]) != str(own["settings"]):
+        raise InvalidInputError(
+            f"{path}: was saved by a tracker with other settings: "
+            f"{_changed_setting(str(found['settings']), str(own['settings']))}"
+        )
+    arrays = load_npz(path, FORMAT, VERSION, spec)
+    try:
+        return _state(settings, state, Saved(arrays))
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from None
+
+
+def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
+    """A state as arrays by name."""
+    found = {
+        "time": np.array(math.nan if state.time is None else state.time),
+        "scan": np.array(state.scan),
+        "pace": np.array(state.pace),
+        "turns": state.turns,
+        "next_id": np.array(state.next_id),
+        "solver_calls": np.array(state.solver_calls),
+        "filter_rng": np.array("" if state.rng is None else json.dumps(state.rng)),
+        **state.tracks.arrays("tracks."),
+        **settings.method.arrays(state.own),
+    }
+    if state.registration is not None:
+        found |= state.registration.arrays()
+    if state.identities is not None:
+        found |= state.identities.arrays()
+    if settings.nursery is not None and state.nursery is not None:
+        young, unseen = state.nursery
+        found |= {f"nursery.{name}": value for name, value in _arrays(settings.nursery, young).items()}
+        found |= {"unseen_ids": unseen.ids, "unseen": unseen.misses}
+    return found
+
+
+def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> TrackerState:
+    """The state that arrays hold, checked; `model` is any state of these settings."""
+    _check_tracks(settings, saved)
+    tracks = model.tracks.restored(saved.arrays, f"{saved.prefix}tracks.")
+    time, scan, pace = float(saved["time"]), int(saved["scan"]), float(saved["pace"])
+    saved.require(not math.isinf(time), "time", "seconds")
+    saved.require(0 <= scan < 2**62, "scan", "a whole number >= 0")
+    saved.require(math.isfinite(pace) and pace >= 0, "pace", "seconds >= 0")
+    saved.require(int(saved["solver_calls"]) >= 0, "solver_calls", "a whole number >= 0")
+    unknown = math.isnan(time) and (scan > 0 or len(tracks) > 0)
+    saved.require(not unknown, "time", "seconds, since there have been scans or tracks")
+    turns = saved["turns"]
+    good = turns.shape == model.turns.shape and ((turns >= 0) & (turns <= 1 + 1e-6)).all()
+    saved.require(good, "turns", f"{len(model.turns)} shares of a turn")
+    state = model._replace(
+        tracks=tracks, turns=turns, time=None if math.isnan(time) else time, scan=scan, pace=pace,
+        next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
+        rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
+        registration=None if model.registration is None else model.registration.restored(saved.plain()),
+        identities=None if model.identities is None else model.identities.restored(saved.plain()),
+    )  # fmt: skip
+    state = state._replace(own=settings.method.restored(settings, saved, state))
+    if settings.nursery is None or model.nursery is None:
+        return state
+    young = _state(settings.nursery, model.nursery.state, saved.part("nursery."))
+    saved.require(young.time in (None, state.time), "nursery.time", "the tracker's time")
+    ids, misses = saved["unseen_ids"], saved["unseen"]
+    saved.require((np.diff(ids) > 0).all(), "unseen_ids", "ids that ascend")
+    good = misses.shape == (len(ids), len(turns)) and (misses >= 0).all()
+    saved.require(good, "unseen", "how often each sensor has missed each track")
+    return state._replace(nursery=Nursery(young, Unseen(ids, misses)))
+
+
+def _check_tracks(settings: TrackerSettings, saved: Saved) -> None:
+    """Tracks: all arrays of one length, ids that were given, states of the filter's shape."""
+    saved.require(1 <= int(saved["next_id"]) < 2**62, "next_id", "a whole number above 0")
+    arrays = saved.part("tracks.").plain()
+    ids = arrays["track_id"]
+    for name, value in arrays.items():
+        saved.require(len(value) == len(ids), f"tracks.{name}", f"{len(ids)} rows, as many as ids")
+        if value.dtype.kind == "f":
+            saved.require(np.isfinite(value).all(), f"tracks.{name}", "finite numbers")
+    given = (ids >= 1) & (ids < int(saved["next_id"]))
+    saved.require(given.all(), "tracks.track_id", "ids from 1 up to the next one")
+    for name in ("detections", "missed", "hits"):
+        saved.require((arrays[name] >= 0).all(), f"tracks.{name}", "whole numbers >= 0")
+    widest = max(sensor.dim for sensor in settings.sensors)
+    for name, model in arrays_of(one_state(settings.filter)).items():
+        key, value = f"tracks.state.{name}", arrays[f"state.{name}"]
+        # what a filter keeps of measurements has no width before the first one
+        pairs = zip(value.shape[1:], model.shape[1:], strict=True)
+        same = all(a == b or (b == 0 and a <= widest) for a, b in pairs)
+        saved.require(same, key, f"rows of the shape {model.shape[1:]}")
+        if name == "weights":
+            near = np.abs(value.sum(axis=-1) - 1.0) < 1e-6
+            saved.require(near.all() and (value >= 0).all(), key, "probabilities")
+
+
+def _rng_state(settings: TrackerSettings, text: str, now: Any) -> Any:
+    """State of the filter's random generator from its JSON text, tried out on a copy; without a text as it is now."""
+    if now is None or not text:
+        return now
+    try:
+        state = json.loads(text)
+        copy.deepcopy(settings.filter.rng.bit_generator).state = state  # type: ignore[attr-defined]
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as error:
+        raise InvalidInputError("the field 'filter_rng' is not the state of a random generator") from error
+    return state
+
+
+def settings_as_text(settings: TrackerSettings) -> dict[str, str]:
+    """What a saved state depends on, as texts."""
+    return {
+        "tracker": settings.name,
+        "filter": described(settings.filter),
+        "sensors": described(settings.sensors),
+        "region": str(settings.place.region.tolist()),
+        "solver": f"{settings.solver} {sorted(settings.solver_parameters.items())}",
+        "seed": str(settings.seed),
+        "life_cycle": repr(settings.life_cycle),
+        "initiation": repr(settings.initiation),
+        "gate_probability": repr(settings.gate_probability),
+        "registration": "none" if settings.registration is None else repr(settings.registration.parameters),
+        "identity": repr(settings.identity),
+        **{one.name: described(getattr(settings.method, one.name)) for one in fields(settings.method)},
+    }
+
+
+def _changed_setting(saved: str, own: str) -> str:
+    """Say which setting of a tracker differs from a saved one's."""
+    now = json.loads(own)
+    try:
+        before = json.loads(saved)
+    except (ValueError, RecursionError):
+        before = None
+    if not isinstance(before, dict):
+        return "they cannot be read"
+    for key in now:
+        old, new = str(before.get(key)), now[key]
+        if old != new:
+            # long texts from where they part
+            same = len(os.path.commonprefix([old, new]))
+            first = 0 if same < 60 else same - 20
+            return f"{key} was {old[first : first + 80]!r}, is {new[first : first + 80]!r}"
+    return "an unknown setting"
+
+
+def described(thing: object) -> str:
+    """A filter or sensor, with all that it and its motion model are made of, as text."""
+    if isinstance(thing, (Filter, Motion)):
+        parts = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
+        parts.pop("rng", None)
+        inside = [f"{name}={described(parts[name])}" for name in sorted(parts)]
+        if isinstance(thing, Motion):
+            # what a user's function does is known by what it gives
+            somewhere = np.full((1, thing.dim), 100.0)
+            matrix = thing.matrices(1.0)[1] if isinstance(thing, LinearMotion) else thing.noise(somewhere, 1.0)
+            inside.append(f"noise of a second={described(matrix)}")
+            if not isinstance(thing, LinearMotion):
+                inside.append(f"motion of a second={described(thing.propagate(somewhere, 1.0))}")
+        return f"{type(thing).__name__}({', '.join(inside)})"
+    if isinstance(thing, np.ndarray):
+        return str(thing.tolist())
+    if isinstance(thing, (tuple, list)):
+        return f"[{', '.join(described(one) for one in thing)}]"
+    if isinstance(thing, Mapping):
+        return f"{{{', '.join(f'{key}: {described(one)}' for key, one in thing.items())}}}"
+    if is_dataclass(thing) and not isinstance(thing, type):
+        inside = [f"{one.name}={described(getattr(thing, one.name))}" for one in fields(thing)]
+        return f"{type(thing).__name__}({', '.join(inside)})"
+    plain = thing is None or isinstance(thing, (bool, int, float, str, np.number))
+    return repr(thing) if plain else type(thing).__name__

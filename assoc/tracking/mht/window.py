@@ -1,0 +1,105 @@
+"""The scans that a multiple hypothesis tracker has not decided yet, and what its branches say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from assoc._parameters import is_whole
+from assoc._types import Array
+from assoc.errors import InvalidInputError
+from assoc.scene.scan import Scan
+from assoc.tracking.associate.method import Method
+from assoc.tracking.file import Saved
+from assoc.tracking.track import Decision, owners
+from assoc.tracking.track_batch import TrackBatch
+
+MOST_SCANS = 1000
+"""The most scans that a decision may be put off: every branch carries its history with it."""
+
+MOST_MEASUREMENTS = 10_000_000
+"""Of a sensor in a scan, in a file."""
+
+
+class Window(NamedTuple):
+    """W open scans, the last one first, and B branches in them."""
+
+    history: Array
+    """Measurements of each branch (1-based, 0 missed): the sensors of the last scan, of the one before, ...; int32."""
+    times: Array
+    """Seconds, (W,)."""
+    sizes: Array
+    """Measurements of each sensor, int64 (W, S)."""
+
+    @staticmethod
+    def empty(branches: int, depth: int, sensors: int) -> Window:
+        """Branches before the first scan."""
+        history = np.zeros((branches, depth * sensors), dtype=np.int32)
+        return Window(history, np.zeros(0), np.zeros((0, sensors), dtype=np.int64))
+
+    def opened(self, scan: Scan, history: Array) -> Window:
+        """The window with one scan more, and what branches have in all of them."""
+        times, sizes = np.append(scan.time, self.times), np.concatenate([scan.sizes[None].astype(np.int64), self.sizes])
+        return Window(history, times, sizes)
+
+    def closed(self) -> Window:
+        """The window without its oldest scan."""
+        return self._replace(times=self.times[:-1], sizes=self.sizes[:-1])
+
+    def of(self, rows: Array) -> Window:
+        """The window of these branches alone."""
+        return self._replace(history=self.history[rows])
+
+    def decision(self, age: int, scan: int, tracks: TrackBatch, rows: Array) -> Decision:
+        """Which tracks the measurements of the scan `age` scans before scan number `scan` went to, by these rows."""
+        sizes, confirmed = self.sizes[age], tracks.confirmed[rows].astype(np.int64)
+        said = self.history[rows, age * sizes.size : (age + 1) * sizes.size]
+        assigned, sure = owners(said, tracks.track_id[rows], sizes), owners(said, confirmed, sizes)
+        known = tuple(one.astype(np.bool_) for one in sure)
+        return Decision(scan - age, float(self.times[age]), tuple(assigned), known)
+
+    def decisions(self, scan: int, tracks: TrackBatch, rows: Array) -> tuple[Decision, ...]:
+        """What these rows say of all open scans, oldest first."""
+        return tuple(self.decision(age, scan, tracks, rows) for age in reversed(range(len(self.times))))
+
+    def arrays(self) -> Mapping[str, Array]:
+        """The window for a file."""
+        return {"history": self.history, "window_times": self.times, "window_sizes": self.sizes}
+
+    @staticmethod
+    def restored(saved: Saved, branches: int, depth: int, sensors: int) -> Window:
+        """The window that a file holds, checked."""
+        times, sizes, history = saved["window_times"], saved["window_sizes"], saved["history"]
+        saved.require(len(times) < depth or len(times) == 0, "window_times", f"fewer than {depth} scans")
+        saved.require(np.isfinite(times).all(), "window_times", "finite numbers")
+        saved.require(sizes.shape == (len(times), sensors), "window_sizes", f"the shape {(len(times), sensors)}")
+        saved.require(((sizes >= 0) & (sizes <= MOST_MEASUREMENTS)).all(), "window_sizes", "numbers of measurements")
+        shape = branches, depth * sensors
+        saved.require(history.shape == shape, "history", f"the shape {shape}")
+        most = np.full(depth * sensors, MOST_MEASUREMENTS)
+        most[: sizes.size] = sizes.ravel()
+        known = ((history >= 0) & (history <= most)).all()
+        saved.require(known, "history", "numbers of measurements of the scans in the window")
+        return Window(history.astype(np.int32), times, sizes)
+
+
+@dataclass(frozen=True)
+class DeferringMethod(Method):
+    """A method that decides a scan `depth` - 1 scans later."""
+
+    depth: int = 3
+    needs_nursery = False
+
+    def _check(self, whole: str, drop: str) -> None:
+        """Refuse a depth, a number of hypotheses or branches, or a drop of their scores that is none."""
+        for what in ("depth", whole):
+            if not is_whole(getattr(self, what), 1):
+                raise InvalidInputError(f"{what} must be a whole number above 0, got {getattr(self, what)!r}")
+        if self.depth > MOST_SCANS:
+            raise InvalidInputError(f"depth must be at most {MOST_SCANS} scans, got {self.depth}")
+        value = getattr(self, drop)
+        if not isinstance(value, (int, float)) or not value > 0:
+            raise InvalidInputError(f"{drop} must be a number above 0, got {value!r}")

@@ -1,0 +1,87 @@
+"""A step under way: what each stage is given and hands on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from assoc._types import Array
+from assoc.costs.tracks.own_times import TimedScan
+from assoc.problem import AssignmentProblem
+from assoc.scene.scan import Scan
+from assoc.solution import Solution
+from assoc.solvers.assign import assign
+from assoc.tracking.settings import TrackerSettings
+from assoc.tracking.state import TrackerState
+from assoc.tracking.track import Step
+from assoc.tracking.track_batch import TrackBatch
+
+# what the exact solver may do on one scan where the user says nothing of it: visits of tuples in branch and bound,
+# and nodes at the least; counted, so that the answer does not depend on the machine
+_VISITS, _LEAST_NODES = 500_000, 10
+
+
+class Association(NamedTuple):
+    """How a scan was associated with tracks."""
+
+    tracks: TrackBatch
+    """After the scan: those of before, corrected, and new ones."""
+    assigned: Sequence[Array]
+    """Track of each measurement of each sensor, 0 for none, int64 (n_s,)."""
+    own: Any = None
+    """The tracker's own part of the state after the scan."""
+
+
+class Work:
+    """What a step uses up: ids of new tracks and calls of the solver, counted on from the state before it."""
+
+    def __init__(self, settings: TrackerSettings, state: TrackerState) -> None:
+        self.settings, self.scan = settings, state.scan
+        self.next_id, self.solver_calls = state.next_id, state.solver_calls
+
+    def new_ids(self, count: int) -> Array:
+        """Ids that no track has had, int64 (count,)."""
+        ids = np.arange(self.next_id, self.next_id + count)
+        self.next_id += count
+        return ids
+
+    def assign(self, problem: AssignmentProblem) -> Solution:
+        """Solve an assignment problem by the tracker's solver."""
+        self.solver_calls += 1
+        # a source of randomness of this step alone, so that a restored tracker goes on alike
+        seed = np.random.SeedSequence((self.settings.seed, self.scan))
+        options = solver_options(self.settings, problem.num_tuples)
+        return assign(problem, self.settings.solver, seed=seed, advise=False, **options)
+
+
+def solver_options(settings: TrackerSettings, tuples: int) -> dict[str, Any]:
+    """Time limit and parameters of the solver for a problem of so many tuples."""
+    options = {"time_limit": settings.time_limit, **settings.solver_parameters}
+    if settings.solver == "exact" and settings.time_limit is None:
+        options = {"nodes": max(_LEAST_NODES, _VISITS // max(tuples, 1)), "patience": 0} | options
+    return options
+
+
+class Progress(NamedTuple):
+    """A step under way."""
+
+    settings: TrackerSettings
+    state: TrackerState
+    """What the stages so far have made of it; the time is that of the last scan until the last stage."""
+    scan: Scan
+    work: Work
+    timed: TimedScan | None = None
+    """Tracks and measurements with times of their own; None where all sensors looked everywhere at one instant."""
+    found: Association | None = None
+    step: Step | None = None
+
+    def with_state(self, **changes: Any) -> Progress:
+        """Go on with another state."""
+        return self._replace(state=self.state._replace(**changes))
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the last scan."""
+        return 0.0 if self.state.time is None else self.scan.time - self.state.time

@@ -1,0 +1,94 @@
+"""What a tracker is made with: checked once, never changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from assoc._parameters import is_number, is_whole
+from assoc.costs.tracks.scores import ScoreTerms, score_terms
+from assoc.errors import InvalidInputError
+from assoc.filters.base import Filter
+from assoc.registration.online import OnlineRegistration
+from assoc.scene.scene import Scene
+from assoc.sensors import Sensor
+from assoc.solvers.registry import make_parameters
+from assoc.tracking.births.initiation import Initiation
+from assoc.tracking.births.new_tracks import NewTracks
+from assoc.tracking.identity_evidence import IdentityParameters
+from assoc.tracking.life_cycle import LifeCycle
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerSettings:
+    """Settings of a tracker; see `assoc.tracking.Tracker` for those that users give.
+
+    Attributes
+    ----------
+    name : str
+        Of the tracker.
+    method : Method
+        How scans are associated, with its own settings; see `assoc.tracking.associate.method`.
+    place : Scene
+        Sensors and region.
+    registration : OnlineRegistration or None
+        As it is before the first scan.
+    nursery : TrackerSettings or None
+        Where tracks begin if all sensors measure angles alone; see `assoc.tracking.births.nursery`.
+    """
+
+    name: str
+    method: Any
+    place: Scene
+    filter: Filter[Any]
+    solver: str
+    solver_parameters: dict[str, Any]
+    seed: int
+    time_limit: float | None
+    life_cycle: LifeCycle
+    initiation: Initiation
+    gate_probability: float
+    max_tuples: int
+    registration: OnlineRegistration | None
+    identity: IdentityParameters | None
+    nursery: TrackerSettings | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.filter, Filter):
+            raise InvalidInputError(f"filter must be a filter of assoc.filters, got {type(self.filter).__name__}")
+        for sensor in self.sensors:
+            self.filter.observe(sensor)
+        if not isinstance(self.life_cycle, LifeCycle):
+            raise InvalidInputError(f"life_cycle must be a LifeCycle, got {type(self.life_cycle).__name__}")
+        if not isinstance(self.initiation, Initiation):
+            raise InvalidInputError(f"initiation must be an Initiation, got {type(self.initiation).__name__}")
+        self.initiation.prior(self.filter.motion)  # refuses what does not suit the filter
+        make_parameters(self.solver, self.solver_parameters)
+        if not is_number(self.gate_probability) or not 0 < self.gate_probability < 1:
+            raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {self.gate_probability!r}")
+        if not is_whole(self.max_tuples, 1):
+            raise InvalidInputError(f"max_tuples must be a whole number above 0, got {self.max_tuples!r}")
+        online = self.registration
+        if not (online is None or isinstance(online, OnlineRegistration)):
+            raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {online!r}")
+        if online is not None and online.sensors != self.sensors:
+            raise InvalidInputError("registration: its sensors are not those of the tracker")
+        if not (self.identity is None or isinstance(self.identity, IdentityParameters)):
+            raise InvalidInputError(f"identity must be IdentityParameters, got {type(self.identity).__name__}")
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The sensors."""
+        return tuple(self.place.sensors)
+
+    @cached_property
+    def terms(self) -> ScoreTerms:
+        """What detections and misses of each sensor add to a score."""
+        return score_terms(self.sensors)
+
+    @cached_property
+    def births(self) -> NewTracks:
+        """How tracks begin."""
+        limits = {"gate_probability": self.gate_probability, "max_tuples": self.max_tuples}
+        return NewTracks(self.place, self.filter, self.initiation, self.terms, limits)

@@ -1,1 +1,0 @@
-"""Trackers that decide each scan by itself."""
