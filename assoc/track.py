@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from assoc.recordings import Recording
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker, TrackTable
-    from assoc.tracking.plots.plot_tracks import PlotTracks
+    from assoc.tracking.plots import PlotTracks
 
 _INTERRUPTION = Interruption("assoc.track")
 _EARLY_END = EarlyEnd("assoc.track")
@@ -199,7 +199,7 @@ def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tu
     import numpy as np
 
     from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
-    from assoc.tracking.plots.plot_tracks import track_plots
+    from assoc.tracking.plots import track_plots
 
     if parsed["registration"] is not None:
         raise InvalidInputError("--registration: biases of one radar alone cannot be observed; it is for scenes")

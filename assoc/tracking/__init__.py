@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from assoc.tracking.associate.joint_probabilistic import PairProbabilities
+from assoc.tracking.associate.joint_probabilistic import JointProbabilisticTracker, PairProbabilities
+from assoc.tracking.associate.mht import TrackOrientedMHT
+from assoc.tracking.associate.mht_hypothesis import HypothesisOrientedMHT
+from assoc.tracking.associate.multi_sensor import MultiSensorTracker
+from assoc.tracking.associate.nearest_neighbour import NearestNeighbourTracker
+from assoc.tracking.associate.static import StaticFusionTracker
 from assoc.tracking.births.initiation import Initiation
 from assoc.tracking.identity_evidence import IdentityParameters
 from assoc.tracking.life_cycle import LifeCycle
@@ -13,14 +18,6 @@ from assoc.tracking.smoothing import smoothed
 from assoc.tracking.track import Decision, Step, Track
 from assoc.tracking.track_table import TrackTable, track_scene
 from assoc.tracking.tracker import Tracker
-from assoc.tracking.trackers import (
-    HypothesisOrientedMHT,
-    JointProbabilisticTracker,
-    MultiSensorTracker,
-    NearestNeighbourTracker,
-    StaticFusionTracker,
-    TrackOrientedMHT,
-)
 
 TRACKERS: dict[str, type[Tracker]] = {
     kind.name: kind

@@ -28,20 +28,11 @@ VERSION = 2
 _KINDS = {"f": "float", "i": "int", "u": "int", "b": "bool", "U": "str"}
 
 
-class Saved:
-    """Arrays of a file, those with a prefix by what follows it.
+class Saved(dict[str, Array]):
+    """Arrays of a file by name."""
 
-    Parameters
-    ----------
-    arrays : mapping
-    prefix : str
-    """
-
-    def __init__(self, arrays: Mapping[str, Array], prefix: str = "") -> None:
-        self.arrays, self.prefix = arrays, prefix
-
-    def __getitem__(self, name: str) -> Array:
-        return self.arrays[self.prefix + name]
+    prefix = ""
+    """What their names begin with in the file."""
 
     def require(self, good: object, name: str, expected: str) -> None:
         """Refuse a field by name."""
@@ -50,14 +41,10 @@ class Saved:
             raise InvalidInputError(f"{what}: expected {expected}")
 
     def part(self, prefix: str) -> Saved:
-        """Those with a longer prefix."""
-        return Saved(self.arrays, self.prefix + prefix)
-
-    def plain(self) -> dict[str, Array]:
-        """All of them by their short names."""
-        return {
-            name.removeprefix(self.prefix): value for name, value in self.arrays.items() if name.startswith(self.prefix)
-        }
+        """Those whose names begin so, by what follows."""
+        found = Saved({name.removeprefix(prefix): value for name, value in self.items() if name.startswith(prefix)})
+        found.prefix = self.prefix + prefix
+        return found
 
 
 def save(path: str | os.PathLike[str], settings: TrackerSettings, state: TrackerState) -> None:
@@ -108,7 +95,7 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
         "next_id": np.array(state.next_id),
         "solver_calls": np.array(state.solver_calls),
         "filter_rng": np.array("" if state.rng is None else json.dumps(state.rng)),
-        **state.tracks.arrays("tracks."),
+        **{f"tracks.{name}": value for name, value in state.tracks.arrays().items()},
         **settings.method.arrays(state.own),
     }
     if state.registration is not None:
@@ -124,8 +111,9 @@ def _arrays(settings: TrackerSettings, state: TrackerState) -> dict[str, Array]:
 
 def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> TrackerState:
     """The state that arrays hold, checked; `model` is any state of these settings."""
-    _check_tracks(settings, saved)
-    tracks = model.tracks.restored(saved.arrays, f"{saved.prefix}tracks.")
+    saved.require(1 <= int(saved["next_id"]) < 2**62, "next_id", "a whole number above 0")
+    _check_tracks(settings, saved.part("tracks."), int(saved["next_id"]))
+    tracks = model.tracks.restored(saved.part("tracks."))
     time, scan, pace = float(saved["time"]), int(saved["scan"]), float(saved["pace"])
     saved.require(not math.isinf(time), "time", "seconds")
     saved.require(0 <= scan < 2**62, "scan", "a whole number >= 0")
@@ -140,8 +128,8 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
         tracks=tracks, turns=turns, time=None if math.isnan(time) else time, scan=scan, pace=pace,
         next_id=int(saved["next_id"]), solver_calls=int(saved["solver_calls"]),
         rng=_rng_state(settings, str(saved["filter_rng"]), model.rng),
-        registration=None if model.registration is None else model.registration.restored(saved.plain()),
-        identities=None if model.identities is None else model.identities.restored(saved.plain()),
+        registration=None if model.registration is None else model.registration.restored(saved),
+        identities=None if model.identities is None else model.identities.restored(saved),
     )  # fmt: skip
     state = state._replace(own=settings.method.restored(settings, saved, state))
     if settings.nursery is None or model.nursery is None:
@@ -155,22 +143,19 @@ def _state(settings: TrackerSettings, model: TrackerState, saved: Saved) -> Trac
     return state._replace(nursery=Nursery(young, Unseen(ids, misses)))
 
 
-def _check_tracks(settings: TrackerSettings, saved: Saved) -> None:
+def _check_tracks(settings: TrackerSettings, saved: Saved, next_id: int) -> None:
     """Tracks: all arrays of one length, ids that were given, states of the filter's shape."""
-    saved.require(1 <= int(saved["next_id"]) < 2**62, "next_id", "a whole number above 0")
-    arrays = saved.part("tracks.").plain()
-    ids = arrays["track_id"]
-    for name, value in arrays.items():
-        saved.require(len(value) == len(ids), f"tracks.{name}", f"{len(ids)} rows, as many as ids")
+    ids = saved["track_id"]
+    for name, value in saved.items():
+        saved.require(len(value) == len(ids), name, f"{len(ids)} rows, as many as ids")
         if value.dtype.kind == "f":
-            saved.require(np.isfinite(value).all(), f"tracks.{name}", "finite numbers")
-    given = (ids >= 1) & (ids < int(saved["next_id"]))
-    saved.require(given.all(), "tracks.track_id", "ids from 1 up to the next one")
+            saved.require(np.isfinite(value).all(), name, "finite numbers")
+    saved.require(((ids >= 1) & (ids < next_id)).all(), "track_id", "ids from 1 up to the next one")
     for name in ("detections", "missed", "hits"):
-        saved.require((arrays[name] >= 0).all(), f"tracks.{name}", "whole numbers >= 0")
+        saved.require((saved[name] >= 0).all(), name, "whole numbers >= 0")
     widest = max(sensor.dim for sensor in settings.sensors)
     for name, model in arrays_of(one_state(settings.filter)).items():
-        key, value = f"tracks.state.{name}", arrays[f"state.{name}"]
+        key, value = f"state.{name}", saved[f"state.{name}"]
         # what a filter keeps of measurements has no width before the first one
         pairs = zip(value.shape[1:], model.shape[1:], strict=True)
         same = all(a == b or (b == 0 and a <= widest) for a, b in pairs)

@@ -70,22 +70,14 @@ class Evidence(NamedTuple):
     """Whether the pair is not ruled out by addresses, bool (K,)."""
 
 
-class Identities:
-    """The identities that tracks have had lately; `after` returns a new one, nothing is changed in place.
+class Identities(NamedTuple):
+    """The identities that tracks have had lately."""
 
-    Parameters
-    ----------
-    parameters : IdentityParameters
-    """
-
-    def __init__(self, parameters: IdentityParameters) -> None:
-        if not isinstance(parameters, IdentityParameters):
-            raise InvalidInputError(f"identity must be IdentityParameters, got {type(parameters).__name__}")
-        self.parameters = parameters
-        self._ids = np.zeros(0, dtype=np.int64)
-        """Tracks, ascending."""
-        self._told = np.zeros((0, MEMORY, 2), dtype=np.int64)
-        """Code and address of each one's last plots, the newest first; 0 unknown."""
+    parameters: IdentityParameters
+    ids: Array = np.zeros(0, dtype=np.int64)
+    """Tracks, ascending."""
+    told: Array = np.zeros((0, MEMORY, 2), dtype=np.int64)
+    """Code and address of each one's last plots, the newest first; 0 unknown."""
 
     def evidence(self, track_id: Array, identities: Array) -> Evidence:
         """Weigh pairs of a track (K,) and the code and address of a plot (K, 2)."""
@@ -106,21 +98,19 @@ class Identities:
                 if pair.any() and row < len(ids) and ids[row] == track:
                     told[row, 1:] = told[row, :-1].copy()
                     told[row, 0] = pair
-        later = Identities(self.parameters)
         known = told.any(axis=(1, 2))
-        later._ids, later._told = ids[known], told[known]
-        return later
+        return Identities(self.parameters, ids[known], told[known])
 
     def _of(self, track_id: Array) -> Array:
         """What the plots of tracks told, (K, MEMORY, 2)."""
-        rows = np.searchsorted(self._ids, track_id)
-        found = np.append(self._ids, -1)[rows] == track_id
-        told = np.concatenate([self._told, np.zeros((1, MEMORY, 2), dtype=np.int64)])
-        return told[np.where(found, rows, len(self._ids))]
+        rows = np.searchsorted(self.ids, track_id)
+        found = np.append(self.ids, -1)[rows] == track_id
+        told = np.concatenate([self.told, np.zeros((1, MEMORY, 2), dtype=np.int64)])
+        return told[np.where(found, rows, len(self.ids))]
 
     def arrays(self) -> dict[str, Array]:
         """The state as arrays; `restored` reads it."""
-        return {f"{PREFIX}ids": self._ids, f"{PREFIX}told": self._told}
+        return {f"{PREFIX}ids": self.ids, f"{PREFIX}told": self.told}
 
     def restored(self, arrays: Mapping[str, Array]) -> Identities:
         """Take over a state that `arrays` has given.
@@ -134,9 +124,7 @@ class Identities:
         good = ids.ndim == 1 and told.shape == (len(ids), MEMORY, 2) and bool((np.diff(ids) > 0).all())
         if not good or (told < 0).any() or (told >= ADDRESSES).any():
             raise InvalidInputError(f"the fields '{PREFIX}...' are no identities of tracks")
-        later = Identities(self.parameters)
-        later._ids, later._told = ids, told
-        return later
+        return Identities(self.parameters, ids, told)
 
 
 def log_ratio(told: Array, given: Array, count: int, garbled: float, shared: float) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from assoc._parameters import is_whole, positive
 from assoc._types import Array
 from assoc.costs.tracks.scores import sequential_threshold
 from assoc.errors import InvalidInputError
@@ -70,18 +71,13 @@ class LifeCycle:
             raise InvalidInputError(f"deletion must be 'time', 'count' or 'score', got {self.deletion!r}")
         for one in fields(self):
             value = getattr(self, one.name)
-            if one.name == "deletion_time" and value is None:
-                continue
-            if isinstance(one.default, float) or one.name == "deletion_time":
-                good = isinstance(value, (int, float, np.floating)) and not isinstance(value, bool)
-                if not good or not 0 < value < math.inf:
-                    raise InvalidInputError(f"{one.name} must be a number above 0, got {value!r}")
+            if isinstance(one.default, int):
+                if not is_whole(value, 1):
+                    raise InvalidInputError(f"{one.name} must be a whole number above 0, got {value!r}")
+            elif not isinstance(one.default, str) and (one.name, value) != ("deletion_time", None):
+                positive(value, one.name)
                 if one.name.endswith("probability") and value >= 1:
                     raise InvalidInputError(f"{one.name} must be below 1, got {value!r}")
-            elif isinstance(one.default, int) and (
-                not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1
-            ):
-                raise InvalidInputError(f"{one.name} must be a whole number above 0, got {value!r}")
         if not self.m <= self.n <= HISTORY:
             raise InvalidInputError(f"m and n must be m <= n <= {HISTORY}, got {self.m} and {self.n}")
 

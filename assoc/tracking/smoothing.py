@@ -94,22 +94,8 @@ def _track(tracker: Tracker, scene: Scene, track_id: int, found: dict[int, Array
         place[: len(position)], speed[: len(velocity)] = state.mean[0, position], state.mean[0, velocity]
         seen = int(np.count_nonzero(hits[: k + 1]))
         detected = times[max(i for i in range(k + 1) if hits[i])]
-        tracks.append(
-            Track(
-                track_id,
-                time,
-                state.mean[0],
-                state.covariance[0],
-                place,
-                speed,
-                True,
-                np.nan,
-                seen,
-                times[0],
-                detected,
-                1.0,
-            )  # fmt: skip
-        )
+        known = track_id, time, state.mean[0], state.covariance[0], place, speed
+        tracks.append(Track(*known, True, np.nan, seen, times[0], detected, 1.0))
     return tracks
 
 

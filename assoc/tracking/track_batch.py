@@ -29,6 +29,11 @@ _COUNTS = {"track_id": ID, "confirmed": SURE, "detections": BITS, "missed": MISS
 _HANDED_OUT = ("track_id", "confirmed", "score", "hits", "started", "last_detection", "existence")
 
 
+def _column(table: str, number: int, what: str) -> Any:
+    """A column of a table of a batch as a property."""
+    return property(lambda batch: getattr(batch, table)[:, number], doc=what)
+
+
 class TrackBatch:
     """T tracks (or branches of tracks).
 
@@ -49,55 +54,20 @@ class TrackBatch:
     def __init__(self, states: Any, numbers: Array, counts: Array) -> None:
         self.states, self.numbers, self.counts = states, numbers, counts
 
-    @property
-    def score(self) -> Array:
-        """Log likelihood ratio, (T,)."""
-        return self.numbers[:, SCORE]
-
-    @property
-    def best(self) -> Array:
-        """Largest value of the score so far, (T,)."""
-        return self.numbers[:, BEST]
-
-    @property
-    def started(self) -> Array:
-        """Seconds, (T,)."""
-        return self.numbers[:, STARTED]
-
-    @property
-    def last_detection(self) -> Array:
-        """Seconds, (T,)."""
-        return self.numbers[:, LAST]
-
-    @property
-    def existence(self) -> Array:
-        """Logarithm of the odds that the target is still there, (T,)."""
-        return self.numbers[:, EXISTS]
-
-    @property
-    def track_id(self) -> Array:
-        """Ids, int64 (T,)."""
-        return self.counts[:, ID]
+    score = _column("numbers", SCORE, "Log likelihood ratio, (T,).")
+    best = _column("numbers", BEST, "Largest value of the score so far, (T,).")
+    started = _column("numbers", STARTED, "Seconds, (T,).")
+    last_detection = _column("numbers", LAST, "Seconds, (T,).")
+    existence = _column("numbers", EXISTS, "Logarithm of the odds that the target is still there, (T,).")
+    track_id = _column("counts", ID, "Ids, int64 (T,).")
+    detections = _column("counts", BITS, "One bit a scan, the last one lowest: whether it was detected; int64 (T,).")
+    missed = _column("counts", MISSED, "Scans in a row without a detection, int64 (T,).")
+    hits = _column("counts", HITS, "Scans with a detection, int64 (T,).")
 
     @property
     def confirmed(self) -> Array:
         """Whether each is confirmed, bool (T,)."""
         return self.counts[:, SURE] != 0
-
-    @property
-    def detections(self) -> Array:
-        """One bit a scan, the last one lowest: whether the track was detected; int64 (T,)."""
-        return self.counts[:, BITS]
-
-    @property
-    def missed(self) -> Array:
-        """Scans in a row without a detection, int64 (T,)."""
-        return self.counts[:, MISSED]
-
-    @property
-    def hits(self) -> Array:
-        """Scans with a detection, int64 (T,)."""
-        return self.counts[:, HITS]
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -195,20 +165,17 @@ class TrackBatch:
         silent = time - self.last_detection
         return life_cycle.deletes(self.confirmed, self.score, self.best, silent, self.missed, patience)
 
-    def arrays(self, prefix: str = "") -> dict[str, Array]:
+    def arrays(self) -> dict[str, Array]:
         """Everything as plain arrays."""
-        found = {f"{prefix}{name}": value for name, value in self._columns().items()}
-        return found | {f"{prefix}state.{name}": value for name, value in arrays_of(self.states).items()}
+        found = {name: getattr(self, name) for name in (*_NUMBERS, *_COUNTS)}
+        return found | {f"state.{name}": value for name, value in arrays_of(self.states).items()}
 
-    def restored(self, arrays: Mapping[str, Array], prefix: str = "") -> TrackBatch:
+    def restored(self, arrays: Mapping[str, Array]) -> TrackBatch:
         """A batch of the kind of this one, made of the arrays of another."""
-        numbers = np.stack([arrays[f"{prefix}{name}"] for name in _NUMBERS], axis=1)
-        counts = np.stack([arrays[f"{prefix}{name}"].astype(np.int64) for name in _COUNTS], axis=1)
-        state = {name: arrays[f"{prefix}state.{name}"] for name in arrays_of(self.states)}
+        numbers = np.stack([arrays[name] for name in _NUMBERS], axis=1)
+        counts = np.stack([arrays[name].astype(np.int64) for name in _COUNTS], axis=1)
+        state = {name: arrays[f"state.{name}"] for name in arrays_of(self.states)}
         return TrackBatch(state_from(type(self.states), state), numbers, counts)
-
-    def _columns(self) -> dict[str, Array]:
-        return {name: getattr(self, name) for name in (*_NUMBERS, *_COUNTS)}
 
     def tracks(self, filter: Filter[Any], time: float) -> list[Track]:
         """Hand out the tracks."""

@@ -82,24 +82,12 @@ class TrackTable(Shown):
             sigma[: len(positions)] = np.sqrt(np.diagonal(track.covariance)[list(positions)])
             vx, vy = track.velocity[:2].tolist()
             told = float(track.position[2]) if altitudes is None and len(positions) > 2 else math.nan
-            self._rows.append(
-                (
-                    track.track_id,
-                    track.time,
-                    *track.position.tolist(),
-                    *track.velocity.tolist(),
-                    track.confirmed,
-                    track.score,
-                    track.hits,
-                    track.started,
-                    track.last_detection,
-                    *sigma.tolist(),
-                    track.existence,
-                    math.hypot(vx, vy),
-                    math.degrees(math.atan2(vx, vy)) % 360.0,
-                    told if altitudes is None else altitudes.get(track.track_id, math.nan),
-                )  # fmt: skip
-            )
+            life = track.confirmed, track.score, track.hits, track.started, track.last_detection
+            speed, heading = math.hypot(vx, vy), math.degrees(math.atan2(vx, vy)) % 360.0
+            altitude = told if altitudes is None else altitudes.get(track.track_id, math.nan)
+            where = *track.position.tolist(), *track.velocity.tolist()
+            more = *sigma.tolist(), track.existence, speed, heading, altitude
+            self._rows.append((track.track_id, track.time, *where, *life, *more))
 
     def name_targets(self, scene: Scene) -> None:
         """Find the target that each track followed most, where the truth of its scene has names."""

@@ -12,6 +12,7 @@ from assoc.scene import Scene
 from assoc.tracking import Tracker
 from assoc.tracking.associate.all_sensors import associated, associated_in_order
 from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.filter_choice import manoeuvre_noise, pace_of, two_speeds
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
@@ -21,6 +22,8 @@ from assoc.tracking.track_batch import TrackBatch
 @dataclass(frozen=True)
 class Oracle(Method):
     """The targets of all measurements, scan by scan; its own part of a state is the target of each track."""
+
+    nursery = TrackTrees()
 
     sources: Any
 

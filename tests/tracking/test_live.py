@@ -15,7 +15,7 @@ from assoc.scene import Scene
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, IdentityParameters, LiveTracker
 from assoc.tracking.live.kept_identities import KeptIdentities
-from assoc.tracking.plots.plot_tracks import track_plots
+from assoc.tracking.plots import track_plots
 from tests.sizes import sample
 from tests.tracking.crossing import TURN, crossing, radar
 

@@ -23,7 +23,7 @@ from assoc.plotting.report.views import number, plain_numbers
 from assoc.plotting.scene import truth_paths
 from assoc.scene.scene import Scene
 from assoc.sensors import BearingSensor
-from assoc.tracking.plots.plot_tracks import PlotTracks
+from assoc.tracking.plots import PlotTracks
 
 if TYPE_CHECKING:
     import pandas as pd

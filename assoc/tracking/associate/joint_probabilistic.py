@@ -40,12 +40,14 @@ from assoc.filters.batches import concatenate
 from assoc.filters.merging import merged
 from assoc.ranking.pairs.events import pair_probabilities
 from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.associate.track_parts import ScoredPairs, TrackParts
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.tracker import Tracker
 
 _SURE = 30.0
 """Scores beyond this are certainty: exp(-30) is below what probabilities are known to."""
@@ -89,10 +91,12 @@ class _Update(NamedTuple):
 
 @dataclass(frozen=True)
 class JointProbabilistic(Method):
-    """Settings of `assoc.tracking.JointProbabilisticTracker`, and what it does with a scan.
+    """The tracker's own settings, and what it does with a scan.
 
     Its own part of a state are the probabilities of the last scan, `PairProbabilities` of each sensor.
     """
+
+    nursery = TrackTrees()
 
     max_events: int = 4096
 
@@ -227,3 +231,27 @@ def _owners(pairs: PairProbabilities, count: int) -> tuple[Array, Array]:
     likely = pairs.probability > 0.5
     ids[pairs.measurement[likely]] = pairs.track_id[likely]
     return ids, np.minimum(np.bincount(pairs.measurement, pairs.probability, count), 1.0)
+
+
+class JointProbabilisticTracker(Tracker):
+    """Joint integrated probabilistic data association, with certified probabilities.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`; the filter's states must be Gaussian or mixtures of models. The `solver` is not used.
+    max_events : int
+        Joint events, as far as they are summed, that are kept apart at a time in a cluster of tracks and measurements
+        (4096). Where a cluster would need more, its least likely pairs are left out: more make the intervals narrower.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "joint-probabilistic"
+    method = JointProbabilistic
+
+    @property
+    def probabilities(self) -> tuple[PairProbabilities, ...]:
+        """Of the last step, for each sensor."""
+        found: tuple[PairProbabilities, ...] = self.state.own
+        return found

@@ -29,8 +29,8 @@ from assoc.tracking.track_batch import TrackBatch
 class Method(ABC):
     """How a kind of tracker associates."""
 
-    needs_nursery: ClassVar[bool] = True
-    """Whether its tracks begin in a nursery where all sensors measure angles alone."""
+    nursery: ClassVar[Method | None] = None
+    """By which tracks grow up where all sensors measure angles alone; see `assoc.tracking.births.nursery`."""
 
     def arranged(self, scan: Scan) -> Scan:
         """The scan as its measurements are to be numbered inside."""

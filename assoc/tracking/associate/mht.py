@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, SURE, TrackBatch
+from assoc.tracking.tracker import Tracker
 
 
 class Trees(NamedTuple):
@@ -56,9 +57,7 @@ class Trees(NamedTuple):
 
 @dataclass(frozen=True)
 class TrackTrees(DeferringMethod):
-    """Settings of `assoc.tracking.TrackOrientedMHT`, and what it does with a scan."""
-
-    name: ClassVar[str] = "mht"
+    """The tracker's own settings, and what it does with a scan."""
 
     max_branches: int = 30
     branch_drop: float = 7.0
@@ -221,3 +220,25 @@ def _solved(progress: Progress, tree: Array, score: Array, history: Array) -> Ar
     solution = progress.work.assign(AssignmentProblem(tuples, -score[rows], sizes))
     chosen[rows[solution.indices[solution.indices < len(rows)]]] = True
     return chosen
+
+
+class TrackOrientedMHT(Tracker):
+    """Multiple hypothesis tracker with track trees.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`. Sensors of a scan are taken in one after the other.
+    depth : int
+        Scans in the window, N: a measurement's track is final N - 1 scans later. 1 decides at once; at most 1000.
+    max_branches : int
+        The most branches of a tree (30).
+    branch_drop : float
+        A branch is cut if every global hypothesis that contains it scores this much less than the best one: 7 is a
+        thousandth of its probability. Of more than `max_branches` those stay that cost the best hypothesis least.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "mht"
+    method = TrackTrees

@@ -31,8 +31,7 @@ from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
 from assoc.tracking.looks import to_delete
 from assoc.tracking.mht.clusters import Cluster, agreeing, cluster, linked, parts, without
-from assoc.tracking.mht.crossed_births import with_births
-from assoc.tracking.mht.generation import generated
+from assoc.tracking.mht.generation import generated, with_births
 from assoc.tracking.mht.growth import AtOnce, Grown, Growth, Offers, growth_of
 from assoc.tracking.mht.window import DeferringMethod, Window
 from assoc.tracking.progress import Association, Progress
@@ -40,6 +39,7 @@ from assoc.tracking.settings import TrackerSettings
 from assoc.tracking.state import TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.tracker import Tracker
 
 
 class Hypotheses(NamedTuple):
@@ -57,7 +57,7 @@ class Hypotheses(NamedTuple):
 
 @dataclass(frozen=True)
 class ClusteredHypotheses(DeferringMethod):
-    """Settings of `assoc.tracking.HypothesisOrientedMHT`, and what it does with a scan."""
+    """The tracker's own settings, and what it does with a scan."""
 
     max_hypotheses: int = 50
     hypothesis_drop: float = 15.0
@@ -261,3 +261,31 @@ def _split(tracks: TrackBatch, own: Hypotheses) -> list[Cluster]:
         together = len(mine) == 1 or bool((mine == mine[0]).all())
         found += [one] if together else parts(one, mine, tracks.score[one.branches])
     return found
+
+
+class HypothesisOrientedMHT(Tracker):
+    """Multiple hypothesis tracker that keeps the m best hypotheses about each cluster of tracks.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`. Sensors of a scan are taken in one after the other. The `solver` is not used: the ranking is
+        Murty's.
+    max_hypotheses : int
+        m (50).
+    depth : int
+        Scans after which a decision is final, n (3); at most 1000.
+    hypothesis_drop : float
+        A hypothesis whose log-probability is this far below the best of its cluster is dropped (15).
+    **options
+        As for `Tracker`.
+    """
+
+    name = "mht-hypothesis"
+    method = ClusteredHypotheses
+
+    @property
+    def probabilities(self) -> Array:
+        """Probabilities of the best hypotheses about everything, the best first; at most `max_hypotheses` of them."""
+        found: Array = self.settings.method.probabilities(self.state.own)
+        return found

@@ -11,11 +11,15 @@ from assoc.costs.tracks.tuples import grow_track_tuples
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.all_sensors import associated, associated_in_order, scan_problem
 from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.tracker import Tracker
 
 
 class MultiSensor(Method):
-    """What `assoc.tracking.MultiSensorTracker` does with a scan."""
+    """What the tracker does with a scan."""
+
+    nursery = TrackTrees()
 
     def at_once(self, progress: Progress) -> Association:
         """Tracks are the first list of the problem, the sensors the others."""
@@ -67,3 +71,26 @@ def _new_targets(progress: Progress) -> tuple[Array, Array]:
     scores = births.scores(problem.tuples, problem.costs, births.fused(progress.scan, problem.tuples)[1])
     good = scores > 0
     return problem.tuples[good], -scores[good]
+
+
+class MultiSensorTracker(Tracker):
+    """Tracks and S sensors in one (S+1)-D assignment problem for each scan.
+
+    Tracks are the first list. A tuple (track, z_1, ..., z_S) costs the negative log likelihood ratio of its
+    measurements under the track's predicted density, misses included, averaged over whether the track is a target
+    at all, which its score tells; a tuple without a track is a new target
+    and costs what `assoc.build_problem` says, with the birth density in it. Measurements in no tuple are false
+    alarms, and begin tentative tracks.
+
+    Parameters
+    ----------
+    sensors, filter, **options
+        As for `Tracker`.
+
+    References
+    ----------
+    Y. Bar-Shalom, P. Willett, X. Tian, Tracking and Data Fusion, 2011, chapter 9.
+    """
+
+    name = "multi-sensor"
+    method = MultiSensor

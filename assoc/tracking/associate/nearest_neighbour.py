@@ -15,16 +15,20 @@ from assoc.errors import InvalidInputError
 from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
 from assoc.tracking.track import owners
 from assoc.tracking.track_batch import STARTED, TrackBatch
+from assoc.tracking.tracker import Tracker
 
 Rule = Literal["greedy", "assignment"]
 
 
 @dataclass(frozen=True)
 class NearestNeighbour(Method):
-    """Settings of `assoc.tracking.NearestNeighbourTracker`, and what it does with a scan."""
+    """The tracker's own settings, and what it does with a scan."""
+
+    nursery = TrackTrees()
 
     rule: Rule = "greedy"
 
@@ -140,3 +144,24 @@ def _corrected(tracks: TrackBatch, pairs: TrackPairs, chosen: Array, hit: Array)
     rest = np.flatnonzero(~hit)
     back = np.argsort(np.concatenate([pairs.track[chosen], rest]), kind="stable")
     return concatenate([pairs.states[chosen], tracks.states[rest]])[back]
+
+
+class NearestNeighbourTracker(Tracker):
+    """The plain tracker that others are measured against.
+
+    The sensors of a scan are taken in one after the other, whatever the measurements' times. Pairs of tracks and
+    measurements within the gate are taken by falling likelihood, averaged over whether the track is a target at all;
+    what is left over starts a track at once, which the next sensor may confirm.
+
+    Parameters
+    ----------
+    sensors, filter, ...
+        As for `Tracker`.
+    rule : "greedy" or "assignment"
+        "assignment" takes the best 2-D assignment instead (global nearest neighbour), by the tracker's solver.
+    **options
+        As for `Tracker`.
+    """
+
+    name = "nearest-neighbour"
+    method = NearestNeighbour

@@ -16,11 +16,15 @@ from assoc.filters.batches import concatenate
 from assoc.problem import AssignmentProblem
 from assoc.tracking.associate.all_sensors import associated, associated_in_order, scan_problem
 from assoc.tracking.associate.method import Method
+from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.progress import Association, Progress
+from assoc.tracking.tracker import Tracker
 
 
 class StaticFusion(Method):
-    """What `assoc.tracking.StaticFusionTracker` does with a scan."""
+    """What the tracker does with a scan."""
+
+    nursery = TrackTrees()
 
     def at_once(self, progress: Progress) -> Association:
         """Fuse the scan, then assign the fused tuples to tracks."""
@@ -106,3 +110,20 @@ def _pairs(progress: Progress, fused: Array) -> tuple[Array, Array, Array, Any]:
     inside = nis <= chi_square_quantiles(probability, largest)[freedom]
     inside &= costs < -float(terms.miss.sum())
     return track[inside], which[inside], costs[inside], corrected[inside]
+
+
+class StaticFusionTracker(Tracker):
+    """S-D fusion of each scan by itself, then a 2-D assignment of the fused tuples to the tracks.
+
+    The S-D problem knows nothing of the tracks: what it puts together stays together. Single measurements go
+    to the tracks as tuples of one. A tuple's cost for a track is that of all its measurements under the
+    track's predicted density, misses included, averaged over whether the track is a target at all.
+
+    Parameters
+    ----------
+    sensors, filter, **options
+        As for `Tracker`.
+    """
+
+    name = "static"
+    method = StaticFusion

@@ -11,6 +11,7 @@ still let two tracks swap bearings, until they are ghosts: those end by `assoc.t
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +20,10 @@ from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.associate.mht import TrackTrees
 from assoc.tracking.births.new_tracks import angles_alone
-from assoc.tracking.looks import excuse, keep_pace, out_of_view
+from assoc.tracking.looks import out_of_view
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
-from assoc.tracking.stages import associate, live, predict, report
 from assoc.tracking.state import Nursery, TrackerState
 from assoc.tracking.track import Decision, Step
 from assoc.tracking.track_batch import TrackBatch
@@ -35,10 +34,10 @@ _GROWN = 5
 
 def with_nursery(settings: TrackerSettings) -> TrackerSettings:
     """The same settings, with those of a nursery where the tracker needs one."""
-    if not settings.method.needs_nursery or not angles_alone(settings.sensors):
+    method = settings.method.nursery
+    if method is None or not angles_alone(settings.sensors):
         return settings
-    young = replace(settings, name=TrackTrees.name, method=TrackTrees(), registration=None, identity=None)
-    return replace(settings, nursery=young)
+    return replace(settings, nursery=replace(settings, method=method, registration=None, identity=None))
 
 
 def current(settings: TrackerSettings, state: TrackerState) -> TrackBatch:
@@ -52,8 +51,9 @@ def current(settings: TrackerSettings, state: TrackerState) -> TrackBatch:
 
 def take_over(progress: Progress) -> Progress:
     """Stage: the tracks that have grown up leave the nursery."""
-    assert progress.state.nursery is not None
-    young, grown = TrackTrees.hand_over(progress.state.nursery.state, _GROWN)
+    settings = progress.settings.nursery
+    assert settings is not None and progress.state.nursery is not None
+    young, grown = settings.method.hand_over(progress.state.nursery.state, _GROWN)
     tracks = TrackBatch.concatenate([progress.state.tracks, grown])
     return progress.with_state(tracks=tracks, nursery=progress.state.nursery._replace(state=young))
 
@@ -103,8 +103,8 @@ def partners(progress: Progress, step: Step, ghosts: Array) -> Array:
     return np.intersect1d(touched, [track for track in apart if track > 0])
 
 
-def raise_young(progress: Progress) -> Progress:
-    """Stage: a step of the nursery with the measurements that the tracks have left over."""
+def raise_young(progress: Progress, stages: Iterable[Callable[[Progress], Progress]]) -> Progress:
+    """Take the nursery through these stages with the measurements that the tracks have left over."""
     settings, state, step, scan = progress.settings, progress.state, progress.step, progress.scan
     assert settings.nursery is not None and state.nursery is not None and step is not None
     free = [ids == 0 for ids in step.assigned]
@@ -112,7 +112,7 @@ def raise_young(progress: Progress) -> Progress:
     times = None if scan.times is None else tuple(one[own] for one, own in zip(scan.times, free, strict=True))
     left = Scan(scan.index, scan.time, z, times=times, sectors=scan.sectors)
     young = Progress(settings.nursery, state.nursery.state, left, progress.work)
-    for stage in (keep_pace, predict, associate, live, excuse, report):
+    for stage in stages:
         young = stage(young)
     assert young.step is not None
     assigned, confirmed = [one.copy() for one in step.assigned], [one.copy() for one in step.confirmed]

@@ -1,4 +1,4 @@
-"""The next hypotheses of all clusters by one sensor's measurements: Reid's generation, cluster by cluster."""
+"""The next hypotheses of all clusters: by one sensor's measurements (Reid's generation), and where bearings cross."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import numpy as np
 
 from assoc._system import memory
 from assoc._types import Array
+from assoc.problem import AssignmentProblem
+from assoc.ranking.kbest import kbest
 from assoc.tracking.mht.children import Meanings, next_hypotheses
 from assoc.tracking.mht.clusters import Cluster, cluster, doubted, grouped, linked, merged, odds_of
-from assoc.tracking.mht.growth import Offers
+from assoc.tracking.mht.growth import Births, Offers
 
 
 def generated(
@@ -89,3 +91,83 @@ def _children(
     )
     rows = np.concatenate([whole.branches, len(offers.missed) + pair, birth_row])
     return Cluster(rows[used], holds, weight)
+
+
+def with_births(
+    clusters: Sequence[Cluster], rows: Array, births: Births, sizes: Array, most: int, drop: float
+) -> list[Cluster]:
+    """Merge the clusters that want the measurements of births, and add every set of births that a hypothesis allows.
+
+    Parameters
+    ----------
+    clusters : sequence of Cluster
+        Of B branches.
+    rows : int array (B, S)
+        1-based measurements of this scan that each branch has taken, 0: none.
+    births : Births
+        N of them.
+    sizes : int array (S,)
+        Measurements of each sensor.
+    most, drop
+        The most hypotheses of a cluster, and how far below the best they may be.
+
+    Returns
+    -------
+    list of Cluster
+        Of rows among the branches and the births, in this order.
+    """
+    width = int(sizes.max(initial=0)) + 1
+    places = width * np.arange(len(sizes))
+    own = np.repeat(np.arange(len(clusters)), [len(one.branches) for one in clusters])
+    branch, taken = np.nonzero(rows)
+    birth, wanted = np.nonzero(births.rows)
+    begin = len(clusters) + len(births.score)
+    first = np.append(own[branch], len(clusters) + birth)
+    second = np.append((places[taken] + rows[branch, taken]), (places + births.rows)[birth, wanted])
+    label = linked(first, begin + second, begin + width * len(sizes))
+    parts = int(label[:begin].max(initial=-1)) + 1
+    members, born = grouped(label[: len(clusters)], parts), grouped(label[len(clusters) : begin], parts)
+    found = []
+    for there, new in zip(members, born, strict=True):
+        if not len(new):
+            found += [clusters[i] for i in there.tolist()]
+            continue
+        nobody = Cluster(np.zeros(0, dtype=np.int64), np.zeros((1, 0), dtype=np.bool_), np.zeros(1))
+        whole = merged([nobody, *(clusters[i] for i in there.tolist())], np.zeros(len(rows)), most)
+        found.append(_with_sets(whole, rows, new, births, sizes, most, drop))
+    return found
+
+
+def _with_sets(
+    whole: Cluster, rows: Array, new: Array, births: Births, sizes: Array, most: int, drop: float
+) -> Cluster:
+    """The children of a cluster's hypotheses by these births."""
+    # which births the measurements leave open that each hypothesis has taken
+    used = rows[whole.branches]
+    wants = births.rows[new]
+    excluded = ((used[:, None] == wants) & (wants > 0)).any(axis=2)
+    open_births = whole.holds.astype(np.int64) @ excluded == 0
+    known: dict[bytes, tuple[Array, Array]] = {}
+    holds, weight = [], []
+    for held, before, able in zip(whole.holds, whole.weight, open_births, strict=True):
+        key = able.tobytes()
+        if key not in known:
+            known[key] = _sets(births, new, able, sizes, most)
+        sets, score = known[key]
+        holds.append(np.concatenate([np.broadcast_to(held, (len(sets), len(held))), sets], axis=1))
+        weight.append(before + score)
+    branches = np.append(whole.branches, len(rows) + new)
+    return cluster(branches, np.concatenate(holds), np.concatenate(weight), most, drop)
+
+
+def _sets(births: Births, new: Array, able: Array, sizes: Array, most: int) -> tuple[Array, Array]:
+    """The best sets of births that may be, as masks over `new` (K, N), and the sum of the scores of each."""
+    numbers = np.flatnonzero(able)
+    if not len(numbers):
+        return np.zeros((1, len(new)), dtype=np.bool_), np.zeros(1)
+    chosen = new[numbers]
+    solutions = kbest(AssignmentProblem(births.rows[chosen], -births.score[chosen], sizes), most)
+    sets = np.zeros((len(solutions), len(new)), dtype=np.bool_)
+    for one, solution in zip(sets, solutions, strict=True):
+        one[numbers[solution.indices[solution.indices < len(numbers)]]] = True
+    return sets, np.array([-solution.cost for solution in solutions])

@@ -91,7 +91,6 @@ class DeferringMethod(Method):
     """A method that decides a scan `depth` - 1 scans later."""
 
     depth: int = 3
-    needs_nursery = False
 
     def _check(self, whole: str, drop: str) -> None:
         """Refuse a depth, a number of hypotheses or branches, or a drop of their scores that is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +11,37 @@ from assoc._system.interrupts import end_is_asked
 from assoc._types import Array
 from assoc.metrics import CtMtIt, ct_mt_it, tracks_of_one_identity
 from assoc.recordings import Recording, Window
-from assoc.tracking.plots.plot_windows import step_windows
+from assoc.tracking.track import Step
 from assoc.tracking.track_table import TrackTable
 from assoc.tracking.tracker import Tracker
+
+
+def step_windows(tracker: Tracker, windows: Iterable[Window], *, stamps: bool = True) -> Iterator[Step]:
+    """Take windows of plots in, one after the other.
+
+    Parameters
+    ----------
+    tracker : Tracker
+        Of a single sensor, one that takes measurements with times of their own.
+    windows : iterable of Window
+        By the antenna's turn they may overlap a little in time; a plot older than the last window's end
+        counts as of that end.
+    stamps : bool
+        Whether each plot keeps its own time; otherwise all of a window are taken to be of its end.
+
+    Yields
+    ------
+    Step
+        One for each window.
+    """
+    for window in windows:
+        early = tracker.time
+        times = np.asarray(window.times, dtype=np.float64)
+        if early is not None:
+            times = np.maximum(times, early)
+        end = float(times[-1]) if len(times) else float(early or 0.0)
+        known = [np.stack([window.identities, window.addresses], axis=1)]
+        yield tracker.step(end, [window.measurements], [times] if stamps else None, identities=known)
 
 
 class PlotTracks(NamedTuple):

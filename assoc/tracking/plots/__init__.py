@@ -1,1 +1,0 @@
-"""Radar plots in windows of time, instead of scans."""
