@@ -98,7 +98,7 @@ def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, A
 
     def write_tracks_on_map() -> None:
         if parsed["map"]:
-            from assoc.tracking.maps import write_map
+            from assoc.exports.maps import write_map
 
             write_map(parsed["map"], table.to_frame())
 

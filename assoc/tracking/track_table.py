@@ -13,10 +13,10 @@ from assoc._system.door import door, doors
 from assoc._system.interrupts import end_is_asked
 from assoc._text.shown import Shown
 from assoc._types import Array
+from assoc.exports.maps import coordinates, followed_targets
 from assoc.metrics.trajectories import last_at_each_instant
 from assoc.scene.geodesy import Origin
 from assoc.scene.scene import Scene
-from assoc.tracking.maps import coordinates, followed_targets
 from assoc.tracking.track import Decision, Track
 from assoc.tracking.tracker import Tracker
 

@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 
 from assoc.errors import AssocWarning, InvalidInputError
+from assoc.exports.maps import write_map
 from assoc.scene import Scene, Truth
 from assoc.scene.geodesy import earth_centered, east_north_up, geodetic
 from assoc.sensors import PositionSensor
 from assoc.simulation import simulate
 from assoc.tracking import MultiSensorTracker, track_scene
-from assoc.tracking.maps import write_map
 
 
 def test_the_way_back_from_the_plane():
