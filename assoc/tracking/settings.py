@@ -77,7 +77,12 @@ class TrackerSettings:
         if not (self.identity is None or isinstance(self.identity, IdentityParameters)):
             raise InvalidInputError(f"identity must be IdentityParameters, got {type(self.identity).__name__}")
 
-    @property
+    @cached_property
+    def angles_alone(self) -> bool:
+        """Whether no sensor tells a distance, so that none starts a track alone."""
+        return all(all(sensor.angular[: sensor.dim]) for sensor in self.sensors)
+
+    @cached_property
     def sensors(self) -> tuple[Sensor, ...]:
         """The sensors."""
         return tuple(self.place.sensors)

@@ -21,7 +21,6 @@ from assoc.errors import InvalidInputError, warn
 from assoc.filters.base import predict_each
 from assoc.scene.own_times import checked_sectors, checked_times
 from assoc.scene.scan import Scan
-from assoc.tracking.births.new_tracks import angles_alone
 from assoc.tracking.births.nursery import current, end_ghosts, raise_young, take_over
 from assoc.tracking.checking import checked_measurements, checked_time
 from assoc.tracking.identity_evidence import checked_identities
@@ -123,7 +122,7 @@ def _checked_stamps(
 def _warned(settings: TrackerSettings, state: TrackerState, scan: Scan) -> TrackerState:
     """Warn once where angles alone can start no track, and there is none."""
     sensors = settings.sensors
-    if state.warned or not any(map(len, scan.measurements)) or not angles_alone(sensors):
+    if not settings.angles_alone or state.warned or not any(map(len, scan.measurements)):
         return state
     if scan.at_once and len(sensors) > 1 or len(current(settings, state)):
         return state

@@ -20,13 +20,7 @@ from assoc.costs.tracks.scores import ScoreTerms, log_birth
 from assoc.filters.base import Filter
 from assoc.scene.scan import Scan
 from assoc.scene.scene import Scene
-from assoc.sensors import Sensor
 from assoc.tracking.births.initiation import Initiation
-
-
-def angles_alone(sensors: Sequence[Sensor]) -> bool:
-    """Whether no sensor tells a distance, so that none starts a track alone."""
-    return all(all(sensor.angular[: sensor.dim]) for sensor in sensors)
 
 
 class Crossings(NamedTuple):
@@ -128,10 +122,10 @@ class NewTracks:
         Returns
         -------
         Crossings or None
-            None where there are no such tuples, or sensors tell distances.
+            None where there are no such tuples.
         """
         numbers = [np.flatnonzero(one) for one in free]
-        if not angles_alone(self._place.sensors) or sum(len(one) > 0 for one in numbers) < 2:
+        if sum(len(one) > 0 for one in numbers) < 2:
             return None
         left = Scan(scan.index, scan.time, tuple(z[own] for z, own in zip(scan.measurements, numbers, strict=True)))
         problem = build_problem(self._place, left, speed=self._initiation.speed, **self._limits)

@@ -20,7 +20,6 @@ from assoc._types import Array
 from assoc.errors import LimitExceededError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scan import Scan
-from assoc.tracking.births.new_tracks import angles_alone
 from assoc.tracking.looks import out_of_view
 from assoc.tracking.progress import Progress
 from assoc.tracking.settings import TrackerSettings
@@ -35,7 +34,7 @@ _GROWN = 5
 def with_nursery(settings: TrackerSettings) -> TrackerSettings:
     """The same settings, with those of a nursery where the tracker needs one."""
     method = settings.method.nursery
-    if method is None or not angles_alone(settings.sensors):
+    if method is None or not settings.angles_alone:
         return settings
     return replace(settings, nursery=replace(settings, method=method, registration=None, identity=None))
 

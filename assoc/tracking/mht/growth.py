@@ -149,6 +149,8 @@ class AtOnce(Growth):
     def crossings(self, taken: Array) -> Offers | None:
         """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone."""
         scan = self._progress.scan
+        if not self._progress.settings.angles_alone:
+            return None
         free = [np.isin(np.arange(1, size + 1), taken[:, s], invert=True) for s, size in enumerate(scan.sizes.tolist())]
         found = self._progress.settings.births.crossings(scan, free)
         if found is None:
