@@ -157,8 +157,8 @@ class AtOnce(Growth):
             return None
         # by far the most are ghosts
         best = np.argsort(-found.scores, kind="stable")[:_MOST_CROSSINGS]
-        ids = np.empty(len(best), dtype=np.int64)
-        ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
+        best = best[np.lexsort(found.positions[best].T)]
+        ids = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
         self._offered = [self._states, found.states[best]]
         nothing = np.zeros(0, dtype=np.int64)
