@@ -34,8 +34,8 @@ class Crossings(NamedTuple):
     """As new targets, (K,)."""
     positions: Array
     """Metres, (K, 3)."""
-    states: Any
-    """Of new tracks."""
+    covariances: Array
+    """(K, 3, 3)."""
 
 
 class NewTracks:
@@ -137,5 +137,4 @@ class NewTracks:
         given = [np.concatenate([[0], own + 1]) for own in numbers]
         rows = np.stack([one[tuples[:, s]] for s, one in enumerate(given)], axis=1).astype(np.int32)
         rows, costs, positions, covariances = rows[fit], costs[fit], positions[fit], covariances[fit]
-        states = self._initiation.start(self._filter, positions, covariances)
-        return Crossings(rows, costs, self.scores(rows, costs, covariances), positions, states)
+        return Crossings(rows, costs, self.scores(rows, costs, covariances), positions, covariances)

@@ -148,11 +148,11 @@ class AtOnce(Growth):
 
     def crossings(self, taken: Array) -> Offers | None:
         """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone."""
-        scan = self._progress.scan
-        if not self._progress.settings.angles_alone:
+        settings, scan = self._progress.settings, self._progress.scan
+        if not settings.angles_alone:
             return None
         free = [np.isin(np.arange(1, size + 1), taken[:, s], invert=True) for s, size in enumerate(scan.sizes.tolist())]
-        found = self._progress.settings.births.crossings(scan, free)
+        found = settings.births.crossings(scan, free)
         if found is None:
             return None
         # by far the most are ghosts
@@ -160,7 +160,8 @@ class AtOnce(Growth):
         best = best[np.lexsort(found.positions[best].T)]
         ids = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
-        self._offered = [self._states, found.states[best]]
+        begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
+        self._offered = [self._states, begun]
         nothing = np.zeros(0, dtype=np.int64)
         return Offers(np.zeros(len(self.rows)), nothing, nothing, np.zeros(0), np.zeros(0), births)
 
