@@ -241,14 +241,21 @@ def test_kept_identities_are_those_of_the_metric():
         told = np.zeros((n, 2), dtype=np.int64)
         told[:, column] = codes
         judge = KeptIdentities()
-        for k in range(0, n, 7):
-            part = slice(k, k + 7)
-            judge.take(tracks[part], sure[part], np.full(len(tracks[part]), float(k)), told[part])
-            assert k < 200 or judge.counts()[1] > 5
+
+        def feed(judge=judge, given=(tracks, sure, told)):
+            for k in range(0, len(given[0]), 7):
+                of, known, codes = (one[k : k + 7] for one in given)
+                judge.take(of, known, np.full(len(of), float(k)), codes)
+                assert k < 200 or judge.counts()[1] > 5
+
+        feed()
         assert 0 < expected[0] < expected[1] and judge.counts() == expected
         # what is judged is counted once, and forgotten
         judge.settle({1, 2}, 1e9)
-        assert judge.counts() == expected and len(judge._tracks) == 2
+        assert judge.counts() == expected
+        judge.settle(set(), 1e9)
+        feed()
+        assert judge.counts() == (2 * expected[0], 2 * expected[1])
 
 
 @pytest.mark.parametrize("time", [5_000.0, -5_000.0])

@@ -1,7 +1,8 @@
 """What a tracker says of itself: how it associates a scan with its tracks. Everything else is in `assoc.tracking.step`.
 
 A method is a frozen dataclass of the tracker's own settings. Its functions take a step under way and return records;
-they keep nothing. A tracker that decides each scan at once writes `at_once` and `in_order` alone.
+they keep nothing. A tracker that decides each scan at once writes `at_once`, and `in_order` for measurements with
+times of their own; all else may stay as it is here.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from assoc._types import Array
 from assoc.costs.tracks.own_times import TimedScan
+from assoc.errors import InvalidInputError
 from assoc.scene.scan import Scan
 from assoc.tracking.file import Saved
 from assoc.tracking.looks import to_delete
@@ -40,9 +42,9 @@ class Method(ABC):
     def at_once(self, progress: Progress) -> Association:
         """Associate a scan of one instant with the tracks of the state, which have been predicted to it."""
 
-    @abstractmethod
     def in_order(self, progress: Progress, timed: TimedScan) -> Association:
         """Associate a scan whose measurements have times of their own with the tracks as of the last scan."""
+        raise InvalidInputError("times, sectors and identities: this tracker takes measurements of one instant only")
 
     def life_cycle(self, progress: Progress, found: Association) -> Progress:
         """Confirm tracks, say what was decided, delete tracks."""

@@ -79,30 +79,6 @@ class _Work(NamedTuple):
     taken: Any
 
 
-def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> tuple[Array, Array, Array]:
-    """Rank the children of all parents.
-
-    Parameters
-    ----------
-    parents : Parents
-    meanings : Meanings
-    most : int
-        The most children.
-    drop : float
-        Children whose log-probability is this far below the best are left out.
-
-    Returns
-    -------
-    parent : int64 array (C,)
-    choice : int32 array (C, n)
-        Pair of each measurement, or `NEW`, or `FALSE`.
-    weight : array (C,)
-        Log-probability, the largest first.
-    """
-    parent, choice, weight = _rank(parents, meanings, most, drop)
-    return parent, choice, weight
-
-
 @search_njit
 def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, most: int, drop: float) -> Any:
     """The next hypotheses of a cluster, in one compiled call.
@@ -129,7 +105,7 @@ def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, mo
         for b in range(tracks):
             if holds[h, b]:
                 alone[h] += missed[b]
-    parent, choice, after = _rank(Parents(holds, alone), meanings, most, drop)
+    parent, choice, after = best_children(Parents(holds, alone), meanings, most, drop)
     held = np.zeros((parent.size, tracks + pairs + meanings.birth.size), np.bool_)
     for c in range(parent.size):
         copy_to(held[c, :tracks], holds[parent[c]])
@@ -152,7 +128,26 @@ def next_hypotheses(holds: Any, weight: Any, missed: Any, meanings: Meanings, mo
 
 
 @search_njit
-def _rank(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
+def best_children(parents: Parents, meanings: Meanings, most: int, drop: float) -> Any:
+    """Rank the children of all parents.
+
+    Parameters
+    ----------
+    parents : Parents
+    meanings : Meanings
+    most : int
+        The most children.
+    drop : float
+        Children whose log-probability is this far below the best are left out.
+
+    Returns
+    -------
+    parent : int64 array (C,)
+    choice : int32 array (C, n)
+        Pair of each measurement, or `NEW`, or `FALSE`.
+    weight : array (C,)
+        Log-probability, the largest first.
+    """
     holds, weight = parents
     count, room = meanings.birth.size, weight.size + 64
     nodes = _Nodes(
