@@ -69,6 +69,9 @@ class TrackerSettings:
             raise InvalidInputError(f"gate_probability must be above 0 and below 1, got {self.gate_probability!r}")
         if not is_whole(self.max_tuples, 1):
             raise InvalidInputError(f"max_tuples must be a whole number above 0, got {self.max_tuples!r}")
+        # numbers of numpy's are the same settings
+        object.__setattr__(self, "gate_probability", float(self.gate_probability))
+        object.__setattr__(self, "max_tuples", int(self.max_tuples))
         online = self.registration
         if not (online is None or isinstance(online, OnlineRegistration)):
             raise InvalidInputError(f"registration: expected 'online' or an OnlineRegistration, got {online!r}")

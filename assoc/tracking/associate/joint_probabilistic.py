@@ -103,6 +103,7 @@ class JointProbabilistic(Method):
     def __post_init__(self) -> None:
         if not is_whole(self.max_events, 1):
             raise InvalidInputError(f"max_events must be a whole number above 0, got {self.max_events!r}")
+        object.__setattr__(self, "max_events", int(self.max_events))
 
     def begun(self, settings: TrackerSettings, tracks: TrackBatch) -> tuple[PairProbabilities, ...]:
         """No probabilities."""

@@ -97,8 +97,10 @@ class DeferringMethod(Method):
         for what in ("depth", whole):
             if not is_whole(getattr(self, what), 1):
                 raise InvalidInputError(f"{what} must be a whole number above 0, got {getattr(self, what)!r}")
+            object.__setattr__(self, what, int(getattr(self, what)))
         if self.depth > MOST_SCANS:
             raise InvalidInputError(f"depth must be at most {MOST_SCANS} scans, got {self.depth}")
         value = getattr(self, drop)
         if not isinstance(value, (int, float)) or not value > 0:
             raise InvalidInputError(f"{drop} must be a number above 0, got {value!r}")
+        object.__setattr__(self, drop, float(value))
