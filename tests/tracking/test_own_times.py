@@ -9,7 +9,7 @@ import pytest
 
 from assoc.errors import InvalidInputError
 from assoc.filters import ConstantVelocity, KalmanFilter
-from assoc.sensors import BearingSensor, PositionSensor, Radar3D
+from assoc.sensors import BearingSensor, Radar3D
 from assoc.simulation import simulate
 from assoc.tracking import TRACKERS, Initiation, LifeCycle, track_scene
 from experiments.trackers.oracle import OracleTracker
@@ -200,18 +200,3 @@ def test_what_is_refused():
             tracker.step(6.0, z, times, sectors)
         assert "\n" not in str(caught.value)
         assert tracker.time == 5.0
-
-
-def test_a_saved_tracker_knows_how_often_it_is_looked_at(tmp_path):
-    scene = simulate("rotating-radars", 1, aircraft=3, duration=20.0)
-    whole, first, second = (TRACKERS["mht"].for_scene(scene) for _ in range(3))
-    for k in range(scene.num_scans):
-        scan = scene.scan(k)
-        given = scan.time, scan.measurements, scan.times, scan.sectors
-        whole.step(*given)
-        if k == 5:
-            first.save(tmp_path / "half.npz")
-            second.restore(tmp_path / "half.npz")
-        (first if k <= 4 else second).step(*given) if k != 5 else second.step(*given)
-    assert [t.mean.tolist() for t in whole.tracks] == [t.mean.tolist() for t in second.tracks]
-    assert isinstance(scene.sensors[0], Radar3D) and not isinstance(scene.sensors[0], PositionSensor)

@@ -73,22 +73,6 @@ def test_targets_are_found_and_decisions_are_complete(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_saved_and_restored_the_future_is_the_same(kind, tmp_path):
-    one = scene()
-    straight = kind.for_scene(one, seed=3)
-    run(straight, one, 0, 4)
-    straight.save(tmp_path / "state.npz")
-    later = kind.for_scene(one, seed=3)
-    later.restore(tmp_path / "state.npz")
-    same(straight, later)
-    steps, again = run(straight, one, 4), run(later, one, 4)
-    same(straight, later)
-    for a, b in zip(steps, again, strict=True):
-        assert all(np.array_equal(x, y) for x, y in zip(a.assigned, b.assigned, strict=True))
-        assert len(a.final) == len(b.final)
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_the_order_of_the_measurements_does_not_matter(kind):
     one, rng = scene(), np.random.default_rng(5)
     plain, shuffled = kind.for_scene(one), kind.for_scene(one)

@@ -92,7 +92,7 @@ class TrackTrees(DeferringMethod):
             kept, tables, chosen = self._extended(progress, tables, offers, s)
             growth.take(s, offers, kept)
         if isinstance(growth, AtOnce):
-            crossed = growth.crossings(tables.history[chosen & (tables.counts[:, SURE] > 0), :count])
+            crossed = growth.crossings(tables.history[chosen & (tables.counts[:, SURE] > 0), :count], by_place=True)
             if crossed is not None:
                 kept, tables, chosen = self._extended(progress, tables, crossed, 0)
                 growth.take(0, crossed, kept)

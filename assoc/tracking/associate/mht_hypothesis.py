@@ -119,7 +119,7 @@ class ClusteredHypotheses(DeferringMethod):
         if isinstance(growth, AtOnce):
             rows = Hypotheses(own.window, tuple(clusters)).best
             sure = np.append(tracks.confirmed, False)[growth.origin[rows]]
-            crossed = growth.crossings(growth.rows[rows[sure]])
+            crossed = growth.crossings(growth.rows[rows[sure]], by_place=False)
             if crossed is not None:
                 taken(0, crossed, with_births(clusters, growth.rows, crossed.births, progress.scan.sizes, *limits))
         grown = growth.finished()

@@ -146,8 +146,11 @@ class AtOnce(Growth):
     def _take_states(self, s: int, offers: Offers, kept: Array) -> None:
         self._states = concatenate(self._offered)[kept]
 
-    def crossings(self, taken: Array) -> Offers | None:
-        """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone."""
+    def crossings(self, taken: Array, by_place: bool) -> Offers | None:
+        """New targets of what these measurements (T, S), of tracks, leave of sensors that start none alone.
+
+        They are listed by their places, or the most likely first.
+        """
         settings, scan = self._progress.settings, self._progress.scan
         if not settings.angles_alone:
             return None
@@ -157,8 +160,10 @@ class AtOnce(Growth):
             return None
         # by far the most are ghosts
         best = np.argsort(-found.scores, kind="stable")[:_MOST_CROSSINGS]
-        best = best[np.lexsort(found.positions[best].T)]
-        ids = self._progress.work.new_ids(len(best))
+        if by_place:
+            best = best[np.lexsort(found.positions[best].T)]
+        ids = np.empty(len(best), dtype=np.int64)
+        ids[np.lexsort(found.positions[best].T)] = self._progress.work.new_ids(len(best))
         births = Births(ids, found.rows[best], np.full(len(best), scan.time), found.scores[best])
         begun = settings.initiation.start(settings.filter, found.positions[best], found.covariances[best])
         self._offered = [self._states, begun]
