@@ -60,6 +60,16 @@ def _uncut(packing: Packing, duals: Any, *_: Any) -> Root:
     return plain_root(packing, duals)
 
 
+_searched = diving.search_shortly
+
+
+def _forgetful(*arguments: Any) -> Any:
+    """A search at the end of a dive that knows nothing of pairs from those before."""
+    for known in arguments[-1]:
+        known[:] = 0
+    return _searched(*arguments)
+
+
 def _replaced(owner: Any, name: str, new: Any) -> Callable[[], AbstractContextManager[Any]]:
     return lambda: mock.patch.object(owner, name, new)
 
@@ -178,6 +188,7 @@ OWN = (
 SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
     Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
+    Part("nothing kept of pairs from dive to dive", SOLVERS, without=_replaced(diving, "search_shortly", _forgetful)),
     Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
     Part(
         "no cluster search",

@@ -11,7 +11,8 @@ before it cost, and what is left can still bring. The first choices cost next to
 The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
 the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
 cover, and branch and bound (branching/short_search.py) covers what is left, as a problem of its own. The share grows
-while these searches end early, and shrinks when they do not end at all.
+while these searches end early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to
+dive.
 
 References
 ----------
@@ -30,7 +31,7 @@ from assoc.packing.bounds.dual_ascent import reduced_costs
 from assoc.packing.bounds.priced import Priced
 from assoc.packing.branching.depth_first import Limits
 from assoc.packing.branching.root import MOST_ROWS, root_with_cuts
-from assoc.packing.branching.short_search import Part, search_shortly, short_memory
+from assoc.packing.branching.short_search import Lessons, Part, no_lessons, search_shortly, short_memory
 from assoc.packing.neighbourhoods.cover import own_all
 from assoc.packing.packing import Packing
 from assoc.packing.simplex.basis import basis_of
@@ -93,6 +94,7 @@ class Diver:
         self._program = LinearProgram.extended(self._core, root.program, root.slack, basis)
         self._relaxed = self._program.solve(deadline=deadline)
         self._program.mark()
+        self._lessons = no_lessons(self._core)
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
@@ -153,7 +155,7 @@ class Diver:
                 break
             if not at.fix(_drawn(columns, chances, rng), _BATCH * (at.open_rows - left), deadline):
                 break
-        found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline))
+        found, done = at.completed(Limits(self._tolerance, np.inf, _NODES, deadline), self._lessons)
         self.share = min(self.share + _GROW, _HIGHEST) if done else max(self.share - _SHRINK, _LOWEST)
         owner = np.full(self._packing.num_rows, -1, dtype=np.int32)
         own_all(self._packing.arrays.cols, self._core.origin[found], owner)
@@ -239,7 +241,7 @@ class _Descent:
         """Columns that are fixed."""
         return np.array(self._fixed, dtype=np.int64)
 
-    def completed(self, limits: Limits) -> tuple[NDArray[np.int64], bool]:
+    def completed(self, limits: Limits, lessons: Lessons) -> tuple[NDArray[np.int64], bool]:
         """Search a cover lighter than the cutoff with what is fixed; what is fixed alone where none was found.
 
         And whether the search came to its end.
@@ -248,5 +250,5 @@ class _Descent:
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)
         slack = self._packing.slack & ~self._covered
         part = Part(columns, slack, self.fixed)
-        found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits)
+        found, done = search_shortly(self._packing, self._program, part, self._cutoff, limits, lessons)
         return (found if found.size else self.fixed), done
