@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -74,8 +74,9 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     # all at once at the start: the executor loses count when one dies while it starts another on demand
     executor._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]
     try:
-        with signals_as_they_are(), safe_path():
-            waiting = _submit(executor, items)
+        # a signal is heard when all are there: one that is half started could not be ended
+        with signals_as_they_are(), safe_path(), ThreadPoolExecutor(1) as starter:
+            waiting = starter.submit(_submit, executor, items).result()
         for future in waiting:
             yield future.result()
     except BrokenProcessPool:
