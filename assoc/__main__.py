@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from assoc._cli.lines import print_lines
-from assoc._cli.program import BAD_INPUT, command, prepare_streams, run_program
-from assoc._cli.speech import SPEECH_FLAGS
+from assoc._cli.options import BAD_INPUT, VERBOSITY_FLAGS
+from assoc._cli.program import command, prepare_streams, run_program
 from assoc._text.near import did_you_mean
 from assoc._text.plain import one_line
 from assoc._version import __version__
@@ -16,7 +16,8 @@ from assoc._version import __version__
 PROGRAMS = {
     "simulate": ("simulate a scene", "three-radar -o scene.npz"),
     "solve": ("associate its measurements", "scene.npz --solver aco"),
-    "track": ("make tracks of scenes or of radar plots", "scene.npz -o tracks.csv"),
+    "track": ("make tracks of scenes or of recorded radar plots", "scene.npz -o tracks.csv"),
+    "live": ("make tracks of radar plots as they come", "scene.npz --page 0 < plots > tracks.csv"),
     "register": ("find biases of sensors", "scene.npz -o registered.npz"),
     "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),
 }
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a program by its name; returns its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     forwarded = []
-    while words and words[0] in SPEECH_FLAGS:
+    while words and words[0] in VERBOSITY_FLAGS:
         forwarded.append(words.pop(0))
     name, *rest = words or ["--help"]
     if name == "check":
@@ -66,10 +67,16 @@ def _list() -> None:
 
 
 def _complete(words: Sequence[str]) -> None:
+    from argparse import ArgumentParser
+
     from assoc._cli.completion import SHELLS, script
 
-    programs = {name: import_module(f"assoc.{name}").completions() for name in PROGRAMS}
-    print(script(words[0] if words else "", {**programs, "check": {}, "completion": {"": SHELLS}}), end="")
+    check, shells = ArgumentParser(add_help=False), ArgumentParser(add_help=False)
+    check.add_argument("files", nargs="*", metavar="FILE")
+    shells.add_argument("shell", choices=SHELLS)
+    others = {"check": check, "completion": shells}
+    programs = {name: import_module(f"assoc.{name}").parser() for name in PROGRAMS}
+    print(script(words[0] if words else "", {**programs, **others}))
 
 
 if __name__ == "__main__":

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import secrets
 import sys
 import types
-from dataclasses import MISSING, Field, fields
+from dataclasses import Field, fields
 from numbers import Integral, Real
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
@@ -17,8 +16,8 @@ from assoc.errors import InvalidInputError
 _FOREVER = 1e9
 
 
-class Option:
-    """One parameter as an option of the command line or a key of a configuration file.
+class Parameter:
+    """One parameter, given by text on a command line or by a value in a configuration file.
 
     Parameters
     ----------
@@ -30,7 +29,6 @@ class Option:
 
     def __init__(self, owner: type, field: Field[Any]) -> None:
         self.name = field.name
-        self.flag = "--" + field.name.replace("_", "-")
         self.help = str(field.metadata.get("help", ""))
         self.default = field.default
         self.positional = bool(field.metadata.get("positional", False))
@@ -51,26 +49,14 @@ class Option:
         """Whether text on a command line can give its value."""
         return self.kind in (int, float, str, bool)
 
-    def describe(self) -> str:
-        """Return the text of the help, with the default."""
-        if self.default is MISSING or self.default is None:
-            return self.help
-        return f"{self.help} (default {self.default})".strip()
-
-    def metavar(self) -> str:
-        """Return what stands for the value in the help."""
-        if self.choices:
-            return "{" + ",".join(map(str, self.choices)) + "}"
-        return {int: "N", float: "X"}.get(self.kind, "TEXT")
-
-    def parse(self, text: str) -> Any:
-        """Turn text from the command line into the value."""
+    def parse(self, text: str, label: str) -> Any:
+        """Turn text from a command line into the value."""
         try:
             value = self.kind(text)
         except ValueError:
             expected = {int: "a whole number", float: "a number"}.get(self.kind, "a value")
-            raise InvalidInputError(f"{self.flag}: expected {expected}, got {text!r}") from None
-        return self.check(value, self.flag)
+            raise InvalidInputError(f"{label}: expected {expected}, got {text!r}") from None
+        return self.check(value, label)
 
     def check(self, value: Any, label: str) -> Any:
         """Check the type of a value from a configuration file; whole numbers will do for numbers."""
@@ -87,27 +73,11 @@ class Option:
             raise InvalidInputError(f"{label}: expected one of {', '.join(map(str, self.choices))}, got {value!r}")
         return value
 
-    def add_to(self, parser: argparse._ActionsContainer) -> None:
-        """Add the option to a parser or a group; without a value it stays out of the parsed arguments."""
-        text = self.describe().replace("%", "%%")
-        if self.positional:
-            parser.add_argument(self.name, metavar=self.name.upper(), help=text)
-        elif self.kind is bool:
-            parser.add_argument(
-                self.flag,
-                dest=self.name,
-                action=argparse.BooleanOptionalAction,
-                default=argparse.SUPPRESS,
-                help=text,
-            )
-        else:
-            parser.add_argument(self.flag, dest=self.name, metavar=self.metavar(), default=argparse.SUPPRESS, help=text)
 
-
-def options(owner: type) -> list[Option]:
-    """Options for the fields of a parameter dataclass that text can give."""
-    every = [Option(owner, field) for field in fields(cast(Any, owner))]
-    return [option for option in every if option.usable]
+def parameters_of(owner: type) -> list[Parameter]:
+    """The fields of a parameter dataclass that text can give."""
+    every = [Parameter(owner, field) for field in fields(cast(Any, owner))]
+    return [parameter for parameter in every if parameter.usable]
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> bool:

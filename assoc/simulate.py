@@ -5,17 +5,16 @@ This is a program: the package must not import it. Imports inside functions keep
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
 from itertools import takewhile
 from typing import Any
 
-from assoc._cli.inputs import check_ending, check_outputs
 from assoc._cli.lines import print_lines
-from assoc._cli.options import add_common_options, common_values, parameter_values
-from assoc._cli.program import Parser, command, prepare_process, run_program
-from assoc._cli.speech import SPEECH_FLAGS, add_speech_options, spoken
-from assoc._parameters import Option, options
+from assoc._cli.messages import messages
+from assoc._cli.options import COMMON, VERBOSITY_FLAGS, Given, Option, Parser, parameter_options, verbosity
+from assoc._cli.program import Program, command
+from assoc._cli.signals import EarlyEnd
+from assoc._cli.values import Output
+from assoc._parameters import parameters_of
 from assoc._text.near import did_you_mean
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
@@ -33,21 +32,16 @@ _PURPOSE = {
 _PLOTS = ("rotating-radar",)
 """Scenarios that write plots, not a scene."""
 
-
-def start(arguments: Sequence[str] | None = None) -> int:
-    """Run the program as a process of its own."""
-    prepare_process("assoc.simulate")
-    return main(arguments)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; returns its exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    return run_program(lambda: _simulate(words), "assoc.simulate")
+_TRUTH = Option(
+    "truth",
+    "FILE",
+    "also write the aircraft's true positions each time the antenna points at them (.csv)",
+    Output(".csv", strict=True),
+)
 
 
 def _simulate(words: list[str]) -> None:
-    before = [*takewhile(lambda word: word in SPEECH_FLAGS, words)]
+    before = [*takewhile(lambda word: word in VERBOSITY_FLAGS, words)]
     words = [*words[len(before) : len(before) + 1], *before, *words[len(before) + 1 :]]
     scenario = words[0] if words else ""
     if scenario not in _PURPOSE:
@@ -59,43 +53,35 @@ def _simulate(words: list[str]) -> None:
         return
     from assoc import simulation
 
-    choices = options(simulation.parameters(scenario))
-    parsed = vars(_parser(scenario, choices).parse_args(words[1:]))
-    seed = common_values(parsed).get("seed", 0)
-    values = parameter_values(choices, parsed)
-    inputs = [value for value in values.values() if isinstance(value, str)]
-    check_outputs([parsed["output"], parsed.get("truth")], inputs)
-    check_ending(parsed["output"], "--output", ".csv" if scenario in _PLOTS else ".npz")
-    check_ending(parsed.get("truth"), "--truth", ".csv")
-    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed.get("truth")]):
-        if parsed["verbose"]:
-            used = {"seed": seed} | {option.name: values.get(option.name, option.default) for option in choices}
+    given = _parser(scenario).read(words[1:])
+    seed = given["seed"] or 0
+    parameters = parameters_of(simulation.parameters(scenario))
+    values = given.some(one.name for one in parameters)
+    given.check_outputs(value for value in values.values() if isinstance(value, str))
+    with messages(given):
+        if given["verbose"]:
+            used = {"seed": seed} | {one.name: values.get(one.name, one.default) for one in parameters}
             print_lines(f"{scenario}: " + ", ".join(f"{name} {value}" for name, value in used.items()))
         if scenario in _PLOTS:
-            _write_plots(scenario, seed, parsed, values)
+            _write_plots(scenario, seed, given, values)
             return
         scene = simulation.simulate(scenario, seed, **values)
-        scene.save(parsed["output"])
-        print_lines(f"{printable(parsed['output'])}: {scene!r}")
+        scene.save(given["output"])
+        print_lines(f"{printable(given['output'])}: {scene!r}")
         for what, count in scene.notes.items():
             print_lines(f"{what}: {count:,}")
 
 
-def completions() -> dict[str, Sequence[str]]:
-    """Options of the program with the values they take, for shells."""
-    from assoc import simulation
-
-    flags: dict[str, Sequence[str]] = {"": tuple(_PURPOSE)}
-    for scenario in _PURPOSE:
-        flags |= _parser(scenario, options(simulation.parameters(scenario))).flags()
-    return flags
+def parser() -> dict[str, Parser]:
+    """Return the parsers of the scenarios."""
+    return {scenario: _parser(scenario) for scenario in _PURPOSE}
 
 
-def _write_plots(scenario: str, seed: int, parsed: dict[str, Any], values: dict[str, Any]) -> None:
+def _write_plots(scenario: str, seed: int, given: Given, values: dict[str, Any]) -> None:
     from assoc import simulation
     from assoc.recordings import write_plots, write_tracks
 
-    output, truth = parsed["output"], parsed["truth"]
+    output, truth = given["output"], given["truth"]
     simulated = simulation.simulate_recording(scenario, seed, **values)
     write_plots(output, simulated.recording)
     if truth is not None:
@@ -118,20 +104,26 @@ def _list_parser() -> Parser:
     return parser
 
 
-def _parser(scenario: str, choices: list[Option]) -> Parser:
+def _parser(scenario: str) -> Parser:
+    from assoc import simulation
+
+    plots = scenario in _PLOTS
+    content = "file for the plots (.csv)" if plots else "file for the scene (.npz)"
     parser = Parser(prog=f"assoc.simulate {scenario}", description=_PURPOSE[scenario] + ".")
-    content = "file for the plots (.csv)" if scenario in _PLOTS else "file for the scene (.npz)"
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=content)
-    if scenario in _PLOTS:
-        text = "also write the aircraft's true positions each time the antenna points at them (.csv)"
-        parser.add_argument("--truth", metavar="FILE", help=text)
-    add_common_options(parser, ["seed"])
-    add_speech_options(parser, "all parameters, the defaults included")
-    group = parser.add_argument_group("scenario")
-    for option in choices:
-        option.add_to(parser if option.positional else group)
+    parser.declare(
+        Option("output", "FILE", content, Output(".csv" if plots else ".npz", strict=True),
+               short="-o", rest={"required": True})
+    )  # fmt: skip
+    if plots:
+        parser.declare(_TRUTH)
+    parser.declare(COMMON["seed"], *verbosity("all parameters, the defaults included"))
+    for option in parameter_options(simulation.parameters(scenario)):
+        parser.declare(option, group="" if option.positional else "scenario")
     return parser
 
+
+PROGRAM = Program("assoc.simulate", _simulate, EarlyEnd("assoc.simulate").on_signals)
+start, main = PROGRAM.start, PROGRAM.main
 
 if __name__ == "__main__":
     raise SystemExit(start())

@@ -8,35 +8,37 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.growing_table import GrowingTable
-from assoc._cli.imports import HELP as IMPORT_HELP
-from assoc._cli.imports import import_modules
-from assoc._cli.inputs import check_ending, check_outputs, read_toml
+from assoc._cli.inputs import import_modules
 from assoc._cli.lines import print_lines
+from assoc._cli.messages import messages
 from assoc._cli.options import (
-    add_common_options,
-    common_values,
+    COMMON,
+    Given,
+    Option,
+    Parser,
     flag_of,
     flags_of_solvers,
-    parameter_values,
+    parameter_options,
+    read_config,
     read_first,
+    verbosity,
 )
-from assoc._cli.program import Parser, command, prepare_streams, run_program, write_all
+from assoc._cli.program import Program, command, write_all
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.signals import EarlyEnd
-from assoc._cli.speech import add_speech_options, spoken
-from assoc._cli.table import print_table
-from assoc._cli.values import check_kind, cores, density, scan_range
-from assoc._files.output import STDOUT, is_stream, write_json, write_text
-from assoc._parameters import Option, options
-from assoc._system.extras import check_extra
+from assoc._cli.table import GrowingTable, print_table
+from assoc._cli.values import Output, csv_table, html_page, scan_range, whole
+from assoc._files.output import write_json, write_text
+from assoc._parameters import Parameter, parameters_of
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 
 if TYPE_CHECKING:
+    from assoc._cli.solver_log import SolverLog
     from assoc.association.association import Association
     from assoc.association.plan import Plan
     from assoc.association.scan import ScanAssociation
@@ -47,239 +49,175 @@ _EARLY_END = EarlyEnd("assoc.solve")
 _LAST_SCAN = 3.0
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
-_GATING = ("gate_probability", "max_tuples", "target_density")
-_LEAST = {"seed": 0, "jobs": 1, "max_tuples": 1, "kbest": 1}
-_SETTINGS = ("solver", "seed", "time_limit", "jobs", "scans", *_GATING, "kbest")
-
-
-def start(arguments: Sequence[str] | None = None) -> int:
-    """Run the program as a process of its own."""
-    prepare_streams()
-    _EARLY_END.on_signals()
-    return main(arguments)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; returns its exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    return run_program(lambda: _solve(words), "assoc.solve")
+_SCENES = {"input": ("scenes",)}
+_GATING = [replace(COMMON[name], only=_SCENES) for name in ("gate_probability", "max_tuples", "target_density")]
+_SOLVER = Option("solver", "NAME", f"name of the solver (default {DEFAULT_SOLVER})")
+_SCANS = Option("scans", "A:B", "only scans A to B-1, counted from 0; A alone is one scan")
+_KBEST = Option("kbest", "K", "the K best associations of each scan, in order", whole(1))
+_OF_FILE = (_SOLVER, COMMON["seed"], COMMON["time_limit"], COMMON["jobs"], _SCANS, *_GATING, _KBEST)  # fmt: skip
+"""Options that a TOML file may have."""
+_OPTIONS = (
+    Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "+"}),
+    *_OF_FILE,
+    Option("all", "", f"print all scans on a terminal, not only the first {_SHOWN}"),
+    Option("json", "FILE", "write the result as JSON", Output(".json")),
+    Option("csv", "FILE", "write the table as CSV", csv_table),
+    Option("report", "FILE", "write an HTML page: scene, association, convergence (needs assoc[report])", html_page),
+    COMMON["config"],
+    Option("proof", "FILE", "write a proof for 'assoc check' as JSON, and its problem beside it as .txt",
+           Output(".json", strict=True, streams=False)),
+    Option("gate_loss", "", "bound what the gates may have cost (takes about three times as long)", only=_SCENES),
+    COMMON["import"],
+    *verbosity("all parameters, and how cost and bound change while a scan is solved"),
+)  # fmt: skip
 
 
 def _solve(words: list[str]) -> None:
-    first = read_first("assoc.solve", words, ["solver", "config", "import"])
+    first = read_first(words, "solver", "config", "import")
     import_modules(first["import"])
-    solver, explicit, config = _solver(first)
-    choices = options(registry.parameters(solver))
-    parsed = vars(_parser(solver, choices, explicit).parse_args(words))
-    settings = {**{key: config[key] for key in _SETTINGS if key in config}, **common_values(parsed)}
-    if parsed["scans"] is not None:
-        settings["scans"] = parsed["scans"]
-    parameters = {**_section(config, solver, choices), **parameter_values(choices, parsed)}
+    config, tables = read_config(first["config"], _OF_FILE, registry.names())
+    named = first["solver"] or config.get("solver")
+    solver = named or DEFAULT_SOLVER
+    given = _parser(solver, explicit=named is not None).read(words)
+    given.fill(first["config"] or "", config)
+    known = parameters_of(registry.parameters(solver))
+    parameters = _section(tables, solver, known) | given.some(one.name for one in known)
     registry.make_parameters(solver, parameters)
-    if "kbest" in settings and (explicit or parameters):
-        label = "--kbest" if parsed["kbest"] is not None else f"{first['config']}: kbest"
+    if given["kbest"] is not None and (named or parameters):
+        label = given.label("kbest")
         raise InvalidInputError(f"{label}: has its own algorithm; leave out --solver and solver parameters")
-    files, proof = parsed["files"], parsed["proof"]
-    if proof is not None and (proof == STDOUT or is_stream(proof)):
-        raise InvalidInputError(f"--proof: {proof}: expected the name of a file, for its problem is written beside it")
-    proved = [] if proof is None else [proof, _problem_beside(proof)]
-    check_outputs([parsed["json"], parsed["csv"], parsed["report"], *proved], [*files, parsed["config"]])
-    for option, *endings in (("json", ".json"), ("csv", ".csv"), ("report", ".html", ".htm")):
-        check_ending(parsed[option], flag_of(option), *endings, strict=False)
-    check_ending(proof, "--proof", ".json")
-    if parsed["report"]:
-        check_extra("plotly", "report")
-
-    outputs = [parsed["json"], parsed["csv"], parsed["report"]]
-    with spoken(quiet=parsed["quiet"], outputs=outputs):
-        _associate(words, solver, parsed, settings, parameters)
+    proof = given["proof"]
+    beside = [] if proof is None else [_problem_beside(proof)]
+    given.check_outputs([*given["files"], given["config"]], also=beside)
+    with messages(given):
+        _associate(solver, given, parameters)
 
 
-def _associate(
-    words: list[str], solver: str, parsed: dict[str, Any], settings: dict[str, Any], parameters: dict[str, Any]
-) -> None:
+def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     from assoc._cli.solver_log import SolverLog
     from assoc.association.source import load_source
 
-    files, jobs = parsed["files"], settings.get("jobs", 1)
+    files, jobs = given["files"], given["jobs"] or 1
     sources = [load_source(file) for file in files]
-    _refuse_gates_of_problems(sources, parsed)
+    scenes = any(hasattr(source, "sensors") for source in sources)
+    given.check_use(_OPTIONS, input="scenes" if scenes else "problems, which have their tuples already")
     started = time.perf_counter()
-    bar = ProgressBar("associating", "scans", shown=not parsed["quiet"])
-    log = SolverLog(bar, parsed["verbose"])
-    extras = {"pheromone": parsed["report"] is not None, "gate_loss": parsed["gate_loss"], "watch": log}
-    plan, items = _plan(sources, solver, settings, parameters, extras)
-    if "scans" in settings:
-        label = f"{parsed['config']}: scans" if parsed["scans"] is None else "--scans"
-        items = _chosen(items, files, settings["scans"], label)
-    if parsed["proof"] and len(items) != 1:
+    bar = ProgressBar("associating", "scans", shown=not given["quiet"])
+    log = SolverLog(bar, given["verbose"])
+    plan = _plan(sources, solver, parameters, given, log)
+    items = _items(plan, given)
+    if given["proof"] and len(items) != 1:
         raise InvalidInputError(f"--proof: is of one scan, got {len(items)}; choose it with --scans K")
-    if parsed["verbose"]:
+    if given["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     names = [files[number] for number, _ in items]
     # a pipe gets all scans and columns when all are there: programs read it
-    table = _ScanTable(sources, names, len(names) if parsed["all"] else _SHOWN) if sys.stdout.isatty() else None
+    table = _ScanTable(sources, names, len(names) if given["all"] else _SHOWN) if sys.stdout.isatty() else None
     progress = with_progress(plan.run(items, jobs), len(items), bar)
     # with -v the log has a line for each scan already
-    watched = progress if table is None or parsed["verbose"] else table.watch(progress)
-    scans: list[ScanAssociation] = []
+    watched = progress if table is None or given["verbose"] else table.watch(progress)
     # other processes do not hear that they should end: their scans are given up
     with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
-        try:
-            for scan in watched:
-                scans.append(scan)
-                log.end(scan)
-        except KeyboardInterrupt:
-            if not _EARLY_END.asked:
-                raise
+        scans = _collected(watched, log)
     elapsed = time.perf_counter() - started
     if not scans and items:
         _EARLY_END.say("")
     found, names = plan.gather(scans), names[: len(scans)]
     of_items = [sources[number] for number, _ in items[: len(scans)]]
     write_all(
-        lambda: _write_json(parsed["json"], found, names),
-        lambda: _write_csv(parsed["csv"], found, names),
-        lambda: _write_report(parsed["report"], found, of_items, names, words),
-        lambda: _write_proof(parsed["proof"], plan, found, items),
-        lambda: _print(found, names, elapsed, table),
+        (given["json"], lambda: _write_json(given["json"], found, names)),
+        (given["csv"], lambda: _write_csv(given["csv"], found, names)),
+        (given["report"], lambda: _write_report(given, found, of_items, names)),
+        (given["proof"], lambda: _write_proof(given["proof"], plan, found, items)),
+        (given, lambda: _print(found, names, elapsed, table)),
     )
     _EARLY_END.say(f"{len(scans)} of {len(items)} scans are finished and written")
 
 
-def completions() -> dict[str, Sequence[str]]:
-    """Options of the program with the values they take, for shells."""
-    parameters = dict.fromkeys(flags_of_solvers(DEFAULT_SOLVER), ())
-    parser = _parser(DEFAULT_SOLVER, options(registry.parameters(DEFAULT_SOLVER)), explicit=True)
-    return {**parameters, **parser.flags(), "--solver": registry.names()}
+def _collected(scans: Iterable[ScanAssociation], log: SolverLog) -> list[ScanAssociation]:
+    """All scans, or those that are finished when a signal ends the work."""
+    found = []
+    try:
+        for scan in scans:
+            found.append(scan)
+            log.end(scan)
+    except KeyboardInterrupt:
+        if not _EARLY_END.asked:
+            raise
+    return found
 
 
-def _solver(first: Mapping[str, str | None]) -> tuple[str, bool, dict[str, Any]]:
-    """Which solver, whether it was named, and the configuration file: they decide what options there are."""
-    config = _read_config(first["config"]) if first["config"] is not None else {}
-    name = first["solver"] if first["solver"] is not None else config.get("solver")
-    return (DEFAULT_SOLVER, False, config) if name is None else (name, True, config)
+def parser() -> Parser:
+    """Return the parser with the options of all solvers."""
+    made = _parser(DEFAULT_SOLVER, explicit=True)
+    for name in registry.names():
+        made.declare(*(one for one in parameter_options(registry.parameters(name)) if one.name not in made.declared))
+    return made
 
 
-def _parser(solver: str, choices: list[Option], explicit: bool) -> Parser:
+def _parser(solver: str, explicit: bool) -> Parser:
     parser = Parser(
         prog="assoc.solve",
         usage=f"{command('solve')} FILE.npz [FILE.npz ...] --solver NAME [options]",
         description="Associate the measurements of scenes, or solve assignment problems,\n"
         "and report how far each answer can be from the optimum.",
-        epilog=None if explicit else _other_solvers(solver),
+        epilog=None if explicit else _other_solvers(),
     )
-    add = parser.add_argument
-    add("files", nargs="+", metavar="FILE", help="scene.npz or problem.npz")
-    add("--solver", metavar="NAME", help=f"name of the solver (default {DEFAULT_SOLVER})")
-    add_common_options(parser, ["seed", "time_limit", "jobs"])
-    add("--scans", metavar="A:B", help="only scans A to B-1, counted from 0; A alone is one scan")
-    add_common_options(parser, ["kbest"])
-    add("--all", action="store_true", help=f"print all scans on a terminal, not only the first {_SHOWN}")
-    add("--json", metavar="FILE", help="write the result as JSON")
-    add("--csv", metavar="FILE", help="write the table as CSV")
-    add("--report", metavar="FILE", help="write an HTML page: scene, association, convergence (needs assoc[report])")
-    add("--config", metavar="FILE", help="read these options from a TOML file; solver parameters in a table [solver]")
-    add_common_options(parser, ["gate_probability", "max_tuples", "target_density"])
-    add("--proof", metavar="FILE", help="write a proof for 'assoc check' as JSON, and its problem beside it as .txt")
-    add("--gate-loss", action="store_true", help="bound what the gates may have cost (takes about three times as long)")
-    add("--import", metavar="MODULE", help=IMPORT_HELP)
-    add_speech_options(parser, "all parameters, and how cost and bound change while a scan is solved")
+    parser.declare(*_OPTIONS)
     parser.elsewhere = lambda: flags_of_solvers(solver)
+    choices = parameter_options(registry.parameters(solver))
     if choices:
-        group = parser.add_argument_group(f"parameters of {solver}")
-        for option in choices:
-            option.add_to(group)
+        parser.declare(*choices, group=f"parameters of {solver}")
     return parser
 
 
-def _other_solvers(solver: str) -> str:
+def _other_solvers() -> str:
     lines = ["solvers and their parameters (described by --solver NAME --help):"]
     for name in registry.names():
-        flags = " ".join(option.flag for option in options(registry.parameters(name)))
+        flags = " ".join(flag_of(one.name) for one in parameters_of(registry.parameters(name)))
         lines.append(f"  {name:<12} {flags or '(none)'}")
     return "\n".join(lines)
 
 
-def _read_config(path: str) -> dict[str, Any]:
-    config = read_toml(path)
-    for key, value in config.items():
-        if isinstance(value, dict):
-            if key not in registry.names():
-                raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(registry.names())}")
-            continue
-        if key == "jobs" and value == "all":
-            config[key] = cores()
-            continue
-        if key not in _SETTINGS:
-            raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(_SETTINGS)}, and [solver]")
-        if key == "target_density":
-            config[key] = density(str(value), f"{path}: {key}")
-            continue
-        kind = str if key in ("solver", "scans") else float if key in ("time_limit", "gate_probability") else int
-        check_kind(value, kind, f"{path}: {key}")
-        if key in _LEAST and value < _LEAST[key]:
-            raise InvalidInputError(f"{path}: {key}: expected a whole number >= {_LEAST[key]}, got {value!r}")
-    return config
-
-
-def _section(config: dict[str, Any], solver: str, choices: list[Option]) -> dict[str, Any]:
+def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) -> dict[str, Any]:
     """Parameters of the solver from the configuration file."""
-    by_name = {option.name: option for option in choices}
-    found = {}
-    for key, value in config.get(solver, {}).items():
-        name = key.replace("-", "_")
-        # unknown names go through: the registry knows what to say about them
-        found[name] = by_name[name].check(value, f"[{solver}] {key}") if name in by_name else value
-    return found
+    table, by_name = tables.get(solver, {}), {one.name: one for one in known}
+    if not isinstance(table, dict):
+        raise InvalidInputError(f"[{solver}]: expected one table, got {len(table)}")
+    # the registry knows what to say about unknown names
+    return {
+        name: by_name[name].check(value, f"[{solver}] {key}") if name in by_name else value
+        for key, value in table.items()
+        for name in [key.replace("-", "_")]
+    }
 
 
-def _plan(
-    sources: list[Source],
-    solver: str,
-    settings: dict[str, Any],
-    parameters: dict[str, Any],
-    extras: dict[str, Any],
-) -> tuple[Plan, list[tuple[int, int]]]:
+def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given: Given, log: SolverLog) -> Plan:
     from assoc.association.plan import Plan
 
-    gating: dict[str, Any] = {key: settings[key] for key in _GATING if key in settings}
-    plan = Plan(
+    return Plan(
         tuple(sources),
         solver,
-        settings.get("seed", 0),
-        settings.get("time_limit"),
-        parameters,
-        gating,
-        settings.get("kbest"),
-        **extras,
+        parameters=parameters,
+        gating=given.some(one.name for one in _GATING),
+        pheromone=given["report"] is not None,
+        gate_loss=bool(given["gate_loss"]),
+        watch=log,
+        **given.some(("seed", "time_limit", "kbest")),
     )
-    return plan, plan.items()
 
 
-def _refuse_gates_of_problems(sources: list[Source], parsed: dict[str, Any]) -> None:
-    """Refuse options of the command line that change nothing where no file is a scene."""
-    from assoc.scene.scene import Scene
-
-    if any(isinstance(source, Scene) for source in sources):
-        return
-    for name in (*_GATING, "gate_loss"):
-        if parsed[name]:
-            raise InvalidInputError(
-                f"{flag_of(name)}: is of scenes, and a problem has its tuples already; leave it out"
-            )
-
-
-def _chosen(items: list[tuple[int, int]], files: list[str], text: str, label: str) -> list[tuple[int, int]]:
+def _items(plan: Plan, given: Given) -> list[tuple[int, int]]:
     """The scans of each file that are asked for."""
+    items, files, text = plan.items(), given["files"], given["scans"]
+    if text is None:
+        return items
     counts = [sum(number == n for number, _ in items) for n in range(len(files))]
-    scans = [scan_range(text, count, file, label) for count, file in zip(counts, files, strict=True)]
+    scans = [scan_range(text, count, file, given.label("scans")) for count, file in zip(counts, files, strict=True)]
     return [(number, k) for number, k in items if k in scans[number]]
 
 
-def _write_json(path: str | None, association: Association, names: list[str]) -> None:
-    if path is None:
-        return
+def _write_json(path: str, association: Association, names: list[str]) -> None:
     content = association.to_dict()
     if len(set(names)) > 1:
         for scan, name in zip(content["scans"], names, strict=True):
@@ -287,28 +225,20 @@ def _write_json(path: str | None, association: Association, names: list[str]) ->
     write_json(path, content)
 
 
-def _write_csv(path: str | None, association: Association, names: list[str]) -> None:
+def _write_csv(path: str, association: Association, names: list[str]) -> None:
     from assoc.association.table import to_csv
 
-    if path is not None:
-        write_text(path, to_csv(association.scans, names))
+    write_text(path, to_csv(association.scans, names))
 
 
-def _write_report(
-    path: str | None,
-    association: Association,
-    sources: list[Source],
-    names: list[str],
-    words: list[str],
-) -> None:
-    if path is not None:
-        from assoc.plotting.report import write_association_report
+def _write_report(given: Given, association: Association, sources: list[Source], names: list[str]) -> None:
+    from assoc.plotting.report import write_association_report
 
-        write_association_report(path, association, sources, names, words=words)
+    write_association_report(given["report"], association, sources, names, words=given.words)
 
 
-def _write_proof(path: str | None, plan: Plan, found: Association, items: Sequence[tuple[int, int]]) -> None:
-    if path is None or not found.scans:
+def _write_proof(path: str, plan: Plan, found: Association, items: Sequence[tuple[int, int]]) -> None:
+    if not found.scans:
         return
     from assoc.proofs import write_proof
 
@@ -368,6 +298,9 @@ def _print(association: Association, names: list[str], elapsed: float, table: _S
     solving, compiling = total["runtime"], total["compile_time"]
     print_lines(f"{elapsed:.2f} s in all, {solving:.2f} s of it in the solver, {compiling:.2f} s compiling")
 
+
+PROGRAM = Program("assoc.solve", _solve, _EARLY_END.on_signals)
+start, main = PROGRAM.start, PROGRAM.main
 
 if __name__ == "__main__":
     raise SystemExit(start())

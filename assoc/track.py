@@ -6,34 +6,43 @@ This is a program: the package must not import it. Imports inside functions keep
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assoc._cli.lines import print_lines
-from assoc._cli.options import flag_of
-from assoc._cli.program import prepare_streams, run_program, write_all
+from assoc._cli.messages import messages
+from assoc._cli.options import Given, Parser
+from assoc._cli.program import Program, command, prepare_streams, write_all
 from assoc._cli.progress import ProgressBar, with_progress
 from assoc._cli.scan_table import with_scan_table
-from assoc._cli.signals import EarlyEnd, Interruption
-from assoc._cli.speech import spoken
-from assoc._cli.track.options import CUTOFF, FORMATS, RADAR, WINDOWS, make_tracker, read_options
-from assoc._cli.track.options import completions as completions
-from assoc._cli.values import number, seconds
+from assoc._cli.signals import EarlyEnd
+from assoc._cli.track.options import (
+    CUTOFF,
+    OF_PLOTS,
+    OF_SCENES,
+    RADAR,
+    TRACKERS,
+    TRACKS,
+    make_tracker,
+    read_options,
+    track_parser,
+    with_further,
+)
 from assoc._files.output import STDOUT, is_stream
 from assoc._system.compile_time import compile_seconds
 from assoc._text.plain import printable
 from assoc.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from assoc.recordings import Recording
+    from assoc.recordings import Recording, Window
     from assoc.scene.scene import Scene
     from assoc.tracking import Tracker, TrackTable
     from assoc.tracking.plots import PlotTracks
 
-_INTERRUPTION = Interruption("assoc.track")
 _EARLY_END = EarlyEnd("assoc.track")
 # seconds that the scan under way gets when the program is asked to end: tracks are known between scans only
 _LAST_SCAN = 20.0
@@ -41,83 +50,66 @@ _LAST_SCAN = 20.0
 
 def start(arguments: Sequence[str] | None = None) -> int:
     """Run the program as a process of its own."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
     prepare_streams()
-    if "--live" in words:
-        # what has come in is still written
-        _INTERRUPTION.interrupt_on_signals()
-    else:
-        _EARLY_END.on_signals()
-    return main(words)
+    program, words = _program(arguments)
+    return program.start(words)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
+    program, words = _program(arguments)
+    return program.main(words)
+
+
+def _program(arguments: Sequence[str] | None) -> tuple[Program, list[str]]:
+    """Return which program is called, and its words: with ``--live``, its old spelling, `assoc.live`."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return run_program(lambda: _track(words), "assoc.track", _INTERRUPTION)
+    if "--live" not in words:
+        return Program("assoc.track", _track, _EARLY_END.on_signals), words
+    from assoc.live import PROGRAM
+
+    words.remove("--live")
+    called = printable(f"{command('live')} {shlex.join(words)}")
+    print(f"assoc.track: warning: --live is a program of its own now: {called}", file=sys.stderr, flush=True)
+    return PROGRAM, words
 
 
 def _track(words: list[str]) -> None:
-    parsed, settings = read_options(words)
-    if parsed["live"]:
-        from assoc._cli.track.live import track_live
-
-        track_live(parsed["file"], parsed, settings, _INTERRUPTION)
-        return
-    with spoken(quiet=parsed["quiet"], outputs=[parsed["output"], parsed["report"], parsed["rates"], parsed["map"]]):
-        _make_tracks(words, parsed, settings)
+    given, settings = read_options(words, track_parser())
+    given.check_outputs([given["file"]])
+    with messages(given):
+        _make_tracks(given, settings)
 
 
-def _make_tracks(words: list[str], parsed: dict[str, Any], settings: dict[str, Any]) -> None:
-    file, cutoff = parsed["file"], parsed["cutoff"] or CUTOFF
+class _Tracked(NamedTuple):
+    """What was made of a scene, as far as it was tracked, or of plots; of how many of all scans."""
+
+    tracker: Tracker
+    table: TrackTable
+    scene: Any
+    plots: Any
+    num_tracked: int
+    total: int
+
+
+def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
+    file = given["file"]
     started, compiled = time.perf_counter(), compile_seconds()
-    if _is_npz(file):
-        if parsed["window"] is not None:
-            raise InvalidInputError("--window: groups the plots of a CSV file; a scene already has scans")
-        tracker, table, scene, total = _of_scene(file, parsed, settings)
-        count, plots = scene.num_scans, None
-    else:
-        tracker, plots, total = _of_plots(file, parsed, settings)
-        count, table, scene = len(plots.windows), plots.table, None
-        if parsed["identity"] == "ignore":
-            # nothing is judged by what was left out
-            plots = plots._replace(rates=None, kept=None)
-        table.origin = parsed["origin"]
+    found = (_of_scene if _is_npz(file) else _of_plots)(file, given, settings)
     compiling = compile_seconds() - compiled
     elapsed = time.perf_counter() - started - compiling
-
-    def write_report() -> None:
-        if parsed["report"]:
-            from assoc.plotting.report import write_tracking_report
-
-            asked = tracker.settings.solver if tracker.solver_calls else "none"
-            used = {"tracker": tracker.name, "solver": asked, "filter": parsed["filter"], "scans": count}
-            more: dict[str, Any] = {"name": file, "settings": used, "cutoff": cutoff, "words": words}
-            more["plots"] = plots
-            write_tracking_report(parsed["report"], table.to_frame(), scene, **more)
-
-    def write_tracks_on_map() -> None:
-        if parsed["map"]:
-            from assoc.exports.maps import write_map
-
-            write_map(parsed["map"], table.to_frame())
-
-    def write_rates() -> None:
-        if parsed["rates"] and plots is not None:
-            _write_rates(parsed["rates"], plots)
-
-    if parsed["verbose"]:
+    if given["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in settings.items()))
     write_all(
-        write_tracks_on_map,
-        lambda: getattr(table, FORMATS[parsed["ending"]])(parsed["output"]),
-        write_rates,
-        write_report,
-        lambda: _report(parsed["output"], count, tracker, table, elapsed, compiling),
-        lambda: _compare(scene, table, cutoff),
-        lambda: _report_rates(plots, parsed["identity"] or "score-only"),
+        (given["map"], lambda: _write_map(given["map"], found.table)),
+        (given["output"], lambda: _write_tracks(given["output"], found.table)),
+        (given["rates"], lambda: _write_rates(given["rates"], found.plots)),
+        (given["report"], lambda: _write_report(given, found)),
+        (given, lambda: _print_counts(given["output"], found, elapsed, compiling)),
+        (found.scene and found.scene.truth, lambda: _compare(found.scene, found.table, given["cutoff"] or CUTOFF)),
+        (found.plots, lambda: _print_rates(found.plots, given["identity"])),
     )
-    _EARLY_END.say(f"the tracks of {count} of {total} scans are written")
+    _EARLY_END.say(f"the tracks of {found.num_tracked} of {found.total} scans are written")
 
 
 def _is_npz(file: str) -> bool:
@@ -151,107 +143,144 @@ def _read_asterix(file: str, radar: str | None) -> Recording:
     return plots[radar]
 
 
-def _of_scene(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, TrackTable, Scene, int]:
-    """The tracker, its tracks, the scene as far as it was tracked, and how many scans it has in all."""
+def _of_scene(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     from assoc.scene.scene import Scene
     from assoc.tracking import smoothed, track_scene
     from assoc.tracking.filter_choice import pace_of
     from assoc.tracking.smoothing import check_smoothable
 
-    parsed["filter"] = parsed["filter"] or "imm-cv"
-    if parsed["identity"] is not None:
-        raise InvalidInputError("--identity: is for plots; the measurements of a scene have no codes")
-    if parsed["rates"] is not None:
-        raise InvalidInputError("--rates: judges the plots of a CSV file; a scene with its truth is judged by GOSPA")
-    for flag in ("rotation", "radar", *RADAR):
-        if parsed[flag] is not None:
-            raise InvalidInputError(f"{flag_of(flag)}: describes the radar of plots; a scene contains its own sensors")
-    if parsed["registration"] is not None:
-        if parsed["registration"] != "online":
-            raise InvalidInputError(f"--registration: expected online, got {parsed['registration']!r}")
-        settings["registration"] = "online"
+    given.check_use((*OF_SCENES, *OF_PLOTS), input="scenes")
+    given["filter"] = given["filter"] or "imm-cv"
+    settings |= given.some(("registration",))
     scene = Scene.load(file)
-    if parsed["cutoff"] is not None and scene.truth is None:
+    if given["cutoff"] is not None and scene.truth is None:
         raise InvalidInputError(f"--cutoff: {file} has no truth with which tracks are compared")
-    if parsed["smooth"]:
+    if given["smooth"]:
         check_smoothable(scene, corrects="registration" in settings)
-    if parsed["origin"] is not None:
-        scene = replace(scene, origin=parsed["origin"])
-    elif parsed["map"] and scene.origin is None:
+    if given["origin"] is not None:
+        scene = replace(scene, origin=given["origin"])
+    elif given["map"] and scene.origin is None:
         raise InvalidInputError(f"--map: {file} does not say where it is on the earth; give --origin LAT,LON")
-    name, pace = parsed["tracker"] or "multi-sensor", pace_of(scene.times)
-    tracker = make_tracker(name, scene.sensors, parsed, settings, scene.region, pace)
-    bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
-    numbers = with_progress(range(scene.num_scans), scene.num_scans, bar)
-    numbers = with_scan_table(numbers, tracker, lambda k: (scene.times[k], scene.scan(k).sizes.tolist()))
-    with _EARLY_END.work(_LAST_SCAN):
-        table, decisions = track_scene(tracker, scene, confirmed=not parsed["all"], scans=numbers)
-    bar.close()
-    if not bar.done:
-        _EARLY_END.say("")
-    if parsed["smooth"]:
-        table = smoothed(tracker, scene, decisions)
-    tracked = scene if bar.done == scene.num_scans else scene.part(0, bar.done)
-    return tracker, table, tracked, scene.num_scans
+    name, pace = given["tracker"] or "multi-sensor", pace_of(scene.times)
+    tracker = make_tracker(name, scene.sensors, given, settings, scene.region, pace)
+    (tracks, decisions), count = _watched(
+        given,
+        tracker,
+        range(scene.num_scans),
+        lambda k: (scene.times[k], scene.scan(k).sizes.tolist()),
+        lambda scans: track_scene(tracker, scene, confirmed=not given["all"], scans=scans),
+    )
+    if given["smooth"]:
+        tracks = smoothed(tracker, scene, decisions)
+    tracked = scene if count == scene.num_scans else scene.part(0, count)
+    return _Tracked(tracker, tracks, tracked, None, count, scene.num_scans)
 
 
-def _of_plots(file: str, parsed: dict[str, Any], settings: dict[str, Any]) -> tuple[Tracker, PlotTracks, int]:
-    import numpy as np
-
-    from assoc.recordings import Window, clustering_time_window, irregular_groups, radar_of, read_plots
+def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
+    from assoc.recordings import radar_of
     from assoc.tracking.plots import track_plots
 
-    if parsed["registration"] is not None:
-        raise InvalidInputError("--registration: biases of one radar alone cannot be observed; it is for scenes")
-    name = parsed["tracker"] or "mht"
-    parsed["filter"] = parsed["filter"] or "ekf"
+    given["window"], given["filter"] = given["window"] or "ctw", given["filter"] or "ekf"
+    kind, identity = "ASTERIX files" if _is_asterix(file) else "tables", given["identity"] or "score-only"
+    given.check_use((*OF_SCENES, *OF_PLOTS), input="plots", format=kind, window=given["window"], identity=identity)
+    name = given["tracker"] or "mht"
     if name in ("multi-sensor", "static"):
-        raise InvalidInputError(
-            f"--tracker: {name} takes scenes; for plots use mht, mht-hypothesis, nearest-neighbour or "
-            "joint-probabilistic"
-        )
-    window = parsed["window"] or "ctw"
-    if window not in WINDOWS:
-        raise InvalidInputError(f"--window: unknown name {window!r}; known: {', '.join(WINDOWS)}")
-    radar: dict[str, Any] = {}
-    for flag, (argument, unit) in RADAR.items():
-        if parsed[flag] is not None:
-            radar[argument] = unit * number(parsed[flag], flag_of(flag))
-    turn = None if parsed["rotation"] is None else seconds(parsed["rotation"], "--rotation")
-    if turn is not None and not window.startswith("ctw"):
-        raise InvalidInputError(f"--rotation: is only for --window ctw or ctw-time, not for {window}")
-    if parsed["cutoff"] is not None:
-        raise InvalidInputError(
-            "--cutoff: is for scenes, whose tracks are judged by GOSPA; plots are judged by identity"
-        )
-    if parsed["smooth"]:
-        raise InvalidInputError("--smooth: is for scenes (.npz), not for plots")
-    recording = _read_asterix(file, parsed["radar"]) if _is_asterix(file) else read_plots(file)
-    if parsed["radar"] is not None and not _is_asterix(file):
-        raise InvalidInputError("--radar: names a radar of an ASTERIX file; a table holds the plots of one")
-    if parsed["rates"] and parsed["identity"] == "ignore":
-        raise InvalidInputError("--rates: judges by the identities that --identity ignore leaves out")
-    if parsed["rates"] and recording.aircraft is None:
-        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
-    if window == "none":
-        windows = [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
-    elif window == "irregular":
-        windows = irregular_groups(recording, np.random.default_rng(settings.get("seed", 0)))
-    else:
-        windows = clustering_time_window(recording, turn, by="antenna" if window == "ctw" else "time")
-    print_lines(recording.summary())
-    tracker = make_tracker(name, [radar_of(recording, **radar)], parsed, settings, None)
-    if parsed["map"] and parsed["origin"] is None:
+        others = ", ".join(other for other in TRACKERS if other not in ("multi-sensor", "static"))
+        raise InvalidInputError(f"--tracker: {name} takes scenes; for plots use one of {others}")
+    if given["map"] and given["origin"] is None:
         raise InvalidInputError("--map: plots do not say where their radar stands; give --origin LAT,LON")
-    bar = ProgressBar("tracking", "scans", shown=not parsed["quiet"])
-    shown = with_progress(windows, len(windows), bar)
-    shown = with_scan_table(shown, tracker, lambda window: (window.times[-1], [len(window)]))
+    recording = _read_plots(file, given)
+    windows = _windows(recording, given, settings.get("seed", 0))
+    print_lines(recording.summary())
+    radar = radar_of(recording, **{RADAR[flag]: value for flag, value in given.some(RADAR).items()})
+    tracker = make_tracker(name, [radar], given, settings, None)
+    done, _ = _watched(
+        given,
+        tracker,
+        windows,
+        lambda window: (window.times[-1], [len(window)]),
+        lambda scans: track_plots(tracker, recording, scans, confirmed=not given["all"]),
+    )
+    done.table.origin = given["origin"]
+    if given["identity"] == "ignore":
+        # nothing is judged by what was left out
+        done = done._replace(rates=None, kept=None)
+    return _Tracked(tracker, done.table, None, done, len(done.windows), len(windows))
+
+
+def _read_plots(file: str, given: Given) -> Recording:
+    from assoc.recordings import read_plots
+
+    recording = _read_asterix(file, given["radar"]) if _is_asterix(file) else read_plots(file)
+    if given["rates"] and recording.aircraft is None:
+        raise InvalidInputError(f"--rates: {file}: no plot has an identity (column mode3 or aircraft)")
+    return recording
+
+
+def _windows(recording: Recording, given: Given, seed: int) -> list[Window]:
+    """The plots, grouped into scans."""
+    import numpy as np
+
+    from assoc.recordings import Window, clustering_time_window, irregular_groups
+
+    window = given["window"]
+    if window == "none":
+        return [Window.of(recording, [row], row) for row in range(len(recording))]  # type: ignore[arg-type]
+    if window == "irregular":
+        return irregular_groups(recording, np.random.default_rng(seed))
+    return clustering_time_window(recording, given["rotation"], by="antenna" if window == "ctw" else "time")
+
+
+def _watched(
+    given: Given,
+    tracker: Tracker,
+    scans: Sequence[Any],
+    describe: Callable[[Any], tuple[float, Sequence[int]]],
+    track: Callable[[Iterator[Any]], Any],
+) -> tuple[Any, int]:
+    """Track the scans, and show how far it is; what was made, and of how many of them."""
+    bar = ProgressBar("tracking", "scans", shown=not given["quiet"])
     with _EARLY_END.work(_LAST_SCAN):
-        done = track_plots(tracker, recording, shown, confirmed=not parsed["all"])
+        found = track(with_scan_table(with_progress(scans, len(scans), bar), tracker, describe))
     bar.close()
     if not bar.done:
         _EARLY_END.say("")
-    return tracker, done, len(windows)
+    return found, bar.done
+
+
+def _write_map(path: str, tracks: TrackTable) -> None:
+    from assoc.exports.maps import write_map
+
+    write_map(path, tracks.to_frame())
+
+
+def _write_tracks(path: str, tracks: TrackTable) -> None:
+    if TRACKS.ending(path) == ".parquet":
+        tracks.to_parquet(path)
+    else:
+        tracks.to_csv(path)
+
+
+def _write_report(given: Given, found: _Tracked) -> None:
+    from assoc.plotting.report import write_tracking_report
+
+    tracker = found.tracker
+    used = {
+        "tracker": tracker.name,
+        "solver": tracker.settings.solver if tracker.solver_calls else "none",
+        "filter": given["filter"],
+        "scans": found.num_tracked,
+    }
+    write_tracking_report(
+        given["report"],
+        found.table.to_frame(),
+        found.scene,
+        name=given["file"],
+        settings=used,
+        cutoff=given["cutoff"] or CUTOFF,
+        words=given.words,
+        plots=found.plots,
+    )
 
 
 def _write_rates(path: str, plots: PlotTracks) -> None:
@@ -265,9 +294,7 @@ def _write_rates(path: str, plots: PlotTracks) -> None:
     write_text(path, "\n".join(lines) + "\n")
 
 
-def _report_rates(plots: PlotTracks | None, identity: str) -> None:
-    if plots is None:
-        return
+def _print_rates(plots: PlotTracks, identity: str | None) -> None:
     if plots.kept is not None:
         kept, judged = plots.kept
         # what was used says nothing of how good the result is
@@ -283,30 +310,33 @@ def _report_rates(plots: PlotTracks | None, identity: str) -> None:
     print_lines(f"{figures}: means over {len(rates.windows)} windows, aircraft known by {known} (docs/metrics.md)")
 
 
-def _report(output: str, count: int, tracker: Tracker, table: TrackTable, elapsed: float, compiling: float) -> None:
-    _, ids, _ = table.arrays()
+def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float) -> None:
+    tracker, rows = found.tracker, found.table
+    _, ids, _ = rows.arrays()
     name = "stdout" if output == STDOUT else printable(output)
-    print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(table)} rows, {count} scans")
-    each = 1e3 * elapsed / max(count, 1)
+    print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
+    each = 1e3 * elapsed / max(found.num_tracked, 1)
     # several trackers never need one, or only for what their own search leaves open
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")
 
 
-def _compare(scene: Scene | None, table: TrackTable, cutoff: float) -> None:
-    """Print the metrics if the truth is known."""
-    if scene is None or scene.truth is None:
-        return
+def _compare(scene: Scene, tracks: TrackTable, cutoff: float) -> None:
+    """Print the metrics against the truth."""
     from assoc.metrics import Trajectories, summarise
 
-    found = summarise(Trajectories.from_scene(scene), Trajectories(*table.arrays()), cutoff)
+    found = summarise(Trajectories.from_scene(scene), Trajectories(*tracks.arrays()), cutoff)
     print_lines(
         f"against the truth (cutoff {cutoff:g} m): root mean square GOSPA {found.gospa:.4g} m "
         f"(localisation {found.gospa_localisation:.4g}, missed {found.gospa_missed:.4g}, "
-        f"false {found.gospa_false:.4g}), "
-        f"{found.identity.switches} identity switches"
+        f"false {found.gospa_false:.4g}), {found.identity.switches} identity switches"
     )
+
+
+def parser() -> Parser:
+    """Return the parser with all options."""
+    return with_further(track_parser())
 
 
 if __name__ == "__main__":

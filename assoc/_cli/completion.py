@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import argparse
+from collections.abc import Mapping
 
+import shtab
+
+from assoc._cli.options import Parser
+from assoc._cli.values import OneOf
 from assoc.errors import InvalidInputError
-
-Options = Mapping[str, Sequence[str]]
-"""Options of a program, each with the values it takes (none: numbers, files); "" has those of the first word."""
+from assoc.solvers import registry
 
 SHELLS = ("bash", "zsh", "fish")
+# what stands for the value of options that take names of files
+_FILES = ("FILE", "FOLDER", "SCENE.npz")
+
+Parsers = Mapping[str, "argparse.ArgumentParser | Parsers"]
+"""Parsers by the words that choose them."""
 
 
-def script(shell: str, programs: Mapping[str, Options]) -> str:
+def script(shell: str, programs: Parsers) -> str:
     """Return a script for a shell.
 
     Raises
@@ -20,76 +28,27 @@ def script(shell: str, programs: Mapping[str, Options]) -> str:
     InvalidInputError
         The shell is not known.
     """
-    if shell not in _WRITERS:
-        raise InvalidInputError(f"completion: expected one of {', '.join(_WRITERS)}, got {shell!r}")
-    return _WRITERS[shell](programs)
+    if shell not in SHELLS:
+        raise InvalidInputError(f"completion: expected one of {', '.join(SHELLS)}, got {shell!r}")
+    parser = argparse.ArgumentParser("assoc")
+    _add(parser, programs)
+    return shtab.complete(parser, shell)
 
 
-def _bash(programs: Mapping[str, Options]) -> str:
-    return f"""# for ~/.bashrc: eval "$(assoc completion bash)"
-_assoc() {{
-  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} words=
-  if [ "$COMP_CWORD" = 1 ]; then words="{" ".join(programs)}"
-  else
-    case "${{COMP_WORDS[1]}} $before" in
-{_cases(programs, "      {pattern}) words={words!r};;")}
-    esac
-    if [ -z "$words" ] && [ "${{current#-}}" != "$current" ]; then
-      case "${{COMP_WORDS[1]}}" in
-{_flags(programs, "        {name}) words={words!r};;")}
-      esac
-    fi
-  fi
-  COMPREPLY=($(compgen -W "$words" -- "$current"))
-}}
-complete -o default -F _assoc assoc
-"""
-
-
-def _zsh(programs: Mapping[str, Options]) -> str:
-    return f"""# for ~/.zshrc, after compinit: eval "$(assoc completion zsh)"
-_assoc() {{
-  if (( CURRENT == 2 )); then compadd -- {" ".join(programs)}; return; fi
-  case "$words[2] $words[CURRENT-1]" in
-{_cases(programs, "    {pattern}) compadd -- {words}; return;;")}
-  esac
-  if [[ $PREFIX == -* ]]; then
-    case "$words[2]" in
-{_flags(programs, "      {name}) compadd -- {words};;")}
-    esac
-  else _files; fi
-}}
-compdef _assoc assoc
-"""
-
-
-def _fish(programs: Mapping[str, Options]) -> str:
-    lines = [
-        "# for ~/.config/fish/config.fish: assoc completion fish | source",
-        f"complete -c assoc -n __fish_use_subcommand -f -a '{' '.join(programs)}'",
-    ]
-    for name, options in programs.items():
-        seen = f"complete -c assoc -n '__fish_seen_subcommand_from {name}'"
-        for flag, values in options.items():
-            start = f"{seen} -l {flag.removeprefix('--')}" if flag else seen
-            if not flag or flag.startswith("--"):
-                lines.append(f"{start} -x -a '{' '.join(values)}'" if values else start)
-    return "\n".join(lines) + "\n"
-
-
-_WRITERS = dict(zip(SHELLS, (_bash, _zsh, _fish), strict=True))
-
-
-def _cases(programs: Mapping[str, Options], line: str) -> str:
-    """Lines for the options that have values; the first word comes after the name of the program."""
-    return "\n".join(
-        line.format(pattern=f"'{name} {flag or name}'", words=" ".join(values))
-        for name, options in programs.items()
-        for flag, values in options.items()
-        if values
-    )
-
-
-def _flags(programs: Mapping[str, Options], line: str) -> str:
-    flags = {name: " ".join(filter(None, options)) for name, options in programs.items()}
-    return "\n".join(line.format(name=name, words=words) for name, words in flags.items())
+def _add(parser: argparse.ArgumentParser, parsers: Parsers) -> None:
+    subparsers = parser.add_subparsers()
+    for name, one in parsers.items():
+        # shtab leaves out what has no help
+        if isinstance(one, Mapping):
+            _add(subparsers.add_parser(name, help=name), one)
+            continue
+        declared = one.declared if isinstance(one, Parser) else {}
+        for action in one._actions:
+            kind = declared[action.dest].kind if action.dest in declared else None
+            if isinstance(kind, OneOf):
+                action.choices = kind.names
+            elif action.dest == "solver":
+                action.choices = registry.names()
+            elif action.metavar in _FILES:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+        subparsers.add_parser(name, help=name, parents=[one], add_help=False)

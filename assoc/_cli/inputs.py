@@ -1,12 +1,12 @@
-"""What the programs read and write: TOML files, and outputs that can be written."""
+"""What programs read before their options: TOML files, and modules of the user's own."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import sys
+from importlib import import_module
 from typing import Any
 
-from assoc._files.output import STDOUT, check_writable, is_stream
 from assoc._files.reading import read_bytes
 from assoc._text.plain import one_line
 from assoc.errors import InvalidInputError
@@ -33,75 +33,28 @@ def read_toml(path: str) -> dict[str, Any]:
     return {key.replace("-", "_"): value for key, value in content.items()}
 
 
-def check_outputs(
-    outputs: Sequence[str | None],
-    inputs: Sequence[str | None],
-    *,
-    reserved: Sequence[str] = (),
-    new_folder: str | None = None,
-) -> None:
-    """Refuse before the work outputs that could not be written after it.
-
-    Parameters
-    ----------
-    outputs, inputs : sequences of str or None
-        Files that are written and read; None for options that were not given.
-    reserved : sequence of str
-        Other files that must not be overwritten.
-    new_folder : str, optional
-        A folder that the program will make.
+def import_modules(names: str | None) -> None:
+    """Import modules by their names, joined by commas; those in the current folder are found.
 
     Raises
     ------
     InvalidInputError
-        An output would overwrite an input or another output, is a folder, or its folder does not exist or takes
-        no files.
+        There is no such module, or it cannot be imported.
     """
-    taken = {_real_path(path) for path in (*inputs, *reserved) if path}
-    for path in outputs:
-        if not path or is_stream(path):
-            continue
-        if _real_path(path) in taken:
-            raise InvalidInputError(f"{path}: is given twice, or would overwrite an input file")
-        taken.add(_real_path(path))
-    for path in outputs:
-        if path:
-            check_writable(path, folder_to_come=new_folder)
-
-
-FORMATS = (".npz", ".json", ".csv", ".parquet", ".html", ".htm", ".toml", ".png", ".pdf", ".xlsx")
-"""Endings by which people know what is in a file."""
-
-
-def check_ending(path: str | None, option: str, *endings: str, strict: bool = True) -> str:
-    """Refuse a file whose name promises something else than is written; returns its ending, the first for streams.
-
-    Parameters
-    ----------
-    path : str or None
-        None where the option was not given.
-    option : str
-        What the message begins with.
-    endings : str
-        What it may end in.
-    strict : bool, default True
-        Whether the ending must be one of these; otherwise it must only be none of another format.
-
-    Raises
-    ------
-    InvalidInputError
-        The name ends in something else.
-    """
-    if path is None or path == STDOUT or is_stream(path):
-        return endings[0]
-    ending = os.path.splitext(path)[1].lower()
-    if ending in endings or not (strict or ending in FORMATS):
-        return ending
-    raise InvalidInputError(f"{option}: {path}: expected a name that ends in {' or '.join(endings)}")
-
-
-def _real_path(path: str) -> str:
-    try:
-        return os.path.realpath(path)
-    except ValueError:  # a NUL, which TOML can hold: reading or writing will say so
-        return path
+    if names is None:
+        return
+    folder = os.getcwd()
+    # behind all others: no other import finds what lies here; worker processes get the same path
+    if folder not in sys.path and "" not in sys.path:
+        sys.path.append(folder)
+    for name in names.split(","):
+        if name.endswith(".py") or os.sep in name:
+            raise InvalidInputError(f"--import: expected the name of a module (mine, not mine.py), got {name!r}")
+        try:
+            import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name is not None and (name == error.name or name.startswith(error.name + ".")):
+                raise InvalidInputError(f"--import: no module {name!r} is here or among what is installed") from None
+            raise InvalidInputError(f"--import: {name} cannot be imported ({error})") from None
+        except Exception as error:  # whatever a module of the user's does
+            raise InvalidInputError(f"--import: {name} cannot be imported ({type(error).__name__}: {error})") from None

@@ -1,45 +1,24 @@
-"""Options of the command line: those that several programs have, and those made from parameter dataclasses."""
+"""Options, declared once: flag, kind, help and what they are for; reading, checking and refusing follow from that."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import MISSING, dataclass, field
+from typing import Any, NoReturn
 
-from assoc._cli.program import Parser
-from assoc._cli.values import density, number, processes, seconds, whole_number
+from assoc._cli.inputs import read_toml
+from assoc._cli.lines import HelpFormatter
+from assoc._cli.values import Kind, Output, density, probability, processes, seconds, text, whole
+from assoc._files.output import check_writable, is_stream
+from assoc._parameters import parameters_of
+from assoc._text.near import did_you_mean
+from assoc._text.plain import one_line
+from assoc.errors import InvalidInputError
 
-if TYPE_CHECKING:
-    from assoc._parameters import Option
-
-
-class CommonOption(NamedTuple):
-    """An option that several programs have: what stands for its value in the help, how it is read, its help."""
-
-    metavar: str
-    parse: Callable[[str, str], Any]
-    help: str
-
-
-COMMON_OPTIONS = {
-    "seed": CommonOption("N", partial(whole_number, least=0), "seed of the random numbers (default 0)"),
-    "time_limit": CommonOption(
-        "S", seconds, "seconds for the solver on each scan; it then returns the best solution found (default: none)"
-    ),
-    "gate_probability": CommonOption(
-        "P", number, "probability that a gate contains a target's true measurement (default 0.999)"
-    ),
-    "max_tuples": CommonOption(
-        "N", partial(whole_number, least=1), "stop if a scan has more candidate tuples than this"
-    ),
-    "target_density": CommonOption(
-        "D", density, "targets per m^3 (in the plane per m^2), or auto: positions integrated out (default: equation 5)"
-    ),
-    "jobs": CommonOption("N", processes, "number of processes, or 'all' for one per core (default 1)"),
-    "kbest": CommonOption("K", partial(whole_number, least=1), "the K best associations of each scan, in order"),
-}
-"""By name; the flag has dashes for underscores."""
+BAD_INPUT = 2
+"""Exit code."""
 
 
 def flag_of(name: str) -> str:
@@ -47,41 +26,264 @@ def flag_of(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def add_common_options(parser: argparse._ActionsContainer, names: Iterable[str]) -> None:
-    """Add options of `COMMON_OPTIONS` to a parser."""
-    for name in names:
-        option = COMMON_OPTIONS[name]
-        parser.add_argument(flag_of(name), metavar=option.metavar, help=option.help)
+@dataclass(frozen=True)
+class Option:
+    """An option of a program.
+
+    Attributes
+    ----------
+    name : str
+        With underscores for the dashes of its flag.
+    metavar : str
+        What stands for its value in the help; empty for one without a value.
+    help : str
+    kind : callable
+        Reads its value; see `assoc._cli.values`.
+    only : mapping
+        By the name of another option, or of something else that was chosen: what it is only for.
+    rest : mapping
+        Further arguments for argparse.
+    short : str
+        Short flag.
+    positional : bool
+        Whether it goes by its position, without a flag.
+    """
+
+    name: str
+    metavar: str
+    help: str
+    kind: Kind = text
+    only: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    rest: Mapping[str, Any] = field(default_factory=dict)
+    short: str = ""
+    positional: bool = False
+
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
+        """Add the option to a parser or a group of one."""
+        rest: dict[str, Any] = {"default": None, **self.rest}
+        flags = [self.name] if self.positional else [*filter(None, [self.short]), flag_of(self.name)]
+        if self.metavar:
+            rest["metavar"] = self.metavar
+        elif "action" not in rest:
+            rest |= {"action": "store_const", "const": True}
+        parser.add_argument(*flags, help=self.help.replace("%", "%%"), **rest)
+
+    def read(self, value: Any, label: str) -> Any:
+        """Turn the text of a command line, or the list of texts, into the value."""
+        if isinstance(value, list):
+            return [self.kind(one, label) for one in value]
+        return self.kind(value, label) if isinstance(value, str) else value
+
+    def read_toml(self, value: Any, label: str) -> Any:
+        """Turn a value of a TOML file into the option's."""
+        many = "nargs" in self.rest
+        values = value if many and isinstance(value, list) else [value]
+        if self.kind is text and not all(isinstance(one, str) for one in values):
+            raise InvalidInputError(f"{label}: expected text{' or a list of texts' if many else ''}, got {value!r}")
+        found = [self.kind(str(one), label) for one in values]
+        return found if many else found[0]
 
 
-def common_values(parsed: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of the common options that were given, in their types."""
-    return {
-        name: option.parse(parsed[name], flag_of(name))
-        for name, option in COMMON_OPTIONS.items()
-        if parsed.get(name) is not None
-    }
+class Given(dict[str, Any]):
+    """Values of options by their names, None where there is none.
+
+    Attributes
+    ----------
+    words : list of str
+        The command line.
+    outputs : dict of Output
+        The options that name files which are written.
+    file : str
+        The TOML file that values were read from.
+    """
+
+    def __init__(self, values: Mapping[str, Any], words: Sequence[str]) -> None:
+        super().__init__(values)
+        self.words, self.file = list(words), ""
+        self.outputs: dict[str, Output] = {}
+        self._of_file: set[str] = set()
+
+    def some(self, names: Iterable[str]) -> dict[str, Any]:
+        """Those of some values that were given."""
+        return {name: self[name] for name in names if self.get(name) is not None}
+
+    def label(self, name: str) -> str:
+        """What messages call an option: its flag, or its key in the file."""
+        return f"{self.file}: {name}" if name in self._of_file else flag_of(name)
+
+    def of_line(self, name: str) -> bool:
+        """Whether the command line gives an option."""
+        return self[name] not in (None, []) and name not in self._of_file
+
+    def fill(self, file: str, values: Mapping[str, Any]) -> None:
+        """Take from a file what the command line does not give."""
+        self.file = file
+        missing = [name for name in values if self.get(name) in (None, [])]
+        self._of_file.update(missing)
+        self.update((name, values[name]) for name in missing)
+
+    def check_outputs(
+        self,
+        inputs: Iterable[str | None],
+        *,
+        also: Iterable[str] = (),
+        reserved: Iterable[str] = (),
+        new_folder: str | None = None,
+    ) -> None:
+        """Refuse before the work outputs that could not be written after it.
+
+        Parameters
+        ----------
+        inputs : iterable of str
+            Files that are read.
+        also : iterable of str
+            Further files that are written.
+        reserved : iterable of str
+            Other files that must not be overwritten.
+        new_folder : str, optional
+            A folder that the program will make.
+        """
+        taken = {_real_path(path) for path in (*inputs, *reserved) if path}
+        outputs = [*self.some(self.outputs).values(), *also]
+        for path in outputs:
+            if not path or is_stream(path):
+                continue
+            if _real_path(path) in taken:
+                raise InvalidInputError(f"{path}: is given twice, or would overwrite an input file")
+            taken.add(_real_path(path))
+        for path in filter(None, outputs):
+            check_writable(path, folder_to_come=new_folder)
+        for name, value in self.some(self.outputs).items():
+            self.outputs[name](value, flag_of(name))
+
+    def check_use(self, options: Iterable[Option], **chosen: str) -> None:
+        """Refuse options of the command line that are not for what was chosen.
+
+        Raises
+        ------
+        InvalidInputError
+            There is one.
+        """
+        for option in options:
+            for what, allowed in option.only.items():
+                if self.of_line(option.name) and chosen[what] not in allowed:
+                    flag = f"{flag_of(what)} " if what in self else ""
+                    expected = f"is only for {flag}{' or '.join(allowed)}, not for {chosen[what]}"
+                    raise InvalidInputError(f"{flag_of(option.name)}: {expected}")
 
 
-def parameter_values(choices: Sequence[Option], parsed: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of those parameters that were given, in their types."""
-    found = {}
-    for option in choices:
-        if option.name in parsed:
-            value = parsed[option.name]
-            found[option.name] = value if option.kind is bool else option.parse(value)
+class Parser(argparse.ArgumentParser):
+    """A parser of options: its errors are one line, and its help fits the terminal."""
+
+    def __init__(self, **rest: Any) -> None:
+        super().__init__(formatter_class=HelpFormatter, allow_abbrev=False, **rest)
+        self.declared: dict[str, Option] = {}
+        self.elsewhere: Callable[[], Mapping[str, str]] = dict
+        """Returns flags that this program does not take here, each with what it belongs to."""
+
+    def declare(self, *options: Option, group: str = "") -> None:
+        """Add options, to a group of the help if that has a name."""
+        into = self.add_argument_group(group) if group else self
+        for option in options:
+            option.add_to(into)
+            self.declared[option.name] = option
+
+    def read(self, words: Sequence[str]) -> Given:
+        """Read a command line.
+
+        Raises
+        ------
+        InvalidInputError
+            A value is not what its option takes.
+        """
+        parsed = vars(self.parse_args(words))
+        given = Given({}, words)
+        for name, option in self.declared.items():
+            if isinstance(option.kind, Output):
+                given[name] = parsed[name]
+                given.outputs[name] = option.kind
+            else:
+                given[name] = option.read(parsed[name], flag_of(name))
+        return given
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; a flag that is not known is named with those that are near."""
+        parsed, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown[0])}")
+        return parsed
+
+    def _hint(self, word: str) -> str:
+        flag = word.partition("=")[0]
+        if not flag.startswith("-"):
+            return ""
+        elsewhere = self.elsewhere()
+        if flag in elsewhere:
+            return f"; {flag} belongs to {elsewhere[flag]}"
+        near = did_you_mean(flag, [*self._option_string_actions, *elsewhere])
+        return f"; {near}" if near else ""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line to stderr and leave with exit code 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see --help)\n")
+
+
+def _real_path(path: str) -> str:
+    try:
+        return os.path.realpath(path)
+    except ValueError:  # a NUL, which TOML can hold: reading or writing will say so
+        return path
+
+
+def read_config(
+    path: str | None, options: Iterable[Option], solvers: Sequence[str]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read options, and tables of solvers' parameters, from a TOML file if there is one.
+
+    Raises
+    ------
+    InvalidInputError
+        The file cannot be read, or has an unknown key or a wrong value.
+    """
+    values: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
+    known = {option.name: option for option in options}
+    for key, value in read_toml(path).items() if path else ():
+        if key in known:
+            values[key] = known[key].read_toml(value, f"{path}: {key}")
+        elif key in solvers:
+            tables[key] = value
+        elif isinstance(value, (dict, list)):
+            raise InvalidInputError(f"{path}: [{key}] is no solver; known: {', '.join(solvers)}")
+        else:
+            raise InvalidInputError(f"{path}: {key}: unknown key; known: {', '.join(known)}, and tables [solver]")
+    return values, tables
+
+
+def parameter_options(owner: type) -> list[Option]:
+    """Options for the fields of a parameter dataclass that text can give."""
+    found = []
+    for one in parameters_of(owner):
+        more: dict[str, Any] = {}
+        metavar = one.name.upper() if one.positional else {int: "N", float: "X"}.get(one.kind, "TEXT")
+        if one.choices:
+            metavar = "{" + ",".join(map(str, one.choices)) + "}"
+        if one.kind is bool:
+            metavar, more = "", {"action": argparse.BooleanOptionalAction}
+        default = "" if one.default in (MISSING, None) else f" (default {one.default})"
+        described = (one.help + default).strip()
+        found.append(Option(one.name, metavar, described, one.parse, rest=more, positional=one.positional))
     return found
 
 
 def flags_of_solvers(but: str) -> dict[str, str]:
     """Flags of the parameters of all solvers but one, with whose they are."""
-    from assoc._parameters import options
     from assoc.solvers import registry
 
     found: dict[str, list[str]] = {}
     for name in registry.names():
-        for option in options(registry.parameters(name)):
-            found.setdefault(option.flag, []).append(name)
+        for one in parameters_of(registry.parameters(name)):
+            found.setdefault(flag_of(one.name), []).append(name)
     return {
         flag: f"{' and '.join(owners)} (--solver {owners[0]}), not to {but}"
         for flag, owners in found.items()
@@ -89,9 +291,34 @@ def flags_of_solvers(but: str) -> dict[str, str]:
     }
 
 
-def read_first(program: str, words: Sequence[str], names: Iterable[str]) -> dict[str, str | None]:
+def read_first(words: Sequence[str], *names: str) -> dict[str, str | None]:
     """Read some options before all others: those that decide which others there are."""
-    parser = Parser(prog=program, add_help=False)
-    for name in names:
-        parser.add_argument(flag_of(name))
+    parser = Parser(add_help=False)
+    parser.declare(*(Option(name, "NAME", "") for name in names))
     return vars(parser.parse_known_args(words)[0])
+
+
+def verbosity(more: str) -> tuple[Option, Option]:
+    """Return ``-q`` and ``-v``, which says ``more``."""
+    return (
+        Option("quiet", "", "say nothing but errors and warnings", short="-q"),
+        Option("verbose", "", f"say more: {more}", short="-v"),
+    )
+
+
+VERBOSITY_FLAGS = ("-q", "--quiet", "-v", "--verbose")
+
+COMMON = {one.name: one for one in (
+    Option("seed", "N", "seed of the random numbers (default 0)", whole(0)),
+    Option("time_limit", "S",
+           "seconds for the solver on each scan; it then returns the best solution found (default: none)", seconds),
+    Option("gate_probability", "P", "probability that a gate contains a target's true measurement (default 0.999)",
+           probability),
+    Option("max_tuples", "N", "stop if a scan has more candidate tuples than this", whole(1)),
+    Option("target_density", "D",
+           "targets per m^3 (in the plane per m^2), or auto: positions integrated out (default: equation 5)", density),
+    Option("jobs", "N", "number of processes, or 'all' for one per core (default 1)", processes),
+    Option("import", "MODULE", "import modules of your own first, which register solvers (docs/own_solver.md)"),
+    Option("config", "FILE", "read these options from a TOML file; solver parameters in a table [solver]"),
+)}  # fmt: skip
+"""Options that several programs have."""

@@ -2,56 +2,53 @@
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import sys
-from collections.abc import Callable, Mapping
-from typing import Any, NoReturn
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from assoc._cli.lines import HelpFormatter
-from assoc._cli.signals import Interruption, exit_on_signals
-from assoc._cli.warnings import warnings_as_lines
-from assoc._text.near import did_you_mean
+from assoc._cli.messages import warnings_as_lines
+from assoc._cli.options import BAD_INPUT
+from assoc._cli.signals import Interruption
 from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
-DONE, BAD_INPUT, NOTHING_FEASIBLE, INTERRUPTED = 0, 2, 3, 130
+DONE, NOTHING_FEASIBLE, INTERRUPTED = 0, 3, 130
 """Exit codes; the last one is the shell's own for Ctrl-C."""
 
 
-class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line, and whose help fits the terminal."""
+@dataclass(frozen=True)
+class Program:
+    """A program.
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(formatter_class=HelpFormatter, allow_abbrev=False, **options)
-        self.elsewhere: Callable[[], Mapping[str, str]] = dict
-        """Returns flags that this program knows but does not take here, each with whose they are."""
+    Attributes
+    ----------
+    name : str
+        What its messages begin with.
+    run : callable
+        Does the work that the command line asks for.
+    listen : callable
+        Says what signals do, in a process of its own.
+    interruption : Interruption, optional
+        Knows which signal ended it.
+    """
 
-    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse; what is not known is said together with what is near."""
-        parsed, unknown = self.parse_known_args(args, namespace)
-        if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown[0])}")
-        return parsed
+    name: str
+    run: Callable[[list[str]], None]
+    listen: Callable[[], object]
+    interruption: Interruption | None = None
 
-    def flags(self) -> dict[str, tuple[str, ...]]:
-        """Return all flags, each with the values that it takes where these are few."""
-        return {flag: tuple(one.choices or ()) for flag, one in self._option_string_actions.items()}
+    def start(self, arguments: Sequence[str] | None = None) -> int:
+        """Run the program as a process of its own; returns its exit code."""
+        prepare_streams()
+        self.listen()
+        return self.main(arguments)
 
-    def _hint(self, word: str) -> str:
-        flag = word.partition("=")[0]
-        if not flag.startswith("-"):
-            return ""
-        elsewhere = self.elsewhere()
-        if flag in elsewhere:
-            return f"; {flag} belongs to {elsewhere[flag]}"
-        near = did_you_mean(flag, [*self._option_string_actions, *elsewhere])
-        return f"; {near}" if near else ""
-
-    def error(self, message: str) -> NoReturn:
-        """Print one line to stderr and leave with exit code 2."""
-        self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see --help)\n")
+    def main(self, arguments: Sequence[str] | None = None) -> int:
+        """Run the program in this process; returns its exit code."""
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        return run_program(lambda: self.run(words), self.name, self.interruption)
 
 
 def command(name: str) -> str:
@@ -94,8 +91,13 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
     return DONE
 
 
-def write_all(*writers: Callable[[], None]) -> None:
-    """Write several outputs, the others also if one cannot be written: no result must be lost with it.
+def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
+    """Write those outputs that are asked for, the others also if one cannot be written: no result is lost with it.
+
+    Parameters
+    ----------
+    *outputs : (object, callable)
+        The name of the file or another value, None if it is not asked for; what writes it.
 
     Raises
     ------
@@ -103,19 +105,14 @@ def write_all(*writers: Callable[[], None]) -> None:
         The first that was raised.
     """
     errors = []
-    for write in writers:
+    for asked, write in outputs:
         try:
-            write()
+            if asked is not None:
+                write()
         except InvalidInputError as error:
             errors.append(error)
     if errors:
         raise errors[0]
-
-
-def prepare_process(name: str) -> None:
-    """Make a process ready to run a program: its streams, and what happens on signals."""
-    prepare_streams()
-    exit_on_signals(name)
 
 
 def prepare_streams() -> None:

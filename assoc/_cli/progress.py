@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-_EVERY = 5.0
 # seconds of compiling that need no words
 _SOON = 0.5
 
@@ -108,25 +107,6 @@ class ProgressBar:
 
     def __exit__(self, *exception: object) -> None:
         self.close()
-
-
-class ProgressLog:
-    """Says on stderr every five seconds where a study is: for those who read it in a file.
-
-    Parameters
-    ----------
-    silent : bool
-        Say nothing.
-    """
-
-    def __init__(self, silent: bool) -> None:
-        self._next = float("inf") if silent else 0.0
-
-    def __call__(self, counts: Counts) -> None:
-        """Say where a study is."""
-        if time.monotonic() >= self._next or (counts.done == counts.total and self._next < float("inf")):
-            self._next = time.monotonic() + _EVERY
-            print(f"{counts.done} of {counts.total} runs", file=sys.stderr, flush=True)
 
 
 def with_progress(items: Iterable[Item], total: int, bar: ProgressBar) -> Iterator[Item]:

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
-from assoc._cli.growing_table import GrowingTable
 from assoc._cli.lines import print_lines
+from assoc._cli.table import GrowingTable
 from assoc._system.compile_time import compile_seconds
 
 if TYPE_CHECKING:

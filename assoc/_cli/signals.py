@@ -1,8 +1,9 @@
-"""How programs end on Ctrl-C, a termination signal or a lost terminal: at once, or in order.
+"""How programs end on Ctrl-C, a termination signal or a lost terminal.
 
-Or work is cut short in order: loops over scans end early, what is finished is written (`EarlyEnd`).
+`Interruption`: the work is interrupted, and what has been done is kept. `EarlyEnd`: at once, but loops over scans end
+early, and what is finished is written.
 
-In all ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
+In both ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
 that solves returns, which can take minutes, and some MIP solvers put a handler of their own in its place. The
 exit code is the shell's own: 128 and the number of the signal.
 """
@@ -37,17 +38,6 @@ def ending_signals() -> dict[int, str]:
         return {}
     numbers = {getattr(signal, name): text for name, text in words.items()}
     return {number: text for number, text in numbers.items() if signal.getsignal(number) is not signal.SIG_IGN}
-
-
-def exit_on_signals(name: str) -> None:
-    """Let signals end the program at once, with one line, also while a library solves without Python."""
-    ending = ending_signals()
-
-    def leave(number: int, frame: object = None) -> None:
-        _leave(128 + number, f"{name}: {ending[number]}\n")
-
-    # the handler is for signals that a library lets through
-    _wait_for_signals(ending, handler=leave, waiter=leave)
 
 
 class Interruption:

@@ -4,9 +4,56 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-BETWEEN = "  "
+from assoc._text.plain import printable
+
+_BETWEEN = "  "
+# longer headers are broken between words where a table is too wide
+_SHORT = 5
+
+
+class _Layout:
+    """Columns as wide as their cells, and at least so wide as is asked for; their numbers choose some of them."""
+
+    def __init__(
+        self,
+        headers: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        left: Sequence[str],
+        *,
+        broken: bool = False,
+        least: Mapping[str, int] | None = None,
+    ) -> None:
+        self.headers = [one.split(" ") if broken and len(one) > _SHORT else [one] for one in headers]
+        self.rows = [[printable(cell) for cell in row] for row in rows]
+        self.left = [header in left for header in headers]
+        self.widths = [
+            max(*map(len, header), *(len(row[i]) for row in self.rows), (least or {}).get(headers[i], 0))
+            for i, header in enumerate(self.headers)
+        ]
+        self.every = [*range(len(headers))]
+
+    def width(self, columns: Sequence[int]) -> int:
+        return sum(self.widths[i] for i in columns) + len(_BETWEEN) * (len(columns) - 1)
+
+    def line(self, cells: Sequence[str], columns: Sequence[int]) -> str:
+        texts = [cells[i].ljust(self.widths[i]) if self.left[i] else cells[i].rjust(self.widths[i]) for i in columns]
+        return _BETWEEN.join(texts).rstrip()
+
+    def heading(self, columns: Sequence[int], *, ruled: bool = True) -> Iterator[str]:
+        high = max(len(self.headers[i]) for i in columns)
+        for cells in zip(*([""] * (high - len(header)) + header for header in self.headers), strict=False):
+            yield self.line(cells, columns)
+        if ruled:
+            # rich's stand-in for stdout, while a progress bar is shown, knows no encoding
+            stream = getattr(sys.stdout, "rich_proxied_file", sys.stdout)
+            yield ("─" if (stream.encoding or "").lower().startswith("utf") else "-") * self.width(columns)
+
+    def lines(self, columns: Sequence[int], *, ruled: bool = True) -> Iterator[str]:
+        yield from self.heading(columns, ruled=ruled)
+        for row in self.rows:
+            yield self.line(row, columns)
 
 
 def print_table(
@@ -26,6 +73,7 @@ def print_table(
     ----------
     headers : sequence of str
     rows : sequence of sequences of str
+        Control characters are printed as escapes.
     keys : int, default 1
         Number of first columns that say which row it is; every one of several tables begins with them.
     left : sequence of str
@@ -36,17 +84,10 @@ def print_table(
     if sys.stdout.isatty():
         lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
     else:
-        lines = _plain(headers, rows, left)
+        plain = _Layout(headers, rows, left)
+        lines = plain.lines(plain.every, ruled=False)
     for line in lines:
         print(line)
-
-
-def _plain(headers: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[str]) -> Iterator[str]:
-    words = [[header] for header in headers]
-    widths = _widths(words, rows)
-    yield from _headings(words, widths, headers, left)
-    for row in rows:
-        yield aligned(row, widths, headers, left)
 
 
 def fitted_lines(
@@ -59,99 +100,72 @@ def fitted_lines(
     joined: Sequence[str] = (),
 ) -> Iterator[str]:
     """Yield the lines of a table that is at most ``width`` wide, if its cells are; see `print_table`."""
-    every = range(len(headers))
-    words = [header.split(" ") for header in headers]
-    # short headers stay on one line
-    words = [[header] if len(header) < 6 else split for header, split in zip(headers, words, strict=True)]
-    high = [_width(every[i : i + 1], words, rows) for i in every]
-    if _width(every, [[header] for header in headers], rows) <= width:
-        yield from _drawn(every, [[header] for header in headers], headers, rows, left)
+    table = _Layout(headers, rows, left)
+    if table.width(table.every) <= width:
+        yield from table.lines(table.every)
         return
-    units: list[list[int]] = []
-    for i in every[keys:]:
-        if headers[i] in joined and units:
-            units[-1].append(i)
-        else:
-            units.append([i])
-    fixed = sum(high[:keys]) + len(BETWEEN) * keys
-    needed = [sum(high[i] for i in unit) + len(BETWEEN) * (len(unit) - 1) for unit in units]
-    if units and fixed + max(needed) > width:
-        yield from _listed(headers, rows)
-        return
+    table = _Layout(headers, rows, left, broken=True)
+    first = table.every[:keys]
     blocks: list[list[int]] = []
-    used = width
-    for unit, wide in zip(units, needed, strict=True):
-        if not blocks or used + len(BETWEEN) + wide > width:
-            blocks.append([*every[:keys]])
-            used = fixed - len(BETWEEN)
+    for i in table.every[keys:]:
+        if headers[i] in joined:
+            continue
+        # a column with those that stay with it
+        end = next((k for k in table.every[i + 1 :] if headers[k] not in joined), len(headers))
+        unit = [*range(i, end)]
+        if not blocks or table.width([*blocks[-1], *unit]) > width:
+            blocks.append([*first])
         blocks[-1] += unit
-        used += len(BETWEEN) + wide
-    for number, block in enumerate(blocks or [[*every]]):
-        if number:
-            yield ""
-        yield from _drawn(block, words, headers, rows, left)
-
-
-def _width(columns: Iterable[int], words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> int:
-    widths = [max(map(len, [*words[i], *(row[i] for row in rows)])) for i in columns]
-    return sum(widths) + len(BETWEEN) * (len(widths) - 1)
-
-
-def _drawn(
-    columns: Sequence[int],
-    words: Sequence[Sequence[str]],
-    headers: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    left: Sequence[str],
-) -> Iterator[str]:
-    """Some columns of a table, with a line below their headers."""
-    chosen = [words[i] for i in columns]
-    cells = [[row[i] for i in columns] for row in rows]
-    names = [headers[i] for i in columns]
-    widths = _widths(chosen, cells)
-    yield from heading(chosen, widths, names, left)
-    for row in cells:
-        yield aligned(row, widths, names, left)
-
-
-def _widths(words: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> list[int]:
-    return [max(map(len, [*split, *(row[i] for row in rows)])) for i, split in enumerate(words)]
-
-
-def heading(
-    words: Sequence[Sequence[str]], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]
-) -> Iterator[str]:
-    """Lines of headers, each of one or several words below one another, and a line below them."""
-    yield from _headings(words, widths, headers, left)
-    # rich's stand-in for stdout, while a progress bar is shown, knows no encoding
-    stream = getattr(sys.stdout, "rich_proxied_file", sys.stdout)
-    utf = (stream.encoding or "").lower().startswith("utf")
-    yield ("─" if utf else "-") * (sum(widths) + len(BETWEEN) * (len(widths) - 1))
-
-
-def _headings(
-    words: Sequence[Sequence[str]], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]
-) -> Iterator[str]:
-    high = max(map(len, words))
-    over = [[*[""] * (high - len(split)), *split] for split in words]
-    for line in zip(*over, strict=True):
-        yield aligned(line, widths, headers, left)
-
-
-def aligned(row: Sequence[str], widths: Sequence[int], headers: Sequence[str], left: Sequence[str]) -> str:
-    """Return a line of cells, each as wide as its column."""
-    texts = [
-        text.ljust(width) if header in left else text.rjust(width)
-        for header, text, width in zip(headers, row, widths, strict=True)
-    ]
-    return BETWEEN.join(texts).rstrip()
+    if any(table.width(block) > width for block in blocks):
+        yield from _listed(headers, table.rows)
+        return
+    for number, block in enumerate(blocks):
+        yield from ([""] if number else [])
+        yield from table.lines(block)
 
 
 def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Each row as a list of headers and cells."""
     wide = max(map(len, headers))
     for number, row in enumerate(rows):
-        if number:
-            yield ""
+        yield from ([""] if number else [])
         for header, cell in zip(headers, row, strict=True):
-            yield f"{header.ljust(wide)}{BETWEEN}{cell}"
+            yield f"{header.ljust(wide)}{_BETWEEN}{cell}"
+
+
+class GrowingTable:
+    """A table on a terminal whose rows are printed as soon as they are known; the first decides the columns' widths.
+
+    Parameters
+    ----------
+    headers : sequence of str
+    widths : mapping
+        By header: what later cells may need, where that is more than the first row shows.
+    left : sequence of str
+        Headers of the columns that are aligned to the left.
+    most : int
+        Times that rows are printed; later ones are not.
+    """
+
+    def __init__(self, headers: Sequence[str], widths: Mapping[str, int], left: Sequence[str], most: int) -> None:
+        self._headers, self._widths, self._left, self._most = headers, widths, left, most
+        self._layout: _Layout | None = None
+        self.fits = True
+        """Whether the terminal is wide enough; otherwise nothing is printed. Known after the first row."""
+
+    def add(self, rows: Sequence[Sequence[str]]) -> None:
+        """Print rows; a cell that is wider than its column moves the rest of its row."""
+        layout = self._layout or self._begin(rows)
+        if self.fits and self._most > 0:
+            self._most -= 1
+            for row in rows:
+                print(layout.line([*map(printable, row)], layout.every), flush=True)
+
+    def _begin(self, rows: Sequence[Sequence[str]]) -> _Layout:
+        for broken in (False, True):
+            layout = self._layout = _Layout(self._headers, rows, self._left, broken=broken, least=self._widths)
+            self.fits = layout.width(layout.every) <= shutil.get_terminal_size().columns
+            if self.fits:
+                print(*layout.heading(layout.every), sep="\n")
+                break
+        return layout

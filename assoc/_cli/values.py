@@ -1,34 +1,66 @@
-"""Values that a command line or a configuration file gives, parsed and checked."""
+"""Kinds of options: each reads the text of a command line or a file, and refuses it under the option's name."""
 
 from __future__ import annotations
 
 import math
 import os
-import sys
+from collections.abc import Callable, Iterable
 from typing import Any
 
+from assoc._files.output import STDOUT, is_stream
+from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 
+Kind = Callable[[str, str], Any]
+"""Turns text into a value; the second argument is what messages call the option."""
 
-def whole_number(text: str, label: str, least: int) -> int:
-    """Parse a whole number of at least ``least``."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = least - 1
-    if value < least:
-        raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {text!r}")
+FORMATS = (".npz", ".json", ".csv", ".parquet", ".html", ".htm", ".toml", ".png", ".pdf", ".xlsx")
+"""Endings by which people know what is in a file."""
+
+
+def text(value: str, label: str) -> str:
+    """Take any text."""
     return value
 
 
-def processes(text: str, label: str) -> int:
-    """Parse a number of processes; "all" is one for each core."""
-    if text == "all":
-        return cores()
-    try:
-        return whole_number(text, label, 1)
-    except InvalidInputError:
-        raise InvalidInputError(f"{label}: expected a whole number >= 1 or 'all', got {text!r}") from None
+def whole(least: int, more: str = "") -> Kind:
+    """Whole numbers of at least ``least``; messages say ``more`` of what is expected."""
+
+    def read(value: str, label: str) -> int:
+        try:
+            found = int(value)
+        except ValueError:
+            found = least - 1
+        if found < least:
+            raise InvalidInputError(f"{label}: expected a whole number >= {least}{more}, got {value!r}")
+        return found
+
+    return read
+
+
+def real(expected: str, good: Callable[[float], bool]) -> Kind:
+    """Numbers that are good; messages say what is expected."""
+
+    def read(value: str, label: str) -> float:
+        try:
+            found = float(value)
+        except ValueError:
+            found = math.nan
+        if not good(found):
+            raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")
+        return found
+
+    return read
+
+
+def or_word(word: str, meaning: Callable[[], Any], kind: Kind) -> Kind:
+    """A word of its own meaning, or another kind."""
+    return lambda value, label: meaning() if value == word else kind(value, label)
+
+
+def listed(kind: Kind) -> Kind:
+    """Values with commas between them."""
+    return lambda value, label: tuple(kind(part.strip(), label) for part in value.split(","))
 
 
 def cores() -> int:
@@ -39,73 +71,103 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
-def seconds(text: str, label: str) -> float:
-    """Parse a number of seconds above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise InvalidInputError(f"{label}: expected seconds > 0, got {text!r}")
-    return value
+number = real("a number", lambda found: not math.isnan(found))
+positive = real("a number above 0", lambda found: 0 < found < math.inf)
+not_negative = real("a number >= 0", lambda found: 0 <= found < math.inf)
+seconds = real("seconds > 0", lambda found: 0 < found < math.inf)
+probability = real("a number in (0, 1]", lambda found: 0 < found <= 1)
+density = or_word("auto", lambda: "auto", real("a number above 0, or auto", lambda found: 0 < found < math.inf))
+processes = or_word("all", cores, whole(1, " or 'all'"))
 
 
-def scan_range(text: str, count: int, name: str, label: str = "--scans") -> range:
-    """Parse A:B or A, within the scans of the source ``name``.
+def degrees(value: str, label: str) -> float:
+    """Read an angle in degrees; returns radians."""
+    return math.radians(number(value, label))
+
+
+def position_on_earth(value: str, label: str) -> tuple[float, float, float]:
+    """Read LAT,LON or LAT,LON,HEIGHT (degrees, metres); returns radians and metres."""
+    parts = listed(number)(value, label)
+    if len(parts) not in (2, 3):
+        raise InvalidInputError(f"{label}: expected LAT,LON or LAT,LON,HEIGHT in degrees and metres, got {value!r}")
+    lat, lon, height = (*parts, 0.0)[:3]
+    if not (abs(lat) <= 90 and abs(lon) <= 360 and abs(height) <= 1e6):
+        raise InvalidInputError(f"{label}: expected a latitude within +-90 and a longitude within +-360, got {value!r}")
+    return math.radians(lat), math.radians(lon), height
+
+
+class OneOf:
+    """One of some names, which shells complete."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.names = tuple(names)
+
+    def __call__(self, value: str, label: str) -> str:
+        """Read a name."""
+        if value not in self.names:
+            raise InvalidInputError(f"{label}: unknown name {value!r}; known: {', '.join(self.names)}")
+        return value
+
+
+class Output:
+    """Files that are written, known by the endings of their names.
+
+    Parameters
+    ----------
+    *endings : str
+        What the name may end in.
+    strict : bool, default False
+        Whether it must end in one of these; otherwise it must only be none of another format.
+    streams : bool, default True
+        Whether stdout and pipes will do, which have the first of the endings.
+    extras : dict, optional
+        By ending, "" for all: the package that writes it, and the extra of assoc that brings it.
+    """
+
+    def __init__(
+        self,
+        *endings: str,
+        strict: bool = False,
+        streams: bool = True,
+        extras: dict[str, tuple[str, str]] | None = None,
+    ) -> None:
+        self._endings, self._strict, self._streams, self._extras = endings, strict, streams, extras or {}
+
+    def __call__(self, value: str, label: str) -> str:
+        """Read a name."""
+        ending = self.ending(value)
+        if ending not in self._endings and (self._strict or ending in FORMATS):
+            raise InvalidInputError(f"{label}: {value}: expected a name that ends in {' or '.join(self._endings)}")
+        extra = self._extras.get(ending) or self._extras.get("")
+        if extra:
+            check_extra(*extra)
+        return value
+
+    def ending(self, value: str) -> str:
+        """Return the ending of a name."""
+        if self._streams and (value == STDOUT or is_stream(value)):
+            return self._endings[0]
+        return os.path.splitext(value)[1].lower()
+
+
+html_page = Output(".html", ".htm", extras={"": ("plotly", "report")})
+csv_table = Output(".csv")
+
+
+def scan_range(value: str, count: int, name: str, label: str = "--scans") -> range:
+    """Read A:B or A, within the scans of the source ``name``.
 
     Raises
     ------
     InvalidInputError
         It is not of that form, or reaches beyond.
     """
-    first, colon, last = text.partition(":")
+    first, colon, last = value.partition(":")
     try:
         start = int(first) if first or not colon else 0
         stop = (int(last) if last else count) if colon else start + 1
     except ValueError:
-        raise InvalidInputError(f"{label}: expected A:B or A in whole numbers, got {text!r}") from None
+        raise InvalidInputError(f"{label}: expected A:B or A in whole numbers, got {value!r}") from None
     if not 0 <= start < stop <= count:
-        raise InvalidInputError(f"{label}: {text} is not within the scans 0:{count} of {name}")
+        raise InvalidInputError(f"{label}: {value} is not within the scans 0:{count} of {name}")
     return range(start, stop)
-
-
-def number(text: str, label: str) -> float:
-    """Parse a number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise InvalidInputError(f"{label}: expected a number, got {text!r}") from None
-
-
-def density(text: str, label: str) -> float | str:
-    """Parse a number above 0, or "auto"."""
-    if text == "auto":
-        return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise InvalidInputError(f"{label}: expected a number above 0, or auto, got {text!r}")
-    return value
-
-
-def place_on_earth(text: str, label: str) -> tuple[float, float, float]:
-    """Parse LAT,LON or LAT,LON,HEIGHT (degrees, metres) into radians and metres."""
-    parts = text.split(",")
-    if len(parts) not in (2, 3):
-        raise InvalidInputError(f"{label}: expected LAT,LON or LAT,LON,HEIGHT in degrees and metres, got {text!r}")
-    lat, lon, height = (number(part, label) for part in [*parts, "0"][:3])
-    if not (abs(lat) <= 90 and abs(lon) <= 360 and abs(height) <= 1e6):
-        raise InvalidInputError(f"{label}: expected a latitude within +-90 and a longitude within +-360, got {text!r}")
-    return math.radians(lat), math.radians(lon), height
-
-
-def check_kind(value: Any, kind: type, label: str) -> None:
-    """Refuse a value of a file that is not text (str), a number (float) or a whole number (int)."""
-    taken: Any = (int, float) if kind is float else kind
-    if kind is float and isinstance(value, int) and abs(value) > sys.float_info.max:
-        raise InvalidInputError(f"{label}: expected a number within +-1.8e308, got a larger one")
-    if not isinstance(value, taken) or isinstance(value, bool):
-        expected = {str: "text", float: "a number"}.get(kind, "a whole number")
-        raise InvalidInputError(f"{label}: expected {expected}, got {value!r}")

@@ -10,7 +10,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from assoc._parameters import Option, options
+from assoc._parameters import Parameter, parameters_of
 from assoc._system.door import doors
 from assoc.errors import InvalidInputError
 from assoc.solvers import registry
@@ -38,7 +38,7 @@ class Setting:
     parameters: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        known = {option.name: option for option in options(registry.parameters(self.solver))}
+        known = {option.name: option for option in parameters_of(registry.parameters(self.solver))}
         values = {
             name: known[name].check(value, f"{self.solver}.{name}") if name in known else value
             for name, value in self.parameters.items()
@@ -85,7 +85,7 @@ def _received(solvers: tuple[registry.Own, ...], solver: str, parameters: Mappin
     return Setting(solver, parameters)
 
 
-def parameter(solver: str, name: str) -> Option:
+def parameter(solver: str, name: str) -> Parameter:
     """Return the parameter of a solver that text can give.
 
     Raises
@@ -93,7 +93,7 @@ def parameter(solver: str, name: str) -> Option:
     InvalidInputError
         The solver has none of this name; the near names are listed.
     """
-    for option in options(registry.parameters(solver)):
+    for option in parameters_of(registry.parameters(solver)):
         if option.name == name:
             return option
     try:

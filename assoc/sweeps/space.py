@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assoc._parameters import Option
+from assoc._parameters import Parameter
 from assoc.errors import InvalidInputError
 
 
@@ -56,7 +56,7 @@ class Range:
 Space = Values | Range
 
 
-def read_text(option: Option, text: str, label: str) -> Space:
+def read_text(parameter: Parameter, text: str, label: str) -> Space:
     """Read ``1,2,3`` or ``0.1:0.9`` or ``1:1000:log``.
 
     Raises
@@ -65,30 +65,30 @@ def read_text(option: Option, text: str, label: str) -> Space:
         No values, or one of the wrong type.
     """
     parts = text.split(":")
-    if option.kind in (int, float) and len(parts) in (2, 3):
+    if parameter.kind in (int, float) and len(parts) in (2, 3):
         if len(parts) == 3 and parts[2] != "log":
             raise InvalidInputError(f"{label}: expected LOW:HIGH or LOW:HIGH:log, got {text!r}")
-        low, high = (_parse(option, part, label) for part in parts[:2])
-        return make_range(option, low, high, len(parts) == 3, label)
+        low, high = (_parse(parameter, part, label) for part in parts[:2])
+        return make_range(parameter, low, high, len(parts) == 3, label)
     words = [word.strip() for word in text.split(",")]
     if not any(words):
-        raise InvalidInputError(f"{label}: no values given, expected {option.name}=VALUE[,VALUE...]")
-    return values([_parse(option, word, label) for word in words])
+        raise InvalidInputError(f"{label}: no values given, expected {parameter.name}=VALUE[,VALUE...]")
+    return values([_parse(parameter, word, label) for word in words])
 
 
-def read_value(option: Option, value: Any, label: str) -> Space:
+def read_value(parameter: Parameter, value: Any, label: str) -> Space:
     """Read what a TOML file gives: one value, a list of them, or ``{low = .., high = .., log = true}``."""
     if isinstance(value, dict):
         unknown = sorted({*value} - {"low", "high", "log"})
-        if unknown or not {"low", "high"} <= {*value} or option.kind not in (int, float):
+        if unknown or not {"low", "high"} <= {*value} or parameter.kind not in (int, float):
             raise InvalidInputError(f"{label}: expected a value, a list or {{low, high, log}}, got {value!r}")
-        low, high = (option.check(value[end], f"{label}.{end}") for end in ("low", "high"))
-        return make_range(option, low, high, value.get("log", False) is True, label)
+        low, high = (parameter.check(value[end], f"{label}.{end}") for end in ("low", "high"))
+        return make_range(parameter, low, high, value.get("log", False) is True, label)
     if not isinstance(value, list):
-        return Values((option.check(value, label),))
+        return Values((parameter.check(value, label),))
     if not value:
         raise InvalidInputError(f"{label}: the list is empty, expected at least one value")
-    return values([option.check(one, label) for one in value])
+    return values([parameter.check(one, label) for one in value])
 
 
 def values(found: list[Any]) -> Values:
@@ -96,23 +96,23 @@ def values(found: list[Any]) -> Values:
     return Values(tuple(dict.fromkeys(found)))
 
 
-def make_range(option: Option, low: float, high: float, logarithmic: bool, label: str) -> Range:
+def make_range(parameter: Parameter, low: float, high: float, logarithmic: bool, label: str) -> Range:
     """Return a checked range."""
-    if option.kind is int and max(abs(low), abs(high)) >= 2**62:
+    if parameter.kind is int and max(abs(low), abs(high)) >= 2**62:
         raise InvalidInputError(f"{label}: expected whole numbers within +-4e18, got a larger one")
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise InvalidInputError(f"{label}: expected low < high, got {low}:{high}")
     if logarithmic and low <= 0:
         raise InvalidInputError(f"{label}: a logarithmic range needs low > 0, got {low}")
-    return Range(low, high, logarithmic, option.kind is int)
+    return Range(low, high, logarithmic, parameter.kind is int)
 
 
-def _parse(option: Option, text: str, label: str) -> Any:
+def _parse(parameter: Parameter, text: str, label: str) -> Any:
     try:
-        if option.kind is bool:
+        if parameter.kind is bool:
             return {"true": True, "false": False}[text.lower()]
-        value = option.kind(text)
+        value = parameter.kind(text)
     except (ValueError, KeyError):
-        expected = {int: "a whole number", float: "a number", bool: "true or false"}[option.kind]
+        expected = {int: "a whole number", float: "a number", bool: "true or false"}[parameter.kind]
         raise InvalidInputError(f"{label}: expected {expected}, got {text!r}") from None
-    return option.check(value, label)
+    return parameter.check(value, label)

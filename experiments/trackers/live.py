@@ -2,7 +2,7 @@
 
     python -m experiments.trackers.live [--quick] [--seed N] [--json FILE] [--publish]
 
-What `assoc track --live` does with its defaults (tracker multi-sensor) and the antennas' turns of 4, 5 and 5.5 s,
+What `assoc live` does with its defaults (tracker multi-sensor) and the antennas' turns of 4, 5 and 5.5 s,
 plots taken in every half second: 500 aircraft (scenario `rotating-radars`), 60 s of plots, the first 10 s not counted.
 CPU times of a step, from the plot that ends an interval to the picture, and wall times beside them, which on a busy
 machine hold what others do.

@@ -164,7 +164,7 @@ def _scene_file(path: Path) -> None:
 SOLVE = "assoc.solve {} --solver greedy"
 CHECK = "assoc.check {} /dev/null"
 FLIGHTS = "assoc.simulate from-tracks {} -o /dev/null --scans 2"
-LIVE = "assoc.track {} --live --turns 4,5,5.5 -o /dev/null"
+LIVE = "assoc.live {} --turns 4,5,5.5 -o /dev/null"
 
 HOSTILE = [
     Hostile("problem.txt.xz", packed(lzma, HEAD, b"0 1\n", 4.9e8), SOLVE),

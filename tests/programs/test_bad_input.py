@@ -152,7 +152,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--time-limit", "nan"], "--time-limit: expected seconds > 0"),
         (["s.npz", "--scans", "1:9"], "--scans: 1:9 is not within the scans 0:2 of s.npz"),
         (["s.npz", "--scans", "b:c"], "--scans: expected A:B"),
-        (["s.npz", "--gate-probability", "2"], "gate_probability"),
+        (["s.npz", "--gate-probability", "2"], "--gate-probability: expected a number in (0, 1]"),
         (["s.npz", "--solver", "aco", "--rho", "2"], "rho: expected"),
         (["s.npz", "--solver", "aco", "--rho", "high"], "--rho: expected a number, got 'high'"),
         (["s.npz", "--solver", "aco", "--mode", "quick"], "mode"),
@@ -166,7 +166,7 @@ def test_what_is_no_npz_file(run, tmp_path, scene_fields, name, content):
         (["s.npz", "--config", "none.toml"], "none.toml: cannot be read"),
         (["s.npz", "--config", "s.npz"], "s.npz: is not a TOML file"),
         (["s.npz", "--config", "unknown.toml"], "unknown.toml: colour: unknown key"),
-        (["s.npz", "--config", "type.toml"], "seed: expected a whole number, got 'four'"),
+        (["s.npz", "--config", "type.toml"], "seed: expected a whole number >= 0, got 'four'"),
         (["s.npz", "--config", "ants.toml"], "[aco] ants: expected a whole number, got 'many'"),
         (["s.npz", "--config", "solver.toml"], "[bees] is no solver"),
     ],
@@ -212,6 +212,8 @@ def test_options_of_scenes_are_refused_for_problems(tmp_path, monkeypatch, capsy
     assoc.AssignmentProblem([[1, 1]], [-1.0], [1, 1]).save("p.npz")
     simulate("three-radar", scans=1).save("s.npz")
     assert main(["p.npz", *words]) == 2
-    assert f"{words[0]}: is of scenes, and a problem has its tuples already" in capsys.readouterr().err
+    assert (
+        f"{words[0]}: is only for scenes, not for problems, which have their tuples already" in capsys.readouterr().err
+    )
     # beside a scene they are of use
     assert main(["p.npz", "s.npz", *words]) == 0

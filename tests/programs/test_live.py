@@ -1,4 +1,4 @@
-"""`python -m assoc.track --live` as a program: lines from stdin, a UDP port, a scene; what is wrong is one line."""
+"""`python -m assoc.live` as a program: lines from stdin, a UDP port, a scene; what is wrong is one line."""
 
 import io
 import json
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from assoc import track
+from assoc import live, track
 from assoc._cli.track import plot_lines
 from assoc._cli.track.options import make_tracker
 from assoc._cli.track.plot_lines import LONGEST, Lines, parse_line, replayed
@@ -36,7 +36,7 @@ def scene_file(tmp_path_factory):
 
 
 def words(scene_file, *more):
-    own = ["-W", "error", "-m", "assoc.track", scene_file, "--live", "--turns", "4,5,5.5", *more]
+    own = ["-W", "error", "-m", "assoc.live", scene_file, "--turns", "4,5,5.5", *more]
     return [sys.executable, *map(str, own)]
 
 
@@ -74,7 +74,7 @@ def test_lines_from_stdin_become_tracks_on_stdout(scene_file):
     assert done.returncode == 0, done.stderr
     check(done.stdout)
     told = done.stderr.strip().splitlines()
-    assert all(line.startswith("assoc.track: ") for line in told)
+    assert all(line.startswith("assoc.live: ") for line in told)
     assert sum("line left out" in line for line in told) == 1
     assert sum("the unknown sensor" in line for line in told) == 1
     assert re.search(r"\d+ plots in \d+ steps; a step takes .* ms, p99 .* ms; .*lines not understood", told[-1])
@@ -95,16 +95,16 @@ def test_the_default_filter_suits_the_turns(tmp_path, monkeypatch, capsys):
         made.append(make_tracker(*arguments, **options))
         return made[-1]
 
-    monkeypatch.setattr("assoc._cli.track.live.make_tracker", note)
+    monkeypatch.setattr("assoc.live.make_tracker", note)
     expected = described(MultiSensorTracker.for_scene(scene).filter)
     for more in (["--turns", "4,5,5.5"], []):
         made.clear()
-        words = [str(tmp_path / "radars.npz"), "--live", "--replay", "0", "-o", str(tmp_path / "t.csv"), *more]
-        assert track.main(words) == 0
+        words = [str(tmp_path / "radars.npz"), "--replay", "0", "-o", str(tmp_path / "t.csv"), *more]
+        assert live.main(words) == 0
         assert {described(one.filter) for one in made} == {expected}
     made.clear()
     assert " steps; a step takes " in capsys.readouterr().err
-    assert track.main([*words, "--turns", "9,10,12", "-q"]) == 0
+    assert live.main([*words, "--turns", "9,10,12", "-q"]) == 0
     assert {described(one.filter) for one in made} == {described(two_speeds(manoeuvre_noise(9.0)))}
     assert capsys.readouterr().err == ""
 
@@ -196,39 +196,50 @@ def test_an_interrupt_inside_exec_leaves_the_code():
 
 
 def test_verbose_and_an_output_that_is_full(scene_file, tmp_path, capsys):
-    words = [str(scene_file), "--live", "--replay", "0"]
-    assert track.main([*words, "-v", "-o", str(tmp_path / "t.csv")]) == 0
+    words = [str(scene_file), "--replay", "0"]
+    assert live.main([*words, "-v", "-o", str(tmp_path / "t.csv")]) == 0
     assert "life_cycle LifeCycle(" in capsys.readouterr().err
     if not os.path.exists("/dev/full"):
         pytest.skip("needs a device that is full")
-    assert track.main([*words, "-o", "/dev/full"]) == 2
+    assert live.main([*words, "-o", "/dev/full"]) == 2
     error = capsys.readouterr().err
-    assert error == "assoc.track: error: /dev/full: cannot be written (No space left on device)\n"
+    assert error == "assoc.live: error: /dev/full: cannot be written (No space left on device)\n"
 
 
 def test_bad_options(scene_file, tmp_path, capsys):
-    for more, line in [
-        (["--live", "--udp", "99999"], "--udp: port 99999 cannot be used"),
-        (["--live", "--turns", "4,5"], "turns: expected one for each of 3 sensors"),
-        (["--live", "--udp", "0", "--replay", "1"], "--udp and --replay: expected one of them"),
-        (["--live", "--replay", "-1"], "--replay: expected a number >= 0"),
-        (["--live", "--window", "ctw"], "--window: is not for --live"),
-        (["--live", "--map", tmp_path / "x.geojson"], "--map: is not for --live"),
-        (["--live", "--origin", "52,13"], "--origin: is not for --live"),
-        (["--live", "--radar", "1/2"], "--radar: is not for --live"),
-        (["--live", "--all"], "--all: is not for --live"),
-        (["--live", "--cutoff", "500"], "--cutoff: is not for --live"),
-        (["--live", "-o", tmp_path / "x.parquet"], "x.parquet: expected a name that ends in .csv"),
-        (["--page", "0", "-o", tmp_path / "x.csv"], "--page: is only for --live"),
-        ([], "the following arguments are required: -o/--output"),
+    for main, more, line in [
+        (live.main, ["--udp", "99999"], "--udp: port 99999 cannot be used"),
+        (live.main, ["--turns", "4,5"], "turns: expected one for each of 3 sensors"),
+        (live.main, ["--turns", "4,x,6"], "--turns: expected a number, got 'x'"),
+        (live.main, ["--udp", "0", "--replay", "1"], "--udp and --replay: expected one of them"),
+        (live.main, ["--replay", "-1"], "--replay: expected a number >= 0"),
+        *(
+            (live.main, option, f"{option[0]} belongs to assoc track")
+            for option in (["--window", "ctw"], ["--map", tmp_path / "x.geojson"], ["--all"], ["--cutoff", "500"])
+        ),
+        (live.main, ["--alpha", "2"], "--alpha belongs to aco"),
+        (live.main, ["-o", tmp_path / "x.parquet"], "x.parquet: expected a name that ends in .csv"),
+        (track.main, ["--page", "0", "-o", tmp_path / "x.csv"], "--page belongs to assoc live"),
+        (track.main, [], "the following arguments are required: -o/--output"),
     ]:
         try:
-            code = track.main([*map(str, [scene_file, *more])])
+            code = main([*map(str, [scene_file, *more])])
         except SystemExit as end:
             code = end.code
         said = capsys.readouterr().err
         assert code == 2 and line in said and len(said.strip().splitlines()) == 1, said
     assert not any(tmp_path.glob("x.*"))
+
+
+def test_the_old_spelling_says_the_new_one(scene_file, tmp_path, capsys):
+    out = [tmp_path / "old.csv", tmp_path / "new.csv"]
+    assert track.main([str(scene_file), "--live", "--replay", "0", "-q", "-o", str(out[0])]) == 0
+    words = f"{scene_file} --replay 0 -q -o {out[0]}"
+    assert capsys.readouterr().err == (
+        f"assoc.track: warning: --live is a program of its own now: python -m assoc.live {words}\n"
+    )
+    assert live.main([str(scene_file), "--replay", "0", "-q", "-o", str(out[1])]) == 0
+    assert capsys.readouterr().err == "" and out[0].read_bytes() == out[1].read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -282,13 +293,13 @@ def test_identities_make_or_judge_the_tracks(tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines.encode())))
         out = tmp_path / "tracks.csv"
         more = [] if how is None else ["--identity", how]
-        given = [str(tmp_path / "radar.npz"), "--live", "--interval", "4", "--tracker", "nearest-neighbour"]
-        assert track.main([*given, "-o", str(out), *more]) == 0
+        given = [str(tmp_path / "radar.npz"), "--interval", "4", "--tracker", "nearest-neighbour"]
+        assert live.main([*given, "-o", str(out), *more]) == 0
         told[how], tracks[how] = capsys.readouterr().err.strip().splitlines()[-1], out.read_text()
     for how in (None, "score-only"):
         assert told[how].endswith("; 0 of 2 tracks with an identity kept one")
     assert "identity" not in told["ignore"]
     assert told["use"].endswith("; 2 of 2 tracks with an identity kept one (identities were used to make them)")
     assert tracks[None] == tracks["score-only"] == tracks["ignore"] != tracks["use"]
-    assert track.main([*given, "--replay", "0", "--identity", "use", "-o", str(out)]) == 2
-    assert "--identity: is for plots; the measurements of a scene have no codes" in capsys.readouterr().err
+    assert live.main([*given, "--replay", "0", "--identity", "use", "-o", str(out)]) == 2
+    assert "--identity: is only for plots, not for the measurements of a scene" in capsys.readouterr().err

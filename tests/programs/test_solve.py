@@ -96,21 +96,23 @@ def test_parameters_from_options_and_from_a_file(run, scene_file, tmp_path):
     assert (chosen["ants"], chosen["alpha"], chosen["rho"], chosen["beta"]) == (9, 2.0, 0.3, 1.0)
 
 
-def test_a_density_in_a_file_may_be_text(tmp_path):
-    from assoc import solve
+def test_values_in_a_file_may_be_text(tmp_path):
+    from assoc._cli.options import COMMON, read_config
 
-    (tmp_path / "c.toml").write_text('target-density = "1e-12"\n')
-    assert solve._read_config(str(tmp_path / "c.toml")) == {"target_density": 1e-12}
+    (tmp_path / "c.toml").write_text('target-density = "1e-12"\nseed = 3\n[aco]\nants = 4\n')
+    values, tables = read_config(str(tmp_path / "c.toml"), COMMON.values(), ["aco"])
+    assert values == {"target_density": 1e-12, "seed": 3} and tables == {"aco": {"ants": 4}}
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("kbest = 0", "kbest: expected a whole number >= 1, got 0"),
+        ("kbest = 0", "kbest: expected a whole number >= 1, got '0'"),
         ("kbest = 2\nsolver = 'aco'", "kbest: has its own algorithm"),
-        ("seed = -1", "seed: expected a whole number >= 0, got -1"),
-        ("jobs = 0", "jobs: expected a whole number >= 1, got 0"),
-        ("max_tuples = 0", "max_tuples: expected a whole number >= 1, got 0"),
+        ("seed = -1", "seed: expected a whole number >= 0, got '-1'"),
+        ("jobs = 0", "jobs: expected a whole number >= 1 or 'all', got '0'"),
+        ("max_tuples = 0", "max_tuples: expected a whole number >= 1, got '0'"),
+        ("solver = 3", "solver: expected text, got 3"),
         ("scans = '3:99'", "scans: 3:99 is not within the scans"),
     ],
 )

@@ -42,8 +42,8 @@ def test_the_problem_beside_a_proof_overwrites_nothing(tmp_path, monkeypatch, ca
     for words, message in [
         (["--proof", "p.json"], "p.txt: is given twice, or would overwrite an input file"),
         (["--proof", "q.json", "--csv", "q.txt"], "q.txt: is given twice"),
-        (["--proof", "-"], "--proof: -: expected the name of a file"),
-        (["--proof", "/dev/null"], "--proof: /dev/null: expected the name of a file"),
+        (["--proof", "-"], "--proof: -: expected a name that ends in .json"),
+        (["--proof", "/dev/null"], "--proof: /dev/null: expected a name that ends in .json"),
     ]:
         assert solve.main(["p.txt", *words]) == 2
         said = capsys.readouterr().err

@@ -215,7 +215,7 @@ TOML = [
     ("repeats = 0", "expected a whole number >= 1"),
     ("repeats = true", "expected a whole number"),
     ("time_limit = -1", "expected seconds > 0"),
-    (f"time_limit = 1{'0' * 400}", "time_limit: expected a number within +-1.8e308"),
+    (f"time_limit = 1{'0' * 400}", "time_limit: expected seconds > 0"),
     ("[aco]\nalpha = {low = 1, high = 2}", "[aco]: alpha is a range, which only a random design takes (random = N)"),
     ("random = 5\n[aco]\nalpha = 1", "s.toml: random: nothing to draw"),
     ("grid = ['alpha=1:2']", "s.toml: grid: alpha is a range"),

@@ -29,7 +29,7 @@ _DESCRIBED = ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICEN
 _ADDED = ("PKG-INFO", ".gitignore")
 """What the build adds to a source distribution."""
 _NOT_IN_SDIST = tuple(f"experiments/sdlib/{one}/" for one in ("instances", "proofs", "solutions"))
-_PROGRAMS = ("assoc.simulate", "assoc.solve", "assoc.track", "assoc.sweep")
+_PROGRAMS = ("assoc.simulate", "assoc.solve", "assoc.track", "assoc.live", "assoc.sweep")
 
 _LARGEST_WHEEL = 5_000_000
 """Bytes."""

@@ -11,7 +11,7 @@ import pytest
 
 from assoc.simulation import simulate
 
-DEPENDENCIES = {"joblib", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy"}
+DEPENDENCIES = {"joblib", "llvmlite", "numba", "numpy", "pandas", "rich", "scipy", "shtab"}
 PLANTED = "import os, sys\nos.write(2, b'executed ' + __name__.encode() + b'\\n')\nos._exit(77)\n"
 SWEEP = ["-m", "assoc.sweep", "scene.npz", "--solver", "greedy", "--repeats", "3", "-o", "study", "--jobs", "2"]
 PLAIN = "import assoc\nif __name__ == '__main__':\n    {}\n"

@@ -118,7 +118,7 @@ def test_closed_streams(work):
         assert Path("o.json").read_bytes().startswith(b'{"format"')
         Path("o.json").unlink()
     # without stdin no plot comes
-    words = ["assoc.track", "scene.npz", "--live", "-o", "t.csv"]
+    words = ["assoc.live", "scene.npz", "-o", "t.csv"]
     done = subprocess.run([*PYTHON, *words], stderr=subprocess.PIPE, timeout=300, preexec_fn=closed(0))
     assert done.returncode == 0 and b"0 plots in 0 steps" in done.stderr and b"Traceback" not in done.stderr
 

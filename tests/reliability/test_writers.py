@@ -155,8 +155,8 @@ def test_threads_write_with_the_mode_that_was_asked_for(tmp_path):
 INTERRUPTED = """
 import sys, time
 from assoc._files.output import write_atomically
-from assoc._cli.program import prepare_process
-prepare_process("assoc.test")
+from assoc._cli.signals import EarlyEnd
+EarlyEnd("assoc.test").on_signals()
 def writer(file):
     file.write(b"half of the new")
     file.flush()

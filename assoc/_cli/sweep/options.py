@@ -1,227 +1,183 @@
-"""The options of ``python -m assoc.sweep``, from its command line and from a TOML file.
+"""The options of ``assoc sweep``, from its command line and from a TOML file, and the study that they ask for.
 
-Imports inside functions keep wrong options quick to tell: scenes and studies need numpy and more.
+Imports inside functions let wrong options be refused quickly: scenes and studies need numpy and more.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.inputs import check_outputs, read_toml
-from assoc._cli.options import COMMON_OPTIONS, flag_of
-from assoc._cli.values import check_kind, cores, scan_range, whole_number
+from assoc._cli.options import COMMON, Given, Option, Parser, read_config, verbosity
+from assoc._cli.program import command
+from assoc._cli.values import OneOf, csv_table, html_page, scan_range, whole
+from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
-from assoc.solvers import registry
-from assoc.sweeps.design import designed, read_words, settings_from
-from assoc.sweeps.store import LOG, MANIFEST, REPORT
 
 if TYPE_CHECKING:
-    from assoc.sweeps.setting import Setting
-    from assoc.sweeps.sources import StudySource
     from assoc.sweeps.space import Space
     from assoc.sweeps.study import Study
     from assoc.sweeps.tuning import Report
 
 DEFAULT_SOLVER = "aco"
+SHOWN = 20
+"""Settings that a terminal gets."""
 
-_TEXTS = ("output", "scheduler", "scans", "target")
-_WHOLE = {"repeats": 1, "seed": 0, "random": 1, "max_tuples": 1, "tune": 1}
-_NUMBERS = ("time_limit", "gate_probability")
-_LISTS = ("files", "solver", "grid")
-_KNOWN = (*_LISTS, *_TEXTS, *_WHOLE, *_NUMBERS, "jobs")
-
-
-@dataclass(frozen=True)
-class Options:
-    """The options of a sweep, checked.
-
-    Attributes
-    ----------
-    values : mapping
-        Options by name, in their types.
-    tables : mapping
-        The design as tables, if a file has it.
-    config : str
-        Name of that file.
-    of_file : frozenset of str
-        Options that have their values from it.
-    """
-
-    values: Mapping[str, Any]
-    tables: Mapping[str, Any]
-    config: str
-    of_file: frozenset[str] = frozenset()
-
-    def label(self, name: str) -> str:
-        """What errors call an option: its flag, or its key in the file."""
-        return f"{self.config}: {name}" if name in self.of_file else flag_of(name)
-
-    @property
-    def output(self) -> str:
-        """The study's folder."""
-        return str(self.values["output"])
-
-    @property
-    def jobs(self) -> int:
-        """Number of processes."""
-        return int(self.values.get("jobs", 1))
-
-    @property
-    def scheduler(self) -> str | None:
-        """Address of the dask scheduler."""
-        return self.values.get("scheduler")
-
-    @property
-    def tune(self) -> int | None:
-        """Number of trials, if parameters are to be searched."""
-        return self.values.get("tune")
-
-    @property
-    def solvers(self) -> list[str]:
-        """Names of the solvers of the command line."""
-        words = [name for word in self.values.get("solver", [DEFAULT_SOLVER]) for name in word.split(",") if name]
-        for name in words:
-            registry.parameters(name)
-        return list(dict.fromkeys(words))
-
-    @cached_property
-    def spaces(self) -> dict[str, dict[str, Space]]:
-        """Values and ranges of the command line for each solver."""
-        return read_words(self.values.get("grid", []), self.solvers, self.label("grid"))
-
-    @cached_property
-    def settings(self) -> list[Setting]:
-        """The design."""
-        random, seed = self.values.get("random"), self.values.get("seed", 0)
-        if self.tables:
-            return settings_from(self.tables, random, seed, f"{self.config}: ")
-        return designed(list(self.spaces.items()), random, seed, self.label("grid"))
-
-    @cached_property
-    def sources(self) -> tuple[StudySource, ...]:
-        """The scenes and problems."""
-        from assoc.sweeps.sources import load_sources
-
-        return load_sources(self.values["files"])
-
-    def study(self) -> Study:
-        """Return the study."""
-        from assoc.sweeps.study import Study
-
-        settings = self.settings  # a wrong design is reported before scenes are read
-        return Study(sources=self.sources, settings=settings, repeats=self.values.get("repeats", 1), **self._common())
-
-    def tuning(self, progress: Callable[[Any], object]) -> Report:
-        """Search parameters."""
-        from assoc.sweeps.tuning import tune
-
-        if self.tables or len(self.solvers) != 1 or "random" in self.values:
-            raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without --random or tables")
-        solver = self.solvers[0]
-        return tune(
-            self.output,
-            self.sources,
-            solver,
-            self.spaces[solver],
-            self.values["tune"],
-            target=self.values.get("target", "gap"),
-            repeats=self.values.get("repeats", 3),
-            jobs=self.jobs,
-            scheduler=self.scheduler,
-            progress=progress,
-            **self._common(),
-        )
-
-    def _common(self) -> dict[str, Any]:
-        values = self.values
-        scans = None
-        if "scans" in values:
-            chosen, label = values["scans"], self.label("scans")
-            scans = [scan_range(chosen, source.num_scans, source.name, label) for source in self.sources]
-        return {
-            "seed": values.get("seed", 0),
-            "time_limit": values.get("time_limit"),
-            "gating": {name: values[name] for name in ("gate_probability", "max_tuples") if name in values},
-            "scans": scans,
-        }
+_OF_FILE = (
+    Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "*"}),
+    Option("solver", "NAME", f"one or more solvers (default {DEFAULT_SOLVER})", rest={"nargs": "+"}),
+    Option("grid", "NAME=V1,V2", "parameter values; every combination is run. SOLVER.NAME=... is for one of several "
+           "solvers; --random and --tune also take ranges LOW:HIGH or LOW:HIGH:log", rest={"nargs": "+"}),
+    Option("random", "N", "run N random settings from the values and ranges of --grid", whole(1)),
+    Option("repeats", "N", "runs of each setting on each scan, each with its own seed (default 1)", whole(1)),
+    Option("scans", "A:B", "only scans A to B-1 of each scene, counted from 0; A alone is one scan"),
+    *(COMMON[name] for name in ("seed", "time_limit", "gate_probability", "max_tuples")),
+    Option("output", "FOLDER", "folder of the study", short="-o"),
+    COMMON["jobs"],
+    Option("scheduler", "ADDRESS", "run on a dask cluster: tcp://host:port"),
+    Option("tune", "N", "search for good parameters in the ranges of --grid, with N trials", whole(1)),
+    Option("target", "NAME", "what --tune minimises: gap (mean gap, default) or time (time to optimum)",
+           OneOf(("gap", "time"))),
+)  # fmt: skip
+_OF_SUMMARY = (
+    Option("summary", "FOLDER", "print the table of a study; run nothing"),
+    Option("all", "", f"print all settings on a terminal, not only the first {SHOWN}"),
+    Option("csv", "FILE", "write the table as CSV", csv_table),
+    Option("report", "FILE", "write an HTML page: table, heat maps, convergence (needs assoc[report])", html_page),
+    Option("plot", "", "draw heatmap.png and convergence.png into the folder"),
+)
+_EXTRAS = {"plot": ("matplotlib", "plot"), "tune": ("optuna", "tune"), "scheduler": ("distributed", "dask")}
+"""By option: the package that it needs, and the extra that brings it."""
 
 
-def read_options(given: Mapping[str, Any]) -> Options:
-    """Check the options of the command line and of the file that ``config`` names; the former come first.
+def parser() -> Parser:
+    """Return the parser of ``assoc sweep``."""
+    called = command("sweep")
+    made = Parser(
+        prog="assoc.sweep",
+        usage=f"{called} FILE.npz [FILE.npz ...] --solver NAME --grid NAME=V1,V2 ... -o FOLDER [options]\n"
+        f"       {called} --config STUDY.toml\n"
+        f"       {called} --summary FOLDER [--all] [--plot] [--csv FILE] [--report FILE]",
+        description="Run solvers with many parameter settings on scenes and problems, and keep every result.\n"
+        "The same command again runs only what is missing.",
+    )
+    more = verbosity("how many runs are done, every five seconds, also without a terminal")
+    made.declare(*_OF_FILE, COMMON["config"], *_OF_SUMMARY, COMMON["import"], *more)
+    return made
+
+
+def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
+    """Read the command line and the file that ``--config`` names; the options, and the design as tables of the file.
 
     Raises
     ------
     InvalidInputError
         Anything that is not as ``--help`` says.
     """
-    config = given.get("config", "")
-    content = read_toml(config) if config else {}
-    tables = {key: content.pop(key) for key in [*content] if key in registry.names() and key not in _KNOWN}
-    values = {key: _of_file(config, key, value) for key, value in content.items()}
-    values |= {name: _of_text(name, given[name]) for name in _of_line(given)}
-    options = Options(values, tables, config, frozenset(values) - {*_of_line(given)})
-    if tables:
-        for name in ("solver", "grid"):
-            if name in values:
-                label = options.label(name)
-                raise InvalidInputError(f"{label}: {config} has tables of parameters already; give one of the two")
-    if not values.get("files"):
+    from assoc.solvers import registry
+
+    given = parser().read(words)
+    for name, (package, extra) in _EXTRAS.items():
+        if given[name] is not None:
+            check_extra(package, extra)
+    if given["summary"] is not None:
+        others = [one.name for one in (*_OF_FILE, COMMON["config"]) if given.of_line(one.name)]
+        if others:
+            raise InvalidInputError(
+                "--summary: runs nothing and can be combined only with --all, --plot, --csv and --report, "
+                f"not with {others[0]}"
+            )
+        _check_outputs(given, given["summary"])
+        return given, {}
+    values, tables = read_config(given["config"], _OF_FILE, registry.names())
+    given.fill(given["config"] or "", values)
+    _check_combinations(given, tables)
+    _check_outputs(given, given["output"])
+    return given, tables
+
+
+def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:
+    for name in ("solver", "grid") if tables else ():
+        if given[name]:
+            label = given.label(name)
+            raise InvalidInputError(f"{label}: {given.file} has tables of parameters already; give one of the two")
+    if not given["files"]:
         raise InvalidInputError("no scene.npz or problem.npz is given")
-    if "output" not in values:
+    if given["output"] is None:
         raise InvalidInputError("--output: missing, expected the folder of the study")
-    if "scheduler" in values and "jobs" in values:
+    if given["scheduler"] and given["jobs"]:
         raise InvalidInputError("--jobs: a cluster has its own workers; give --jobs or --scheduler, not both")
-    if values.get("target", "gap") not in ("gap", "time"):
-        raise InvalidInputError(f"{options.label('target')}: expected gap or time, got {values['target']!r}")
-    if "target" in values and "tune" not in values:
-        raise InvalidInputError(f"{options.label('target')}: can be given only with --tune")
-    if not 0 < values.get("gate_probability", 1.0) <= 1:
-        label = options.label("gate_probability")
-        raise InvalidInputError(f"{label}: expected a number in (0, 1], got {values['gate_probability']}")
-    return options
+    if given["target"] is not None and given["tune"] is None:
+        raise InvalidInputError(f"{given.label('target')}: can be given only with --tune")
+    if given["tune"] is not None and (tables or given["random"] or len(_solvers(given)) != 1):
+        raise InvalidInputError("--tune: needs one --solver and ranges in --grid, without --random or tables")
 
 
-def _of_line(given: Mapping[str, Any]) -> list[str]:
-    """Names of the options that the command line has."""
-    return [name for name, value in given.items() if name in _KNOWN and value != []]
-
-
-def _of_text(name: str, value: Any) -> Any:
-    if name in COMMON_OPTIONS:
-        return COMMON_OPTIONS[name].parse(value, flag_of(name))
-    return whole_number(value, flag_of(name), _WHOLE[name]) if name in _WHOLE else value
-
-
-def _of_file(file: str, key: str, value: Any) -> Any:
-    label = f"{file}: {key}"
-    if key not in _KNOWN:
-        if isinstance(value, (dict, list)):
-            raise InvalidInputError(f"{file}: [{key}] is no solver; known: {', '.join(registry.names())}")
-        raise InvalidInputError(f"{label}: unknown key; known: {', '.join(_KNOWN)}, and tables [solver]")
-    if key in _LISTS:
-        words = [value] if isinstance(value, str) else value
-        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
-            raise InvalidInputError(f"{label}: expected text or a list of texts, got {value!r}")
-        return words
-    if key == "jobs" and value == "all":
-        return cores()
-    check_kind(value, str if key in _TEXTS else float if key in _NUMBERS else int, label)
-    if key in _WHOLE or key == "jobs":
-        least = _WHOLE.get(key, 1)
-        if value < least:
-            raise InvalidInputError(f"{label}: expected a whole number >= {least}, got {value!r}")
-    if key == "time_limit" and not 0 < value < float("inf"):
-        raise InvalidInputError(f"{label}: expected seconds > 0, got {value!r}")
-    return float(value) if key in _NUMBERS else value
-
-
-def check_study_outputs(folder: str, files: Sequence[str | None], inputs: Sequence[str]) -> None:
+def _check_outputs(given: Given, folder: str) -> None:
     """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
+    from assoc.sweeps.store import LOG, MANIFEST, REPORT
+
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InvalidInputError(f"{folder}: is a file, expected the folder of a study")
     study = [os.path.join(folder, name) for name in (MANIFEST, LOG, REPORT)]
-    check_outputs(files, inputs, reserved=study, new_folder=folder)
+    given.check_outputs([*given["files"], given["config"]], reserved=study, new_folder=folder)
+
+
+def _solvers(given: Given) -> list[str]:
+    """Names of the solvers."""
+    from assoc.solvers import registry
+
+    words = [name for word in given["solver"] or [DEFAULT_SOLVER] for name in word.split(",") if name]
+    for name in words:
+        registry.parameters(name)
+    return list(dict.fromkeys(words))
+
+
+def _spaces(given: Given) -> dict[str, dict[str, Space]]:
+    """Values and ranges of ``--grid`` for each solver."""
+    from assoc.sweeps.design import read_words
+
+    return read_words(given["grid"] or [], _solvers(given), given.label("grid"))
+
+
+def make_study(given: Given, tables: Mapping[str, Any]) -> Study:
+    """Return the study that is asked for."""
+    from assoc.sweeps.design import designed, settings_from
+    from assoc.sweeps.study import Study
+
+    # a wrong design is reported before scenes are read
+    if tables:
+        settings = settings_from(tables, given["random"], given["seed"] or 0, f"{given.file}: ")
+    else:
+        settings = designed(list(_spaces(given).items()), given["random"], given["seed"] or 0, given.label("grid"))
+    return Study(settings=settings, **_scenes(given), **given.some(("seed", "time_limit", "repeats")))
+
+
+def tune_parameters(given: Given, progress: Callable[[Any], object]) -> Report:
+    """Search good parameters."""
+    from assoc.sweeps.tuning import tune
+
+    ((solver, space),) = _spaces(given).items()
+    sources = _scenes(given)
+    return tune(
+        given["output"],
+        sources.pop("sources"),
+        solver,
+        space,
+        given["tune"],
+        progress=progress,
+        **sources,
+        **given.some(("seed", "time_limit", "repeats", "target", "jobs", "scheduler")),
+    )
+
+
+def _scenes(given: Given) -> dict[str, Any]:
+    """The scenes and problems, which of their scans, and how these become problems."""
+    from assoc.sweeps.sources import load_sources
+
+    sources, scans = load_sources(given["files"]), None
+    if given["scans"] is not None:
+        label = given.label("scans")
+        scans = [scan_range(given["scans"], source.num_scans, source.name, label) for source in sources]
+    return {"sources": sources, "scans": scans, "gating": given.some(("gate_probability", "max_tuples"))}

@@ -1,32 +1,28 @@
-"""The options of ``python -m assoc.track``: their parser, what is checked of them, and the tracker they ask for.
+"""The options of ``assoc track`` and ``assoc live``, and the tracker that they ask for.
 
 Imports inside functions keep --help quick.
 """
 
 from __future__ import annotations
 
-import argparse
-import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from assoc._cli.imports import HELP as IMPORT_HELP
-from assoc._cli.imports import import_modules
-from assoc._cli.inputs import check_ending, check_outputs
+from assoc._cli import values as kinds
+from assoc._cli.inputs import import_modules
 from assoc._cli.options import (
-    add_common_options,
-    common_values,
+    COMMON,
+    Given,
+    Option,
+    Parser,
     flag_of,
     flags_of_solvers,
-    parameter_values,
+    parameter_options,
     read_first,
+    verbosity,
 )
-from assoc._cli.program import Parser, command
-from assoc._cli.speech import add_speech_options
-from assoc._cli.values import number, place_on_earth, whole_number
-from assoc._parameters import Option, options, positive
-from assoc._system.extras import check_extra
-from assoc.errors import InvalidInputError
+from assoc._cli.program import command
 
 if TYPE_CHECKING:
     from assoc.sensors import Sensor
@@ -40,234 +36,230 @@ TRACKERS = {
     "nearest-neighbour": "assigns each measurement to the nearest track",
     "joint-probabilistic": "each track takes all measurements near it, by their probabilities (JIPDA)",
 }
-WINDOWS = ("ctw", "ctw-time", "irregular", "none")
-IDENTITY = ("use", "score-only", "ignore")
-# option -> the trackers that take it
-_OWN = {
-    "depth": ("mht", "mht-hypothesis"),
-    "max_branches": ("mht",),
-    "max_hypotheses": ("mht-hypothesis",),
-    "max_events": ("joint-probabilistic",),
-    "rule": ("nearest-neighbour",),
-}
-# option of the life cycle -> the choice without which it says nothing
-_NEEDS = {
-    "m": ("confirmation", "m-of-n"),
-    "n": ("confirmation", "m-of-n"),
-    "false_probability": ("confirmation", "score"),
-    "deletion_time": ("deletion", "time"),
-    "deletion_count": ("deletion", "count"),
-    "deletion_drop": ("deletion", "score"),
-}
-# option -> what `assoc.recordings.radar_of` calls it, and its unit
-RADAR = {
-    "detection_probability": ("detection_probability", 1.0),
-    "false_alarms": ("false_alarm_rate", 1.0),
-    "range_noise": ("range_noise", 1.0),
-    "bearing_noise": ("azimuth_noise", math.pi / 180.0),
-}
-FORMATS = {".csv": "to_csv", ".parquet": "to_parquet"}
-"""Endings of the output, and which method of the table writes it."""
+FILTERS = ("imm-cv", "ekf", "kalman", "modified-ekf", "ukf", "enkf", "imm", "fuzzy")
 
-# options that only --live takes
-LIVE_ONLY = ("udp", "replay", "page", "interval", "turns", "horizon", "wait")
+_OF_TRACKERS = (
+    Option("depth", "N", "mht: number of scans after which a decision is final (default 3)", kinds.whole(1),
+           {"tracker": ("mht", "mht-hypothesis")}),
+    Option("max_branches", "N", "mht: largest number of branches of a track tree (default 30)", kinds.whole(1),
+           {"tracker": ("mht",)}),
+    Option("max_hypotheses", "N", "mht-hypothesis: most hypotheses of a cluster (default 50)", kinds.whole(1),
+           {"tracker": ("mht-hypothesis",)}),
+    Option("max_events", "N", "joint-probabilistic: joint events kept apart at a time (default 4096)", kinds.whole(1),
+           {"tracker": ("joint-probabilistic",)}),
+    Option("rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver",
+           kinds.OneOf(("greedy", "assignment")), {"tracker": ("nearest-neighbour",)}),
+)  # fmt: skip
+_OF_ALL = ("seed", "time_limit", "gate_probability")
+TRACKING = (
+    Option("tracker", "NAME", "name of the tracker, see below", kinds.OneOf(TRACKERS)),
+    Option("solver", "NAME", "name of the solver (default exact)"),
+    Option("filter", "NAME", f"{', '.join(FILTERS)} (default: imm-cv, for recorded plots ekf)", kinds.OneOf(FILTERS)),
+    Option("process_noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)",
+           kinds.not_negative),
+    *(COMMON[name] for name in _OF_ALL),
+    *_OF_TRACKERS,
+)  # fmt: skip
+"""Options of trackers, whatever they track."""
+_COMMON = (COMMON["import"], *verbosity("the settings that were used"))
+
+IDENTITY = Option(
+    "identity",
+    "NAME",
+    "codes and addresses: use, to associate plots; score-only, to judge the tracks by them (default); or ignore",
+    kinds.OneOf(("use", "score-only", "ignore")),
+    {"input": ("plots",)},
+)
+# parameter of the life cycle -> what it is only for
+_LIFE_CYCLE = {
+    "m": {"confirmation": ("m-of-n",)},
+    "n": {"confirmation": ("m-of-n",)},
+    "false_probability": {"confirmation": ("score",)},
+    "deletion_time": {"deletion": ("time",)},
+    "deletion_count": {"deletion": ("count",)},
+    "deletion_drop": {"deletion": ("score",)},
+}
 CUTOFF = 1_000.0
-# of the option groups: flag, what stands for its value, help
-_OUTPUTS = (
-    ("--map", "FILE", "write the tracks for a map as well (.geojson or .kml); needs an origin"),
-    ("--origin", "LAT,LON[,H]", "where x = y = 0 is on the earth, degrees and metres (if not in FILE)"),
-    ("--report", "FILE", "write an HTML page: tracks over time, metric, table (needs assoc[report])"),
+_SCENES = {"input": ("scenes",)}
+_PLOTS = {"input": ("plots",)}
+TRACKS = kinds.Output(".csv", ".parquet", strict=True, extras={".parquet": ("pyarrow", "parquet")})
+TRACK = (
+    Option("file", "FILE", "scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)",
+           positional=True),
+    Option("output", "FILE", "file for the tracks (.csv or .parquet)", TRACKS,
+           short="-o", rest={"required": True}),
+    Option("map", "FILE", "write the tracks for a map as well (.geojson or .kml); needs an origin",
+           kinds.Output(".geojson", ".kml", ".json", strict=True, streams=False)),
+    Option("origin", "LAT,LON[,H]", "where x = y = 0 is on the earth, degrees and metres (if not in FILE)",
+           kinds.position_on_earth),
+    Option("report", "FILE", "write an HTML page: tracks over time, metric, table (needs assoc[report])",
+           kinds.html_page),
+    Option("all", "", "also write tracks that are tentative, or whose target may be gone"),
+)  # fmt: skip
+OF_SCENES = (
+    Option("cutoff", "M", f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})",
+           kinds.positive, _SCENES),
+    Option("registration", "NAME", "online: estimate biases of the scene's sensors and correct for them",
+           kinds.OneOf(("online",)), _SCENES),
+    Option("smooth", "", "smooth the tracks: each position by all of its measurements", only=_SCENES),
+)  # fmt: skip
+OF_PLOTS = (
+    Option("window", "NAME",
+           "how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by "
+           "random intervals; none, one by one", kinds.OneOf(("ctw", "ctw-time", "irregular", "none")), _PLOTS),
+    IDENTITY,
+    Option("rates", "FILE", "write CT, MT and IT of each window (.csv; needs identities)", kinds.csv_table,
+           {**_PLOTS, "identity": ("use", "score-only")}),
+    Option("rotation", "S", "rotation period of the antenna, seconds (default: estimated)", kinds.seconds,
+           {**_PLOTS, "window": ("ctw", "ctw-time")}),
+    Option("radar", "SAC/SIC", "which radar of an ASTERIX file (.ast, .asterix, .pcap)",
+           only={**_PLOTS, "format": ("ASTERIX files",)}),
+    Option("detection_probability", "P", "detection probability of the radar (default 0.8)", kinds.number, _PLOTS),
+    Option("range_noise", "M", "standard deviation of range, metres (default: from the plots' steps)", kinds.number,
+           _PLOTS),
+    Option("bearing_noise", "DEG", "standard deviation of bearing, degrees (default: likewise)", kinds.degrees, _PLOTS),
+    Option("false_alarms", "X", "mean number of false plots in a rotation (default 2.5)", kinds.number, _PLOTS),
+)  # fmt: skip
+# what `assoc.recordings.radar_of` calls them
+RADAR = {
+    "detection_probability": "detection_probability",
+    "false_alarms": "false_alarm_rate",
+    "range_noise": "range_noise",
+    "bearing_noise": "azimuth_noise",
+}
+LIVE = (
+    Option("file", "SCENE.npz", "scene with the sensors and the region", positional=True),
+    Option("output", "FILE", "file for the tracks (.csv; default: stdout)", kinds.Output(".csv", strict=True),
+           short="-o"),
+    Option("udp", "PORT", "read plots from this UDP port on 127.0.0.1 (default: stdin)", kinds.whole(0)),
+    Option("replay", "X", "take the scene's own plots, X times as quickly as they were made (0: at once)",
+           kinds.not_negative),
+    Option("page", "PORT", "show the tracks moving on a page on 127.0.0.1 (0: any free port)", kinds.whole(0)),
+    Option("interval", "S", "seconds of plots that are taken in together (default 1)", kinds.number),
+    Option("turns", "S,...", "seconds for a turn of each radar's antenna (default: all measure at the same time)",
+           kinds.listed(kinds.number)),
+    Option("horizon", "S", "seconds that plots may be late (default 30)", kinds.number),
+    Option("wait", "S", "seconds for which an interval waits for plots (default 0)", kinds.number),
+    IDENTITY,
+)  # fmt: skip
+_MORE = "\n".join(
+    [
+        "trackers:",
+        *(f"  {name:<19}  {purpose}" for name, purpose in TRACKERS.items()),
+        "",
+        "further options (docs/tracking.md):",
+        "  track life cycle   --confirmation --false-probability --missed-probability --m --n "
+        "--deletion --deletion-time --deletion-count --deletion-drop --lifetime",
+        "  track initiation   --speed --rest --birth-rate --widest",
+        "  --identity use     --code-garbled --code-shared --address-garbled --address-shared",
+        "  solver parameters  described by: python -m assoc.solve --solver NAME --help",
+    ]
 )
-_CHOICES = (
-    ("--tracker", "NAME", "name of the tracker, see below"),
-    ("--solver", "NAME", "name of the solver (default exact)"),
-    (
-        "--filter",
-        "NAME",
-        "imm-cv, ekf, kalman, modified-ekf, ukf, enkf, imm or fuzzy (default: imm-cv for scenes, ekf for plots)",
-    ),
-    ("--process-noise", "X", "process noise in m/s^1.5, for imm in m/s^2 (default 30, imm-cv by pace)"),
-)
-_TRACKING = (
-    ("--depth", "N", "mht: number of scans after which a decision is final (default 3)"),
-    ("--max-branches", "N", "mht: largest number of branches of a track tree (default 30)"),
-    ("--max-hypotheses", "N", "mht-hypothesis: most hypotheses of a cluster (default 50)"),
-    ("--max-events", "N", "joint-probabilistic: joint events kept apart at a time (default 4096)"),
-    ("--rule", "NAME", "nearest-neighbour: greedy (default), or assignment, which uses the solver"),
-    ("--import", "MODULE", IMPORT_HELP),
-)
-_PLOTS = (
-    (
-        "--window",
-        "NAME",
-        "how plots are grouped into scans: ctw, by antenna angle (default); ctw-time, by time; irregular, by random "
-        "intervals; none, one by one",
-    ),
-    (
-        "--identity",
-        "NAME",
-        "codes and addresses: use, to associate plots; score-only, to judge the tracks by them (default); or ignore",
-    ),
-    ("--rates", "FILE", "write CT, MT and IT of each window (.csv; needs identities)"),
-    ("--rotation", "S", "rotation period of the antenna, seconds (default: estimated)"),
-    ("--radar", "SAC/SIC", "which radar of an ASTERIX file (.ast, .asterix, .pcap)"),
-    ("--detection-probability", "P", "detection probability of the radar (default 0.8)"),
-    ("--range-noise", "M", "standard deviation of range, metres (default: from the plots' steps)"),
-    ("--bearing-noise", "DEG", "standard deviation of bearing, degrees (default: likewise)"),
-    ("--false-alarms", "X", "mean number of false plots in a rotation (default 2.5)"),
-)
-_PLOTS_AS_THEY_COME = (
-    ("--udp", "PORT", "read them from this UDP port on 127.0.0.1 (default: stdin)"),
-    ("--replay", "X", "take the scene's own plots, X times as quickly as they were made (0: at once)"),
-    ("--page", "PORT", "show the picture moving on a page on 127.0.0.1 (0: any free port)"),
-    ("--interval", "S", "seconds of plots that are taken in together (default 1)"),
-    ("--turns", "S,...", "seconds for a turn of each radar's antenna (default: sensors look at once)"),
-    ("--horizon", "S", "seconds that plots may be late (default 30)"),
-    ("--wait", "S", "seconds for which an interval waits for plots (default 0)"),
-)
-_MORE = """
-further options (docs/tracking.md):
-  track life cycle   --confirmation --false-probability --missed-probability --m --n \
---deletion --deletion-time --deletion-count --deletion-drop
-  track initiation   --speed --rest --birth-rate --widest
-  --identity use     --code-garbled --code-shared --address-garbled --address-shared
-  solver parameters  described by: python -m assoc.solve --solver NAME --help"""
+"""What ends the help."""
 
 
-def read_options(words: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read the command line; the options, checked, and the arguments for the tracker.
+def track_parser() -> Parser:
+    """Return the parser of ``assoc track``, without what `read_options` adds."""
+    parser = Parser(
+        prog="assoc.track",
+        usage=f"{command('track')} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
+        description="Make tracks from the measurements of a scene (.npz) or from recorded radar plots.\n"
+        f"{command('live')} makes tracks from plots as they come.",
+        epilog=_MORE,
+    )
+    parser.declare(*TRACK, *_COMMON)
+    parser.declare(*TRACKING, group="options of trackers")
+    parser.declare(*OF_SCENES, group="options for scenes")
+    parser.declare(*OF_PLOTS, group="options for plots")
+    parser.elsewhere = lambda: {flag_of(one.name): "assoc live" for one in LIVE[1:]}
+    return parser
+
+
+def live_parser() -> Parser:
+    """Return the parser of ``assoc live``, without what `read_options` adds."""
+    called = command("live")
+    parser = Parser(
+        prog="assoc.live",
+        usage=f"{called} SCENE.npz [--tracker NAME] [options] < plots > tracks.csv\n"
+        f"       {called} SCENE.npz --udp PORT [--page PORT] [options]\n"
+        f"       {called} SCENE.npz --replay X [--page PORT] [options]",
+        description="Make tracks from radar plots as they come (lines of CSV or JSON), and write them as they change.",
+        epilog=_MORE,
+    )
+    parser.declare(*LIVE, *_COMMON)
+    parser.declare(*TRACKING, group="options of trackers")
+    parser.elsewhere = lambda: {flag_of(one.name): "assoc track" for one in (*TRACK[1:], *OF_SCENES, *OF_PLOTS)}
+    return parser
+
+
+def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any]]:
+    """Read a command line; the options, and the arguments for the tracker.
+
+    Parameters
+    ----------
+    words : list of str
+    parser : Parser
+        Knows the program's options but for the further ones.
 
     Raises
     ------
     InvalidInputError
-        An option is unknown, or its value none that it takes.
+        An option is unknown, or has a value that it does not take.
     """
-    first = read_first("assoc.track", words, ["solver", "import"])
+    first = read_first(words, "solver", "import")
     import_modules(first["import"])
     solver = first["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
         # help must be quick, and the packages that know the further options are not
-        _parser([]).parse_args(words)
+        parser.parse_args(words)
     from assoc.tracking import IdentityParameters, Initiation, LifeCycle
 
-    own, cycle, initiation, identity = _further(solver)
-    parser = _parser([*own, *cycle, *initiation, *identity])
-    parser.elsewhere = lambda: flags_of_solvers(solver)
-    parsed = vars(parser.parse_args(words))
-    given = parsed["cutoff"]
-    if parsed["live"] and given is not None:
-        raise InvalidInputError("--cutoff: is not for --live")
-    parsed["cutoff"] = None if given is None else positive(number(given, "--cutoff"), "--cutoff")
-    if not parsed["live"] and parsed["output"] is None:
-        parser.error("the following arguments are required: -o/--output")
-    check_outputs([parsed["output"], parsed["report"], parsed["map"], parsed["rates"]], [parsed["file"]])
-    parsed["ending"] = check_ending(parsed["output"], "--output", *((".csv",) if parsed["live"] else FORMATS))
-    check_ending(parsed["report"], "--report", ".html", ".htm", strict=False)
-    check_ending(parsed["rates"], "--rates", ".csv", strict=False)
-    if parsed["ending"] == ".parquet":
-        check_extra("pyarrow", "parquet")
-    if parsed["map"] and not parsed["map"].lower().endswith((".geojson", ".json", ".kml")):
-        raise InvalidInputError(f"--map: expected a name that ends in .geojson or .kml, got {parsed['map']!r}")
-    parsed["origin"] = None if parsed["origin"] is None else place_on_earth(parsed["origin"], "--origin")
-    if parsed["report"]:
-        check_extra("plotly", "report")
-    lives = parameter_values(cycle, parsed)
+    further = add_further(parser, solver)
+    elsewhere = parser.elsewhere
+    parser.elsewhere = lambda: {**flags_of_solvers(solver), **elsewhere()}
+    given = parser.read(words)
+    values = {name: given.some(one.name for one in options) for name, options in further.items()}
+    life_cycle = LifeCycle(**values["life_cycle"])
+    given.check_use(further["life_cycle"], confirmation=life_cycle.confirmation, deletion=life_cycle.deletion)
+    given.check_use(further["identity"], identity=given["identity"] or "score-only")
     settings: dict[str, Any] = {
         "solver": solver,
-        "solver_parameters": parameter_values(own, parsed),
-        "life_cycle": LifeCycle(**lives),
-        "initiation": Initiation(**parameter_values(initiation, parsed)),
-        **common_values(parsed),
+        "solver_parameters": values["solver"],
+        "life_cycle": life_cycle,
+        "initiation": Initiation(**values["initiation"]),
+        **given.some(_OF_ALL),
     }
-    for name, (choice, needed) in _NEEDS.items():
-        if name in lives and getattr(settings["life_cycle"], choice) != needed:
-            raise InvalidInputError(f"{flag_of(name)}: is only for {flag_of(choice)} {needed}")
-    if parsed["identity"] not in (None, *IDENTITY):
-        raise InvalidInputError(f"--identity: unknown name {parsed['identity']!r}; known: {', '.join(IDENTITY)}")
-    trusted = parameter_values(identity, parsed)
-    if parsed["identity"] == "use":
-        settings["identity"] = IdentityParameters(**trusted)
-    elif trusted:
-        raise InvalidInputError(f"{flag_of(next(iter(trusted)))}: is only for --identity use")
-    if not parsed["live"]:
-        for option in LIVE_ONLY:
-            if parsed[option] is not None:
-                raise InvalidInputError(f"{flag_of(option)}: is only for --live")
-    return parsed, settings
+    if given["identity"] == "use":
+        settings["identity"] = IdentityParameters(**values["identity"])
+    return given, settings
 
 
-def _further(solver: str) -> tuple[list[Option], list[Option], list[Option], list[Option]]:
-    """Parameters of the solver, the life cycle of tracks, their initiation, and identities."""
+def add_further(parser: Parser, solver: str) -> dict[str, list[Option]]:
+    """Add the parameters of the solver, the life cycle of tracks, their initiation, and identities."""
     from assoc.solvers import registry
     from assoc.tracking import IdentityParameters, Initiation, LifeCycle
 
-    initiation = [*options(Initiation), Option(Initiation, _field(Initiation, "speed"))]
-    for one in initiation:
-        one.kind = float
-    return options(registry.parameters(solver)), options(LifeCycle), initiation, options(IdentityParameters)
+    further = {
+        "solver": parameter_options(registry.parameters(solver)),
+        "life_cycle": [replace(one, only=_LIFE_CYCLE.get(one.name, {})) for one in parameter_options(LifeCycle)],
+        "initiation": [Option("speed", "X", "usual speed along an axis", kinds.number), *parameter_options(Initiation)],
+        "identity": [replace(one, only={"identity": ("use",)}) for one in parameter_options(IdentityParameters)],
+    }
+    for options in further.values():
+        parser.declare(*options)
+    return further
 
 
-def _field(owner: Any, name: str) -> Any:
-    from dataclasses import fields
-
-    return next(one for one in fields(owner) if one.name == name)
-
-
-def completions() -> dict[str, Sequence[str]]:
-    """Options of the program with the values they take, for shells."""
-    from assoc.solvers import registry
-    from assoc.tracking.filter_choice import FILTERS
-
-    values = {
-        "--tracker": [*TRACKERS], "--filter": [*FILTERS], "--window": WINDOWS, "--identity": IDENTITY,
-        "--solver": registry.names(),
-    }  # fmt: skip
-    return {**_parser([option for group in _further("exact") for option in group]).flags(), **values}
-
-
-def _parser(further: Sequence[Option]) -> Parser:
-    lines = [f"  {name:<18} {purpose}" for name, purpose in TRACKERS.items()]
-    called = command("track")
-    parser = Parser(
-        prog="assoc.track",
-        usage=f"{called} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]\n"
-        f"       {called} SCENE --live [--udp PORT] [--page PORT] [options] < plots",
-        description="Make tracks from the measurements of a scene (.npz) or from radar plots (.csv).",
-        epilog="trackers:\n" + "\n".join(lines) + "\n" + _MORE,
-    )
-    add = parser.add_argument
-    add("file", metavar="FILE", help="scene.npz, or plots.csv with time, range, bearing (docs/recordings.md)")
-    add("-o", "--output", metavar="FILE", help="file for the tracks (.csv or .parquet)")
-    _add(parser, _OUTPUTS)
-    _add(parser, _CHOICES)
-    add_common_options(parser, ["seed", "time_limit", "gate_probability"])
-    text = f"GOSPA: farther than this from a target a track is false, metres (default {CUTOFF:g})"
-    add("--cutoff", metavar="M", help=text)
-    add("--registration", metavar="NAME", help="online: estimate biases of the scene's sensors and correct for them")
-    add("--all", action="store_true", help="also write tracks that are tentative, or whose target may be gone")
-    add("--smooth", action="store_true", help="smooth the tracks of a scene: each position by all of its measurements")
-    _add(parser, _TRACKING)
-    add_speech_options(parser, "the settings that were used")
-    _add(parser.add_argument_group("options for plots"), _PLOTS)
-    live = parser.add_argument_group("options for plots as they come")
-    live.add_argument(
-        "--live", action="store_true", help="read plots as lines (CSV or JSON), write tracks as they change"
-    )
-    _add(live, _PLOTS_AS_THEY_COME)
-    for option in further:
-        option.add_to(parser)
+def with_further(parser: Parser) -> Parser:
+    """Return the parser with the options that `read_options` adds."""
+    add_further(parser, "exact")
     return parser
-
-
-def _add(group: argparse._ActionsContainer, table: Sequence[tuple[str, str, str]]) -> None:
-    for flag, metavar, text in table:
-        group.add_argument(flag, metavar=metavar, help=text)
 
 
 def make_tracker(
     name: str,
     sensors: Sequence[Sensor],
-    parsed: dict[str, Any],
+    parsed: Given,
     settings: dict[str, Any],
     region: Any,
     pace: float = 1.0,
@@ -277,23 +269,12 @@ def make_tracker(
     Raises
     ------
     InvalidInputError
-        There is no tracker of that name, or an option is not for it.
+        An option is not for it.
     """
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter
 
-    if name not in KINDS:
-        raise InvalidInputError(f"--tracker: unknown name {name!r}; known: {', '.join(KINDS)}")
-    extra: dict[str, Any] = {}
-    for option, takers in _OWN.items():
-        if parsed[option] is None:
-            continue
-        flag = flag_of(option)
-        if name not in takers:
-            raise InvalidInputError(f"{flag}: is only for --tracker {' or '.join(takers)}, not for {name}")
-        extra[option] = parsed[option] if option == "rule" else whole_number(parsed[option], flag, 1)
-    noise = None
-    if parsed["process_noise"] is not None:
-        noise = positive(number(parsed["process_noise"], "--process-noise"), "--process-noise", zero=True)
-    made = make_filter(parsed["filter"], sensors, noise, settings.get("seed", 0), pace)
-    return KINDS[name](sensors, made, region=region, **settings, **extra)
+    parsed.check_use(_OF_TRACKERS, tracker=name)
+    made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace)
+    own = parsed.some(one.name for one in _OF_TRACKERS)
+    return KINDS[name](sensors, made, region=region, **settings, **own)

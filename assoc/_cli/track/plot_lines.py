@@ -64,23 +64,34 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
         return None
     if len(text) > LONGEST:
         raise InvalidInputError(f"a line of {len(text)} characters, expected at most {LONGEST}")
-    if text.startswith("{"):
-        return _from_json(text, scene)
-    parts = [one.strip() for one in text.split(",")]
-    if parts[0].lower() == "sensor":
+    if text.partition(",")[0].strip().lower() == "sensor":
         return None
-    sensor = _sensor(parts[0], scene)
-    # how many values an unknown one sends is not known: the tracker says that it does not know it
-    dim = len(parts) if sensor is None else sensor.dim
-    identity, more = parts[2 + dim : 4 + dim], parts[4 + dim :]
     try:
-        time, *values = [float(one) for one in parts[1 : 2 + dim]]
-        if more:
-            raise ValueError(f"{len(parts) - 2} values, at most {dim}, mode3 and address")
-        return Plot(parts[0], time, values, _identity(*identity))
-    except ValueError as error:
-        expected = "expected sensor,time,values[,mode3,address] or a JSON object"
-        raise InvalidInputError(f"{expected}, got {text[:60]!r} ({str(error)[:80]})") from None
+        found: Any = json.loads(text) if text.startswith("{") else _from_csv(text, scene)
+        name, time = str(found["sensor"]), float(found["time"])
+        values = found.get("values")
+        if values is None:
+            sensor = _sensor(name, scene)
+            # of an unknown sensor nothing is read: the tracker says that it does not know it
+            values = [found[one] for one in sensor.components[: sensor.dim]] if sensor is not None else []
+        identity = _identity(found.get("mode3"), found.get("address"))
+        return Plot(name, time, [float(one) for one in values], identity)
+    except (ValueError, TypeError, LookupError, RecursionError, AttributeError, OverflowError) as error:
+        what = f"no {error}" if isinstance(error, KeyError) else str(error)
+        expected = "expected sensor, time and values, as CSV or a JSON object"
+        raise InvalidInputError(f"{expected}, got {text[:60]!r} ({what[:80]})") from None
+
+
+def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
+    """Sensor, time, values, and what tells who it is."""
+    name, time, *rest = (one.strip() for one in text.split(","))
+    sensor = _sensor(name, scene)
+    # how many values an unknown sensor sends is not known: the tracker says that it does not know it
+    dim = len(rest) if sensor is None else sensor.dim
+    if len(rest) > dim + 2:
+        raise ValueError(f"{len(rest)} values, at most {dim}, mode3 and address")
+    names = zip(("mode3", "address"), rest[dim:], strict=False)
+    return {"sensor": name, "time": time, "values": rest[:dim], **dict(names)}
 
 
 def _sensor(name: str, scene: Scene) -> Sensor | None:
@@ -111,23 +122,6 @@ def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
             raise ValueError(f"{what}: expected {kind}")
         found.append(number)
     return found[0], found[1]
-
-
-def _from_json(text: str, scene: Scene) -> Plot:
-    try:
-        found: Any = json.loads(text)
-        sensor, time = str(found["sensor"]), float(found["time"])
-        values = found.get("values")
-        if values is None:
-            known = _sensor(sensor, scene)
-            # of an unknown sensor nothing is read: the tracker says that it does not know it
-            names = known.components[: known.dim] if known is not None else ()
-            values = [found[name] for name in names]
-        identity = _identity(found.get("mode3"), found.get("address"))
-        return Plot(sensor, time, [float(one) for one in values], identity)
-    except (ValueError, TypeError, KeyError, RecursionError, AttributeError, OverflowError) as error:
-        what = f"no {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidInputError(f"expected sensor, time and values, got {text[:60]!r} ({what})") from None
 
 
 class _Waiting(queue.Queue[bytes | None]):
@@ -267,8 +261,8 @@ class TrackWriter:
 
     def _row(self, event: str, track: Any, when: float) -> None:
         sigma = [0.0, 0.0, 0.0]
-        for axis, place in enumerate(self._positions):
-            sigma[axis] = math.sqrt(max(float(track.covariance[place, place]), 0.0))
+        for axis, k in enumerate(self._positions):
+            sigma[axis] = math.sqrt(max(float(track.covariance[k, k]), 0.0))
         numbers = [when, *track.position.tolist(), *track.velocity.tolist()]
         rest = [track.score, track.hits, track.started, track.last_detection, *sigma]
         row = [track.track_id, *(f"{one:.10g}" for one in numbers), event, *(f"{one:.10g}" for one in rest)]

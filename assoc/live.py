@@ -1,0 +1,177 @@
+"""``python -m assoc.live``: tracks of plots as they come, until they end or a signal ends the program.
+
+This is a program: the package must not import it. Imports inside functions keep --help quick.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import IO, TYPE_CHECKING, Any
+
+from assoc._cli.options import Given, Parser
+from assoc._cli.program import Program
+from assoc._cli.signals import Interruption
+from assoc._cli.track.options import LIVE, live_parser, make_tracker, read_options, with_further
+from assoc._files.output import STDOUT
+from assoc._text.plain import printable
+from assoc.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from assoc._cli.track.plot_lines import Lines
+    from assoc.plotting.live import LivePage
+    from assoc.scene.scene import Scene
+    from assoc.tracking import LiveTracker, Picture
+
+_INTERRUPTION = Interruption("assoc.live")
+
+
+def _live(words: list[str]) -> None:
+    given, settings = read_options(words, live_parser())
+    given.check_outputs([given["file"]])
+    if given["udp"] is not None and given["replay"] is not None:
+        raise InvalidInputError("--udp and --replay: expected one of them")
+    given.check_use(LIVE, input="plots" if given["replay"] is None else "the measurements of a scene")
+    from assoc._cli.track.plot_lines import Lines
+    from assoc.scene.scene import Scene
+
+    scene = Scene.load(given["file"])
+    tracker = _tracker(scene, given, settings)
+    page = _page(scene, given)
+    lines = Lines(given["udp"]) if given["replay"] is None else None
+    if lines is not None and lines.port is not None:
+        _say(given, f"plots: udp 127.0.0.1:{lines.port}")
+    if given["verbose"]:
+        _say(given, ", ".join(f"{name} {value}" for name, value in settings.items()))
+    outputs = _Outputs(given["output"], page, tracker.positions)
+    losing = False
+
+    def show(pictures: Iterable[Picture]) -> None:
+        nonlocal losing
+        for picture in pictures:
+            outputs.show(picture)
+            if lines is not None and lines.lost and not losing:
+                losing = True
+                _print("datagrams are lost: they come quicker than tracks can be made")
+
+    def end() -> None:
+        show(tracker.finish())
+        outputs.close()
+        if lines is not None and lines.lost:
+            _print(f"{lines.lost} datagrams lost: they came quicker than tracks can be made")
+        _say(given, tracker.summary())
+
+    with _INTERRUPTION.reported(end):
+        _take_plots(lines, scene, tracker, given, show)
+    end()
+
+
+def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracker:
+    from assoc.tracking import LiveTracker, Tracker
+    from assoc.tracking.filter_choice import pace_of
+
+    given["filter"] = given["filter"] or "imm-cv"
+    name, turns = given["tracker"] or "multi-sensor", given["turns"]
+    # a turn of an antenna is what an instant is in a scene: for that long a target is not detected
+    pace = pace_of(scene.times) if turns is None else min(turns)
+
+    def make() -> Tracker:
+        return make_tracker(name, scene.sensors, given, settings, scene.region, pace)
+
+    tracker = LiveTracker(scene, make, turns=turns, tell=_print, **given.some(("interval", "horizon", "wait")))
+    tracker.warm_up()
+    return tracker
+
+
+def _page(scene: Scene, given: Given) -> LivePage | None:
+    if given["page"] is None:
+        return None
+    from assoc.plotting.live import LivePage
+
+    page = LivePage(scene, given["page"], scene.name)
+    _say(given, f"page: {page.address}")
+    return page
+
+
+def _take_plots(
+    lines: Lines | None, scene: Scene, tracker: LiveTracker, given: Given, show: Callable[[list[Picture]], None]
+) -> None:
+    """Give the tracker the plots of the lines, or of the scene if there are none, and show what it makes of them."""
+    from assoc._cli.track.plot_lines import parse_line, replayed
+
+    if lines is None:
+        for plot in replayed(scene, given["replay"]):
+            show(tracker.take(*plot))
+        return
+    for line in lines:
+        try:
+            found = parse_line(line, scene)
+        except InvalidInputError as error:
+            tracker.leave_out("lines not understood", f"line left out: {error}")
+            continue
+        if found is not None:
+            show(tracker.take(*(found[:3] if given["identity"] == "ignore" else found)))
+
+
+class _Outputs:
+    """Where pictures go: lines to a file or stdout, and to the page if there is one."""
+
+    def __init__(self, path: str | None, page: LivePage | None, positions: Sequence[int]) -> None:
+        from assoc._cli.track.plot_lines import TrackWriter
+
+        self._page = page
+        self._name = "stdout" if path in (None, STDOUT) else path
+        self._stream: IO[str] = sys.stdout
+        if path not in (None, STDOUT):
+            self._stream = open(path, "w", encoding="utf-8", newline="\n")
+        with self._writing():
+            self._writer = TrackWriter(self._stream, positions)
+
+    def show(self, picture: Picture) -> None:
+        """Write what has changed."""
+        with self._writing():
+            self._writer.write(picture)
+        if self._page is not None:
+            self._page.show(picture)
+
+    def close(self) -> None:
+        """Close what was opened."""
+        if self._page is not None:
+            self._page.close()
+        if self._stream is not sys.stdout:
+            self._stream.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Name the output if it cannot be written, and close it."""
+        try:
+            yield
+        except BrokenPipeError:
+            raise  # the reader of our output has seen enough
+        except OSError as error:
+            with suppress(OSError):
+                if self._stream is not sys.stdout:
+                    self._stream.close()
+            raise InvalidInputError(f"{self._name}: cannot be written ({error.strerror or error})") from None
+
+
+def _print(line: str) -> None:
+    print(f"assoc.live: {printable(line)}", file=sys.stderr, flush=True)
+
+
+def _say(given: Given, line: str) -> None:
+    if not given["quiet"]:
+        _print(line)
+
+
+def parser() -> Parser:
+    """Return the parser with all options."""
+    return with_further(live_parser())
+
+
+PROGRAM = Program("assoc.live", _live, _INTERRUPTION.interrupt_on_signals, _INTERRUPTION)
+start, main = PROGRAM.start, PROGRAM.main
+
+if __name__ == "__main__":
+    raise SystemExit(start())
