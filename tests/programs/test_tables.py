@@ -43,6 +43,12 @@ def test_no_cell_is_cut(width):
         assert re.search(rf"{re.escape(value)} +{re.escape(interval)}", text)
 
 
+@pytest.mark.parametrize("width", [3, 80])
+def test_control_characters_are_printed_as_escapes(width):
+    lines = [*fitted_lines(["name", "n"], [["a\x1b[31m\n", "1"]], width)]
+    assert lines[-1 if width == 80 else 0].split()[-2 if width == 80 else -1] == r"a\x1b[31m\n"
+
+
 def test_a_narrow_terminal_gets_lists():
     lines = [*fitted_lines(HEADERS, ROWS, 30, keys=2, joined=["95 %"])]
     assert lines[0].split() == ["solver", "aco"] and lines[3].split() == ["mean", "cost", "-107.3407"]
