@@ -5,13 +5,22 @@ On two cores the first hard problem after an installation then waits half as lon
 
 from __future__ import annotations
 
+import base64
+import os
+import pickle
+import queue
 import subprocess
+import threading
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from assoc._system import compile_time, interpreted
-from assoc._system.beside import call_beside
+from assoc._system.beside import LEAVE, call_beside
 from assoc._system.compiled import is_kept
+
+# how far the process that compiles what is interpreted meanwhile stands back
+_NICE = 10
 
 _under_way: list[subprocess.Popen[bytes]] = []
 # kernels that are known to be compiled: looking for their code takes longer than a small problem
@@ -52,3 +61,34 @@ def wait_for_kernels() -> None:
     while _under_way:
         with compile_time.loading():
             _under_way.pop().wait()
+
+
+def serve(*call: str) -> None:
+    """Call a function, given by its module and name; without one compile what the lines of stdin ask for."""
+    asked: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    leaving = threading.Event()
+
+    def listen() -> None:
+        for line in open(0, "rb", closefd=False):
+            if line == LEAVE:
+                leaving.set()
+            asked.put(line)
+        if not leaving.is_set():
+            os._exit(1)
+
+    threading.Thread(target=listen, daemon=True).start()
+    if call:
+        module, name = call
+        with interpreted.compiled_only():
+            getattr(import_module(module), name)()
+    else:
+        if hasattr(os, "nice"):
+            # nobody waits for this process, so that it leaves the cores to those that somebody waits for
+            os.nice(_NICE)
+        while not leaving.is_set():
+            line = asked.get()
+            if line != LEAVE:
+                module, name, kinds = pickle.loads(base64.b64decode(line))
+                getattr(import_module(module), name).compile(kinds)
+    # without waiting for the thread that listens
+    os._exit(0)

@@ -11,20 +11,18 @@ import base64
 import functools
 import os
 import pickle
-import queue
 import subprocess
 import sys
 import threading
 from contextlib import suppress
-from importlib import import_module
 from typing import Any
 
 from assoc._system.interrupts import end_is_asked
 from assoc._system.processes import start_python
 
-# how far the process that compiles what is interpreted meanwhile stands back
-_NICE = 10
-_LEAVE = b"leave\n"
+LEAVE = b"leave\n"
+# where these processes begin, by name: that file knows what is interpreted, which uses this one
+_SERVE = "assoc._system.ahead"
 
 
 @functools.cache
@@ -36,7 +34,7 @@ def has_room() -> bool:
 def call_beside(module: str, name: str) -> subprocess.Popen[bytes]:
     """Let another process call a function, and end."""
     # Ctrl-C is for the program, with which this process ends
-    return start_python(__name__, module, name, start_new_session=True)
+    return start_python(_SERVE, module, name, start_new_session=True)
 
 
 class _Beside:
@@ -61,7 +59,7 @@ class _Beside:
                 if self._process is None:
                     # a group of its own for Ctrl-C; in a session of its own the process would get an equal share of
                     # the cores, whatever its nice value (sched(7), autogroups)
-                    self._process = start_python(__name__, process_group=0)
+                    self._process = start_python(_SERVE, process_group=0)
                 self._write(base64.b64encode(pickle.dumps((module, name, kinds))) + b"\n")
             except (OSError, ValueError):
                 # no process to be had, or it has died: this one compiles, once its patience is over
@@ -72,7 +70,7 @@ class _Beside:
         interrupted = end_is_asked() or getattr(sys, "last_type", None) is KeyboardInterrupt
         if self._process is not None and self._owner == os.getpid() and not interrupted:
             with suppress(OSError, ValueError):
-                self._write(_LEAVE)
+                self._write(LEAVE)
 
     def _write(self, line: bytes) -> None:
         assert self._process is not None and self._process.stdin is not None
@@ -82,36 +80,3 @@ class _Beside:
 
 beside = _Beside()
 atexit.register(beside.leave)
-
-
-def serve(*call: str) -> None:
-    """Call a function, given by its module and name; without one compile what the lines of stdin ask for."""
-    asked: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    leaving = threading.Event()
-
-    def listen() -> None:
-        for line in open(0, "rb", closefd=False):
-            if line == _LEAVE:
-                leaving.set()
-            asked.put(line)
-        if not leaving.is_set():
-            os._exit(1)
-
-    threading.Thread(target=listen, daemon=True).start()
-    if call:
-        from assoc._system.interpreted import compiled_only
-
-        module, name = call
-        with compiled_only():
-            getattr(import_module(module), name)()
-    else:
-        if hasattr(os, "nice"):
-            # nobody waits for this process, so that it leaves the cores to those that somebody waits for
-            os.nice(_NICE)
-        while not leaving.is_set():
-            line = asked.get()
-            if line != _LEAVE:
-                module, name, kinds = pickle.loads(base64.b64decode(line))
-                getattr(import_module(module), name).compile(kinds)
-    # without waiting for the thread that listens
-    os._exit(0)
