@@ -10,6 +10,7 @@ import contextlib
 import functools
 import sys
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numba
@@ -97,6 +98,23 @@ def compile_for(kernel: Any, *arguments: Any) -> None:
 def loaded() -> tuple[int, int]:
     """Return numbers that change when code is compiled, loaded from the cache, or imported in this process."""
     return _loads, len(sys.modules)
+
+
+class _Loads(event.Listener):
+    """Counts whatever is compiled or loaded, also kernels that a user compiles with numba itself."""
+
+    def on_start(self, event: Any) -> None:
+        global _loads
+        _loads += 1
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def with_foreign_kernels() -> AbstractContextManager[None]:
+    """Let `loaded` notice within the block what others' kernels load, such as those of a user's solver."""
+    found: AbstractContextManager[None] = _EVENT.install_listener("numba:compiler_lock", _Loads())
+    return found
 
 
 def _silent(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assoc._system.compiled import loaded
+from assoc._system.compiled import loaded, with_foreign_kernels
 from assoc._version import __version__
 from assoc.errors import InfeasibleError, InvalidInputError
 from assoc.sweeps.code_digest import code_digest
@@ -150,11 +150,12 @@ class Job:
         from assoc.solvers.assign import assign
 
         self.warm_up(setting, problem)
-        for _ in range(_ATTEMPTS):
-            before = loaded()
-            solution = assign(problem, setting.solver, seed=seed, time_limit=self.time_limit, **setting.parameters)
-            if loaded() == before:
-                break
+        with with_foreign_kernels():
+            for _ in range(_ATTEMPTS):
+                before = loaded()
+                solution = assign(problem, setting.solver, seed=seed, time_limit=self.time_limit, **setting.parameters)
+                if loaded() == before:
+                    break
         return solution
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from assoc.packing.branching.root import Root, plain_root
 from assoc.packing.components import component
-from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
+from assoc.packing.components.team import Team
 from assoc.packing.neighbourhoods import diving
 from assoc.packing.neighbourhoods.cluster import ClusterSearch
 from assoc.packing.packing import Packing
@@ -189,7 +189,7 @@ SHARED = (
     Part("no dives in the linear program", SOLVERS, without=_replaced(Component, "dives", property(_never))),
     Part("no cuts in the linear program of dives", SOLVERS, without=_replaced(diving, "root_with_cuts", _uncut)),
     Part("nothing kept of pairs from dive to dive", SOLVERS, without=_replaced(diving, "search_shortly", _forgetful)),
-    Part("no branch and bound beside", SOLVERS, without=_replaced(Branching, "advance", lambda self: None)),
+    Part("no branch and bound beside", SOLVERS, without=_replaced(Team, "_branch", lambda self: None)),
     Part(
         "no cluster search",
         SOLVERS,

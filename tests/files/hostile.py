@@ -133,6 +133,8 @@ def _different(path: Path) -> None:
     lines = b"".join(b"0 %d %d %d\n" % (i, j, k) for i in range(1, 71) for j in range(1, 71) for k in range(1, 71))
     head = b"assoc-problem 1\nsizes 70 70 70\ndummies no\ntuples %d\n" % 70**3
     path.write_bytes(lzma.compress(head + lines))
+    diagonal = "".join(f"{i} {i} {i}\n" for i in range(1, 71))
+    (path.parent / "diagonal.txt").write_text(f"assoc-solution 1\n{diagonal}")
 
 
 def _padded(path: Path) -> None:
@@ -190,7 +192,7 @@ HOSTILE = [
         SOLVE,
         code=0,
     ),
-    Hostile("different.txt.xz", _different, CHECK),
+    Hostile("different.txt.xz", _different, "assoc.check {} {folder}/diagonal.txt", code=0),
     Hostile(
         "within.json.xz",
         _counted(b'{"format": N, "trees": [', b"1e999,", 3_900_000),

@@ -121,20 +121,24 @@ def _use_plots(path: Path) -> None:
     read_plots(path)
 
 
-def _use_solver_config(path: Path) -> None:
-    from assoc import solve
+def _refused_in_one_line(main: Callable[[list[str]], int], words: list[str]) -> None:
+    """Run a program that has nothing to work on: it reads its configuration and complains, and nothing else happens."""
+    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
+        code = main(words)
+    if code not in (2, 3) or said.getvalue().count("\n") != 1:
+        raise AssertionError(f"exit code {code}: {said.getvalue()[-200:]!r}")
 
-    solve._solver({"solver": None, "config": str(path)})
+
+def _use_solver_config(path: Path) -> None:
+    from assoc.solve import main
+
+    _refused_in_one_line(main, ["missing.npz", "--config", str(path)])
 
 
 def _use_design(path: Path) -> None:
     from assoc.sweep import main
 
-    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
-        # without a file to solve the program reads its design and complains; nothing else may happen
-        code = main(["--config", str(path), "-o", "nowhere"])
-    if code not in (2, 3) or said.getvalue().count("\n") != 1:
-        raise AssertionError(f"exit code {code}: {said.getvalue()[-200:]!r}")
+    _refused_in_one_line(main, ["--config", str(path), "-o", "nowhere"])
 
 
 def _use_study(path: Path) -> None:

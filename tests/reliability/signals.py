@@ -64,6 +64,7 @@ def trial(way: str, after: float, scenes: Path) -> Trial:
         process = subprocess.Popen([sys.executable, *WAYS[way]], cwd=name, env=environment, text=True, **pipes)
         time.sleep(after)
         if process.poll() is not None:
+            process.communicate()
             return Trial("done before" if process.returncode == 0 else "failed before", 0.0)
         process.send_signal(signal.SIGINT)
         sent = time.monotonic()
@@ -71,6 +72,7 @@ def trial(way: str, after: float, scenes: Path) -> Trial:
             _, errors = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
+            process.communicate()
             return Trial("lost", PATIENCE)
         seconds = time.monotonic() - sent
         # a helper that is starting ends when it has started
