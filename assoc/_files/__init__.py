@@ -1,1 +1,1 @@
-"""Files: read without trust, written whole or not at all."""
+"""Files: read without trust, written completely or not at all."""

@@ -1,4 +1,4 @@
-"""npz files: written whole or not at all, and read without trusting them."""
+"""npz files: written completely or not at all, and read without trust."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from assoc._types import Array
 from assoc.errors import InvalidInputError
 
 SIZE_LIMIT = 4 * 1024**3
-"""The most bytes that the arrays of one npz file may hold together."""
+"""Largest total size of the arrays of one npz file, in bytes."""
 
 _HEADER_LIMIT = 10_000
 FLOOR = 64_000_000
-"""Bytes that the arrays of any file may take: they are not of many small objects, as what text becomes."""
+"""Bytes that the arrays of any file may take: a higher limit than for text, which becomes many small objects."""
 
 _OF_FORMAT = 10_000
 
@@ -32,7 +32,7 @@ _TARGETS: dict[str, Any] = {"float": np.float64, "int": np.int64, "str": np.str_
 
 
 class Field(NamedTuple):
-    """What an array of an npz file must be.
+    """The expected type of an array in an npz file.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def save_npz(
     header = {"format": np.asarray(format_name), "version": np.asarray(version)}
 
     def write(file: IO[bytes]) -> None:
-        # what is packed so much that no reader would take it is not packed
+        # data that compress beyond what readers accept are stored uncompressed
         for method in (zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED):
             file.seek(0)
             file.truncate()
-            # as numpy's savez, whose archive is left open where the disk is full, and complains of that later
+            # as numpy.savez, which leaves its archive open on a full disk and warns of that later
             with zipfile.ZipFile(file, "w", method) as archive:
                 for name, value in {**header, **content}.items():
                     with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -78,29 +78,29 @@ def save_npz(
 def load_npz(
     path: str | os.PathLike[str], format_name: str, version: int, fields: Mapping[str, Field]
 ) -> dict[str, Array]:
-    """Read an npz file written by `save_npz`, or refuse it with one line.
+    """Read an npz file written by `save_npz`; any other file is refused with one line.
 
-    Nothing in the file is executed (no pickles), and no memory is taken for an array before its header
-    has been checked against the bytes that the file really holds.
+    Nothing in the file is executed (no pickles). No memory is allocated for an array before its header is checked
+    against the size of the data in the file.
 
     Parameters
     ----------
     path : path-like
         The file.
     format_name, version : str, int
-        What its fields "format" and "version" must say; older versions are read, later ones are refused.
+        Expected values of its fields "format" and "version"; older versions are read, later ones refused.
     fields : mapping of str to Field
-        The arrays to read. Arrays that are not named are left alone.
+        The arrays to read; others are ignored.
 
     Returns
     -------
     dict of str to ndarray
-        The arrays, contiguous; optional fields that the file does not have are missing.
+        The arrays, contiguous, without optional ones that are missing from the file.
 
     Raises
     ------
     InvalidInputError
-        Anything else than a readable file of this format; the message begins with the path.
+        Not a readable file of this format; the message begins with the path.
     """
     file = Path(path)
     try:
@@ -156,19 +156,19 @@ def _read(
 
 
 def format_of(path: str | os.PathLike[str]) -> str | None:
-    """Return the format that an npz file claims; None if that cannot be read; loading then raises the error."""
+    """Return the format that an npz file claims; None if it cannot be read: loading it then raises the error."""
     file = Path(path)
     try:
         with zipfile.ZipFile(file) as archive:
             return str(_member(file, archive, archive.getinfo("format.npy"), Field("str", 0))[()])
-    except Exception:  # whatever a damaged file raises here, loading gives the better message
+    except Exception:  # for a damaged file, loading gives the better message
         return None
 
 
 def _member(
     file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, spec: Field, taken: int | None = None
 ) -> Array:
-    """One array, beside which others have taken so much; its header is checked before memory is allocated."""
+    """Read one array, after others of ``taken`` bytes; its header is checked before memory is allocated."""
     name = info.filename.removesuffix(".npy")
     with open_member(archive, info) as stream:
         try:
@@ -186,12 +186,12 @@ def _member(
         if dtype.kind not in _KINDS[spec.kind]:
             raise InvalidInputError(f"{file}: the field {name!r} has type {dtype}, expected {spec.kind} values")
         if dtype.itemsize == 0:
-            # numpy allocates one character each, which a check against the size of the file cannot see
+            # numpy allocates one character for each, which the check against the file's size cannot see
             raise InvalidInputError(f"{file}: the field {name!r} holds texts without room for a character")
         if len(shape) != spec.ndim:
             raise InvalidInputError(f"{file}: the field {name!r} has {len(shape)} dimensions, expected {spec.ndim}")
         if any(type(side) is not int for side in shape):
-            # True and False pass numpy's own check, and no array has such a side
+            # numpy's own check lets True and False pass
             raise InvalidInputError(f"{file}: the field {name!r} has the shape {shape}, expected whole numbers")
         if any(side < 0 for side in shape):
             raise InvalidInputError(f"{file}: the field {name!r} has a negative shape {shape}")

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and what is no file: pipes, terminals, /dev/null."""
+"""Write files completely or not at all, and write to pipes, terminals and /dev/null."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from assoc.errors import InvalidInputError
 FilePath = str | os.PathLike[str]
 
 STDOUT = "-"
-"""The name that stands for stdout; a file of that name is ``./-``."""
+"""The name of stdout; a file of that name is ``./-``."""
 
 
 def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) -> None:
-    """Refuse, before the work, a path at which no file can be written.
+    """Refuse, before the work starts, a path where no file can be written.
 
     Parameters
     ----------
     path : path-like
     folder_to_come : path-like, optional
-        A folder that need not be there yet.
+        A folder that need not exist yet.
 
     Raises
     ------
     InvalidInputError
-        It is a folder or a disk, or in a folder that does not exist or takes no files.
+        The path is a folder or a disk, or lies in a folder that is missing or not writable.
     """
     if path == STDOUT:
         return
@@ -45,7 +45,7 @@ def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) ->
             if not is_stream(path):
                 raise InvalidInputError(f"{path}: is neither a file nor a pipe or terminal")
             return
-        # a symbolic link is kept, and its target is written
+        # a symbolic link stays, and its target is written
         parent = Path(os.path.realpath(path)).parent
         if not parent.is_dir():
             if folder_to_come is not None and parent == Path(os.path.realpath(folder_to_come)):
@@ -63,7 +63,7 @@ def check_writable(path: FilePath, *, folder_to_come: FilePath | None = None) ->
 
 
 def is_stream(path: FilePath) -> bool:
-    """Whether a path is a pipe, a terminal or a device of characters, which cannot be replaced by a file."""
+    """Whether a path is a pipe, a terminal or a character device, which no file can replace."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
@@ -72,16 +72,16 @@ def is_stream(path: FilePath) -> bool:
 
 
 def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> None:
-    """Write a file so that readers see the old one or the whole new one, never a part.
+    """Write a file so that readers see the old content or all of the new, never a part.
 
-    A pipe or a device is written to as it is, in one piece. A symbolic link stays, and its target is replaced.
+    A pipe or device is written to directly, in one piece. A symbolic link stays, and its target is replaced.
 
     Parameters
     ----------
     path : path-like
         Where the file goes.
     writer : callable
-        Called with a binary file object; it writes the content. If it raises, nothing is left behind.
+        Called with a binary file object, to which it writes the content. If it raises, nothing is left behind.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
         handle, name = _create(target)
         with os.fdopen(handle, "wb") as file:
             writer(file)
-            # on the disk before it takes the name: a crash of the machine must not leave an empty file under it
+            # flush before the renaming: after a crash of the machine the name must not stand for an empty file
             file.flush()
             os.fsync(file.fileno())
         with temporary.lock:
@@ -108,7 +108,7 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
     except BaseException as error:
         if name:
             temporary.remove(name)
-        # on a full disk closing the archive fails, too; the disk's error is its context
+        # on a full disk closing the archive fails, too; the disk's error is that error's context
         cause: BaseException | None = error
         while cause is not None and not isinstance(cause, OSError):
             cause = cause.__context__
@@ -121,23 +121,23 @@ def write_atomically(path: FilePath, writer: Callable[[IO[bytes]], object]) -> N
 
 
 def write_text(path: FilePath, text: str) -> None:
-    """Write text as UTF-8, whole or not at all; see `write_atomically`.
+    """Write text as UTF-8, completely or not at all; see `write_atomically`.
 
-    Names of files may hold bytes that are no text; they are written as escapes.
+    Bytes of file names that are not valid text are written as escapes.
     """
     content = text.encode("utf-8", "backslashreplace")
     write_atomically(path, lambda file: file.write(content))
 
 
 def write_json(path: FilePath, content: Mapping[str, Any]) -> None:
-    """Write plain data as JSON, whole or not at all; see `write_atomically`."""
+    """Write plain data as JSON, completely or not at all; see `write_atomically`."""
     import json  # not needed for --help
 
     write_text(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def _status(path: FilePath) -> os.stat_result | None:
-    """What is at a path, or at the end of a link; None if nothing is."""
+    """Status of the file at a path, following links; None if there is none."""
     try:
         return os.stat(os.fspath(path))
     except FileNotFoundError:
@@ -147,9 +147,9 @@ def _status(path: FilePath) -> os.stat_result | None:
 
 
 def _create(target: str) -> tuple[int, str]:
-    """Open a new file in the folder of another one, with the mode that this one has or would get."""
+    """Create a file in the folder of another one, with the mode that the other has or would get."""
     folder, base = os.path.split(target)
-    # names may have 255 bytes; 30 are for what is put around
+    # names have at most 255 bytes; 30 are for the additions
     start = os.fsdecode(os.fsencode(base)[:200])
     old = _status(target)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
@@ -157,7 +157,7 @@ def _create(target: str) -> tuple[int, str]:
         name = os.path.join(folder, f".{start}.{secrets.token_hex(6)}.part")
         with temporary.lock:
             try:
-                # the system applies the umask: reading it would change it for all threads
+                # the system applies the umask; reading it here would change it for all threads
                 handle = os.open(name, flags, 0o666)
             except FileExistsError:
                 continue
@@ -169,7 +169,7 @@ def _create(target: str) -> tuple[int, str]:
 
 
 def _standard_stream(path: FilePath) -> int | None:
-    """Return 1 or 2 if a path is where our stdout or stderr goes (/dev/stdout, or the same file)."""
+    """Return 1 or 2 if a path is this process's stdout or stderr (/dev/stdout, or the same file)."""
     found = _status(path)
     for number in (1, 2):
         with suppress(OSError):
@@ -189,19 +189,19 @@ def _write_stream(path: FilePath, number: int | None, writer: Callable[[IO[bytes
         stream = sys.stdout if number == 1 else sys.stderr
         if stream is not None:
             stream.flush()
-        # a file that is opened again would be written from its start
+        # opening the file again would write from its start
         with os.fdopen(os.dup(number), "wb") as file:
             file.write(content.getbuffer())
     except BrokenPipeError:
         if number == 1:
-            raise  # the reader of our output has seen enough
+            raise  # the reader of stdout closed it
         raise InvalidInputError(f"{path}: cannot be written (its reader has gone)") from None
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def _sync_folder(folder: str) -> None:
-    """Write the new name to the disk, too, where the system can do that."""
+    """Flush the new name to the disk, too, where the system can do that."""
     with suppress(OSError):
         handle = os.open(folder or ".", os.O_RDONLY)
         try:

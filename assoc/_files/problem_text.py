@@ -1,4 +1,4 @@
-"""Assignment problems as plain text: what `assoc.check` and other people's programs read (docs/proofs.md)."""
+"""Assignment problems as plain text, which `assoc.check` and other programs read (docs/proofs.md)."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _MOST_INDEX = 2**31
 def write_problem_text(
     path: FilePath, tuples: NDArray[np.int32], costs: NDArray[np.float64], sizes: NDArray[np.int32], dummy: bool
 ) -> None:
-    """Write a problem; the file appears whole or not at all.
+    """Write a problem, completely or not at all.
 
     Parameters
     ----------
     path : path-like
     tuples : int array, shape (M, S)
     costs : float array, shape (M,)
-        Written as the shortest decimals that are read back as the same numbers.
+        Written as the shortest decimals that read back as the same numbers.
     sizes : int array, shape (S,)
     dummy : bool
     """
@@ -46,17 +46,17 @@ def write_problem_text(
 
 
 def is_text(path: FilePath) -> bool:
-    """Whether a file of this name holds a problem as text, packed or not."""
+    """Whether a file name is that of a problem as text, compressed or not."""
     return os.fspath(path).endswith(ENDINGS)
 
 
 def read_problem_text(path: FilePath) -> dict[str, Any]:
-    """Read what `write_problem_text` or another program wrote: tuples, costs, sizes, dummy.
+    """Read a problem as text: tuples, costs, sizes, dummy.
 
     Raises
     ------
     InvalidInputError
-        It is no such file.
+        The file is damaged or of another format.
     """
     every = read_lines(path, _LONGEST_LINE, _LARGEST)
     rows = (line for line in every if line.strip() and not line.startswith("#"))
@@ -86,7 +86,7 @@ def read_problem_text(path: FilePath) -> dict[str, Any]:
     if table.shape[1] != 1 + sizes.size:
         raise InvalidInputError(f"{path}: tuples: expected a cost and {sizes.size} indices in each line")
     indices = table[:, 1:]
-    # nothing that is no number, or beyond all indices, may be cast
+    # check before the cast: NaN, fractions, and numbers beyond the range of indices
     if not ((np.abs(indices) <= _MOST_INDEX) & (indices == np.round(indices))).all():
         raise InvalidInputError(f"{path}: tuples: indices must be whole numbers")
     tuples = indices.astype(np.int64)

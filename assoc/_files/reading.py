@@ -1,7 +1,7 @@
-"""Files that are read: opened without trust, unpacked on the way, and counted while they are.
+"""Reading files without trust: decompressed while they are read, with limits on their size.
 
-A packed file may hold `FLOOR` bytes, or `EXPANSION` times its own size; text that holds more can be unpacked by hand.
-`assoc.check`, which needs nothing of the package, has a limit of its own.
+A compressed file may hold `FLOOR` bytes, or `EXPANSION` times its own size; larger text must be unpacked by hand.
+`assoc.check`, which uses nothing of the package, has a limit of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FilePath = str | os.PathLike[str]
 FLOOR = 16_000_000
 EXPANSION = 30
 MOST_BYTES = 2_000_000_000
-"""The most that any file may hold, packed or not, if its reader allows no less."""
+"""Largest size of any file in bytes, compressed or not, unless its reader allows less."""
 LONGEST_LINE = 10_000
 
 
@@ -38,7 +38,7 @@ def _open_zipped(file: IO[bytes]) -> IO[bytes]:
 
 
 def open_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> IO[bytes]:
-    """Open a file of an archive, plain or deflated: what other methods unpack to zipfile does not limit."""
+    """Open a file of an archive, stored or deflated: zipfile does not limit what other methods unpack to."""
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{member.filename[:60]!r} is packed in an unusual way, expected deflate")
     return archive.open(member)
@@ -50,24 +50,24 @@ _DAMAGED = (lzma.LZMAError, zlib.error, EOFError, gzip.BadGzipFile, zipfile.BadZ
 
 @contextmanager
 def readable(path: FilePath) -> Iterator[None]:
-    """Say in one line of a file that cannot be read which it is, and why."""
+    """Turn errors while reading a file into one line that names the file and the cause."""
     try:
         yield
     except InvalidInputError:
         raise
     except _DAMAGED:
         raise InvalidInputError(f"{path}: is damaged, or not packed as its name says") from None
-    except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # ValueError: no name of a file
+    except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # ValueError: not a valid file name
         raise InvalidInputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
 
 def expands(size: float, packed: int, floor: int = FLOOR) -> bool:
-    """Whether ``size`` bytes are more than a file of ``packed`` bytes may hold."""
+    """Whether ``size`` bytes are more than a file of ``packed`` bytes may unpack to."""
     return size > max(floor, EXPANSION * packed)
 
 
 def check_unpacked(path: FilePath, size: float, packed: int, floor: int = FLOOR) -> None:
-    """Refuse a file of ``packed`` bytes that takes ``size`` bytes of memory, if it may not; see `expands`."""
+    """Refuse a file of ``packed`` bytes that unpacks to ``size`` bytes, if that is too much; see `expands`."""
     if expands(size, packed, floor):
         raise InvalidInputError(
             f"{path}: would unpack from {packed} bytes to {size:.0f} or more, expected at most {EXPANSION} times that"
@@ -75,7 +75,7 @@ def check_unpacked(path: FilePath, size: float, packed: int, floor: int = FLOOR)
 
 
 class _Counted(io.RawIOBase):
-    """What a file holds, until it is too much."""
+    """The content of a file, up to a limit."""
 
     def __init__(self, path: FilePath, most: int) -> None:
         self._path, self._most, self._count = path, most, 0
@@ -107,18 +107,18 @@ class _Counted(io.RawIOBase):
 
 
 def open_input(path: FilePath, most: int = MOST_BYTES) -> IO[bytes]:
-    """Open a file, unpacked if its name ends in .xz, .gz, .bz2 or .zip.
+    """Open a file; names that end in .xz, .gz, .bz2 or .zip are decompressed.
 
     Raises
     ------
     InvalidInputError
-        It cannot be read, or, as soon as that much of it was, is larger than ``most`` or than packed files are.
+        It cannot be read, or it turns out larger than ``most`` or than compressed files may be.
     """
     return io.BufferedReader(_Counted(path, most), 1 << 16)
 
 
 def read_bytes(path: FilePath, most: int = MOST_BYTES) -> bytes:
-    """Return all of a file; see `open_input`."""
+    """Return the content of a file; see `open_input`."""
     with open_input(path, most) as file:
         return file.read()
 
@@ -129,7 +129,7 @@ def read_lines(path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYT
     Raises
     ------
     InvalidInputError
-        As of `open_input`; or a line has more bytes than ``longest``, or is no text.
+        As `open_input`; or a line is longer than ``longest`` bytes, or is not text.
     """
     with open_input(path, most) as file:
         number = 0
@@ -146,12 +146,12 @@ def read_lines(path: FilePath, longest: int = LONGEST_LINE, most: int = MOST_BYT
 
 
 def check_regular(path: FilePath) -> None:
-    """Refuse what others may have put in the place of a file: a link, a pipe, a device, a folder.
+    """Refuse a link, pipe, device or folder that others may have put in the place of a file.
 
     Raises
     ------
     InvalidInputError
-        It is there, and no regular file.
+        The path exists and is not a regular file.
     """
     with suppress(FileNotFoundError):
         if not stat.S_ISREG(os.lstat(path).st_mode):
@@ -159,25 +159,25 @@ def check_regular(path: FilePath) -> None:
 
 
 def open_regular(path: FilePath, mode: str = "rb") -> IO[bytes]:
-    """Open a file of a folder in which others may write: no link is followed, and no pipe or device waited for.
+    """Open a file in a folder that others may write to: follows no link, and waits for no pipe or device.
 
     Parameters
     ----------
     path : path-like
     mode : {"rb", "ab"}
-        To append is not buffered, and makes the file.
+        "ab" is not buffered, and creates the file.
 
     Raises
     ------
     InvalidInputError
-        It is no regular file.
+        It is not a regular file.
     OSError
-        As of `open`.
+        As `open`.
     """
 
     def opener(name: str, flags: int) -> int:
         check_regular(name)
-        # the same again, for what is put there now
+        # check again: it may have been replaced meanwhile
         return os.open(name, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
 
     return open(path, mode, buffering=0 if mode == "ab" else -1, opener=opener)

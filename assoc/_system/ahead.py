@@ -1,6 +1,6 @@
-"""Kernels that a hard problem will need are compiled in another process, while this one compiles those it needs first.
+"""Kernels that a hard problem will need later are compiled in another process, while this one compiles the first ones.
 
-On two cores the first hard problem after an installation then waits half as long.
+On two cores this halves the wait at the first hard problem after an installation.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from assoc._system import compile_time, interpreted
 from assoc._system.beside import LEAVE, call_beside
 from assoc._system.compiled import is_kept
 
-# how far the process that compiles what is interpreted meanwhile stands back
+# nice value of the process that compiles what is interpreted meanwhile
 _NICE = 10
 
 _under_way: list[subprocess.Popen[bytes]] = []
-# kernels that are known to be compiled: looking for their code takes longer than a small problem
+# kernels known to be compiled: looking for their code takes longer than a small problem
 _kept: set[Any] = set()
 
 
 def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = False) -> bool:
-    """Let another process call ``prepare``, if no compiled code of the kernel that it is for is on disk.
+    """Let another process call ``prepare``, if the disk holds no compiled code of a kernel.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
     prepare : callable
         A function at the top level of a module, which calls the kernel.
     anyway : bool
-        Also where this thread interprets nothing: all that it needs is to be compiled.
+        Also where this thread interprets nothing, so that all it needs must be compiled.
 
     Returns
     -------
     bool
-        Whether another process has begun to.
+        Whether another process was started.
     """
     if _under_way or kernel in _kept or not (anyway or interpreted.may_use_processes()):
         return False
@@ -51,20 +51,20 @@ def compile_ahead(kernel: Any, prepare: Callable[[], object], *, anyway: bool = 
     try:
         _under_way.append(call_beside(prepare.__module__, prepare.__qualname__))
     except OSError:
-        # no process to be had: this one compiles
+        # no process could be started: this one compiles
         return False
     return True
 
 
 def wait_for_kernels() -> None:
-    """Wait for what is compiled ahead: compiling it here, too, would take longer."""
+    """Wait for the kernels that are compiled ahead: compiling them here as well would take longer."""
     while _under_way:
         with compile_time.loading():
             _under_way.pop().wait()
 
 
 def serve(*call: str) -> None:
-    """Call a function, given by its module and name; without one compile what the lines of stdin ask for."""
+    """Call a function, given by its module and name; without arguments compile the kernels that stdin lists."""
     asked: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     leaving = threading.Event()
 
@@ -83,12 +83,12 @@ def serve(*call: str) -> None:
             getattr(import_module(module), name)()
     else:
         if hasattr(os, "nice"):
-            # nobody waits for this process, so that it leaves the cores to those that somebody waits for
+            # nobody waits for this process: give way to others
             os.nice(_NICE)
         while not leaving.is_set():
             line = asked.get()
             if line != LEAVE:
                 module, name, kinds = pickle.loads(base64.b64decode(line))
                 getattr(import_module(module), name).compile(kinds)
-    # without waiting for the thread that listens
+    # do not wait for the listening thread
     os._exit(0)

@@ -1,7 +1,7 @@
-"""Processes that compile kernels beside this one, which works on with what is there.
+"""Background processes that compile kernels while this process goes on.
 
-They end at once when this process is ended by a signal, in whatever they are at. When it ends in order, they first
-finish the kernel that they are at, for the next process.
+They end at once when a signal ends this process. When it ends normally they first finish the kernel that they are
+compiling, for the next process.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from assoc._system.interrupts import end_is_asked
 from assoc._system.processes import start_python
 
 LEAVE = b"leave\n"
-# where these processes begin, by name: that file knows what is interpreted, which uses this one
+# module of these processes, by name: it imports interpreted.py, which imports this module
 _SERVE = "assoc._system.ahead"
 
 
 @functools.cache
 def has_room() -> bool:
-    """Whether there is a core for another process."""
+    """Whether the machine has a core for another process."""
     return (os.cpu_count() or 1) > 1
 
 
 def call_beside(module: str, name: str) -> subprocess.Popen[bytes]:
-    """Let another process call a function, and end."""
-    # Ctrl-C is for the program, with which this process ends
+    """Start a process that calls a function and ends."""
+    # a session of its own: Ctrl-C goes to this program alone, and this program ends the process
     return start_python(_SERVE, module, name, start_new_session=True)
 
 
 class _Beside:
-    """The process that compiles what is interpreted meanwhile."""
+    """The process that compiles kernels which are interpreted meanwhile."""
 
     def __init__(self) -> None:
         self._asked: set[Any] = set()
@@ -47,26 +47,26 @@ class _Beside:
         self._owner = 0
 
     def ask(self, module: str, name: str, kinds: Any) -> None:
-        """Let a kernel be compiled for arguments of such types, if there is a core for that."""
+        """Request compilation of a kernel for these argument types, if there is a core for it."""
         with self._lock:
             if self._owner != os.getpid():
-                # a forked process has a copy of its parent's
+                # a forked process has inherited its parent's
                 self._asked, self._process, self._owner = set(), None, os.getpid()
             if (module, name, kinds) in self._asked or not has_room():
                 return
             self._asked.add((module, name, kinds))
             try:
                 if self._process is None:
-                    # a group of its own for Ctrl-C; in a session of its own the process would get an equal share of
-                    # the cores, whatever its nice value (sched(7), autogroups)
+                    # a process group of its own shields it from Ctrl-C; in a session of its own it would get an
+                    # equal share of the cores whatever its nice value (sched(7), autogroups)
                     self._process = start_python(_SERVE, process_group=0)
                 self._write(base64.b64encode(pickle.dumps((module, name, kinds))) + b"\n")
             except (OSError, ValueError):
-                # no process to be had, or it has died: this one compiles, once its patience is over
+                # the process died or could not start: this process compiles the kernel after `PATIENCE`
                 self._process = None
 
     def leave(self) -> None:
-        """Let the process finish what it is at, unless this one ends because of Ctrl-C."""
+        """Let the process finish its current kernel, unless Ctrl-C ends this one."""
         interrupted = end_is_asked() or getattr(sys, "last_type", None) is KeyboardInterrupt
         if self._process is not None and self._owner == os.getpid() and not interrupted:
             with suppress(OSError, ValueError):

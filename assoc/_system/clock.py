@@ -1,8 +1,8 @@
-"""The clock as kernels see it: a time limit holds inside a kernel, too.
+"""A clock that kernels can read, so that time limits hold inside kernels.
 
-Kernels that can take longer than some hundredths of a second on a large problem are given a deadline, in seconds of
-`time.monotonic`, and look at the clock now and then; ``inf`` is no deadline. A kernel that is late stops where its
-result is sound, not where it is best.
+Kernels that can take longer than some hundredths of a second take a deadline, in seconds of `time.monotonic`
+(``inf``: none), and check it regularly. A late kernel stops at the next point where its result is valid, even if it is
+not the best.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ else:
 
     @njit
     def now() -> float:
-        """Return 0: without a clock that kernels can read, time limits are kept between kernels alone."""
+        """Return 0: without such a clock, time limits are checked only between kernels."""
         return 0.0
 
 

@@ -1,7 +1,7 @@
-"""Seconds that went into compiling kernels, or loading compiled ones and modules: no part of what a solver takes.
+"""Seconds spent on compiling or loading kernels and on importing modules: solvers do not count them as their time.
 
-They are added up for each thread by itself. A thread that waits until another has compiled waits for the compiler,
-too. It imports no numba: whoever reads this clock need not compile.
+They are counted for each thread; waiting for another thread that compiles counts as well. This module does not import
+numba, so that reading the counter stays cheap.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import time
 from collections.abc import Iterator
 from threading import get_ident
 
-# by thread; every solution reads it, and a dictionary is quicker than threading.local
+# by thread; read for every solution, where a dictionary is quicker than threading.local
 _total: dict[int, float] = {}
 _under_way: dict[int, float] = {}
 
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Count what is done within, compiling or an import, as loading; once where one is within another."""
+    """Count the time within, compiling or an import, as loading; nested uses count once."""
     thread = get_ident()
     if thread in _under_way:
         yield
@@ -32,11 +32,11 @@ def loading() -> Iterator[None]:
 
 
 def is_compiling(seconds: float = 0.0) -> bool:
-    """Whether some thread has been in the compiler, or importing, for so long."""
+    """Whether some thread has been compiling or importing for more than ``seconds``."""
     now = time.perf_counter()
     return any(now - since > seconds for since in [*_under_way.values()])
 
 
 def compile_seconds() -> float:
-    """Return the seconds of this thread so far in which kernels were compiled or loaded, or modules imported."""
+    """Return the seconds that this thread has spent on compiling or loading kernels, or importing modules."""
     return _total.get(get_ident(), 0.0)

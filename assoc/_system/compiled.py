@@ -1,7 +1,7 @@
-"""The one way to numba: lazy signatures, cached on disk, without the GIL, and never stale.
+"""The only way to numba: kernels compiled at their first call, cached on disk, run without the GIL, never stale.
 
-On arguments of new types a kernel is loaded from the cache, or interpreted where the call is small (interpreted.py), or
-compiled. What is private to numba stands in numba_private.py; without it kernels are numba's own.
+On arguments of new types a kernel is loaded from the cache, interpreted if the call is small (interpreted.py), or
+compiled. Private names of numba are used only in numba_private.py; where they are missing kernels are plain numba.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ def njit(
 ) -> Any:
     """Compile a kernel: ``numba.njit`` with ``cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True``.
 
-    Until it is compiled, calls with arrays of at most ``small`` elements together are interpreted (interpreted.py), by
-    ``stand_in`` where that is given.
+    Until the kernel is compiled, calls whose arrays have at most ``small`` elements together are interpreted
+    (interpreted.py), by ``stand_in`` if given.
 
-    Kernels that call it give it whole numbers as int64, whatever their own are; with ``literal`` as they are.
+    Kernels that call it pass whole numbers as int64, whatever their type; with ``literal`` they pass them unchanged.
 
-    With ``NUMBA_DISABLE_JIT=1`` the function runs as it is, and is as silent about overflow as compiled code.
+    With ``NUMBA_DISABLE_JIT=1`` the Python function runs, and ignores overflow as compiled code does.
     """
     if _CONFIG.DISABLE_JIT:
         return _silent(function)
@@ -59,33 +59,33 @@ def njit(
 
 
 def search_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that searches a tree: as `njit`, but interpreted only where its arrays are very small."""
+    """Compile a kernel that searches a tree: `njit`, but only calls with very small arrays are interpreted."""
     return njit(function, small=SMALL_SEARCH)
 
 
 def literal_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel as `njit`, but anew for each literal number that it is given: its loops are unrolled then."""
+    """Compile a kernel with `njit`, once for each literal number passed to it, so that its loops are unrolled."""
     return njit(function, literal=True)
 
 
 def inner_njit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that other kernels alone call, without what lets Python call it.
+    """Compile a kernel that only other kernels call, without the code that lets Python call it.
 
-    That takes arrays out of their objects and puts them in again: most of the code of a small kernel of many arrays.
-    Where Python calls it (tests do) it is interpreted.
+    That code unpacks and packs arrays: it is most of the code of a small kernel with many arrays.
+    A call from Python (in tests) is interpreted.
     """
     if _CONFIG.DISABLE_JIT or private is None:
         return njit(function)
     kernel = private.make(function, _may_wait, inner=True)
     silent = _silent(function)
-    # there is nothing that Python could call, so that it must find nothing
+    # the wrapper for calls from Python is missing, so no such code may be found
     kernel._insert = lambda *overload: None
     kernel._compile_for_args = lambda *arguments: function if thread.interpreting else silent
     return kernel
 
 
 def is_kept(kernel: Any) -> bool:
-    """Whether compiled code of a kernel, for whatever arguments, is in this process, on disk, or came along."""
+    """Whether compiled code of a kernel, for any types, is in this process, on disk, or shipped with the package."""
     return bool(_CONFIG.DISABLE_JIT or private is None or private.is_kept(kernel))
 
 
@@ -96,7 +96,7 @@ def compile_for(kernel: Any, *arguments: Any) -> None:
 
 
 def loaded() -> tuple[int, int]:
-    """Return numbers that change when code is compiled, loaded from the cache, or imported in this process."""
+    """Return numbers that change when this process compiles code, loads it from the cache, or imports it."""
     return _loads, len(sys.modules)
 
 
@@ -140,7 +140,7 @@ def _may_wait() -> bool:
 
 
 class _Passes(event.Listener):
-    """Between two passes of the compiler nothing is half done: what nobody waits for ends there."""
+    """Ends abandoned work between two passes of the compiler, where its data are consistent."""
 
     def on_start(self, event: Any) -> None:
         end_if_abandoned()
@@ -150,9 +150,9 @@ class _Passes(event.Listener):
 
 
 def _uninterrupted(compiled: Callable[..., Any]) -> Callable[..., Any]:
-    """Let no signal's handler raise while kernels are compiled or loaded: LLVM calls Python where that is a crash.
+    """Keep signal handlers from raising while kernels are compiled or loaded: inside LLVM that would crash.
 
-    What is returned gives None for a kernel that is in no cache and may be interpreted instead.
+    The returned function gives None for a kernel that is in no cache and may be interpreted instead.
     """
 
     def aside(may_interpret: bool, arguments: tuple[Any, ...]) -> Any:

@@ -1,8 +1,8 @@
-"""Wrong types at the doors of the library: one line that names the argument and what was expected.
+"""One-line errors for arguments of a wrong type to public functions: they name the argument and what was expected.
 
-A function that is a `door` checks ranges and shapes itself. What it does not foresee, an object of another kind, ends
-in an error of Python somewhere inside; the door then looks which argument does not fit its annotation and says so. It
-costs nothing where all is well.
+A function decorated with `door` checks ranges and shapes itself. An object of an unexpected type makes Python raise
+somewhere inside; then the decorator finds the argument that does not fit its annotation and names it. Correct calls
+cost nothing.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ Class = TypeVar("Class", bound=type)
 
 _ERRORS = (TypeError, AttributeError, ValueError, IndexError, KeyError, OverflowError)
 _LISTS = (list, tuple, Sequence, Iterable)
-# elements of a list that are looked at
+# elements of a list that are checked
 _SOME = 1000
 
 
 def door(function: Function) -> Function:
-    """Make a public function answer arguments of a wrong type with one `InvalidInputError`."""
+    """Make a public function raise one `InvalidInputError` for arguments of a wrong type."""
 
     @functools.wraps(function)
     def through(*args: Any, **keywords: Any) -> Any:
@@ -49,7 +49,7 @@ def door(function: Function) -> Function:
 
 
 def doors(kind: Class) -> Class:
-    """Make the constructor of a public class, and its public methods, doors."""
+    """Decorate the constructor and the public methods of a public class with `door`."""
     for name, value in [*vars(kind).items()]:
         if name == "__init__" or not name.startswith("_"):
             if isinstance(value, types.FunctionType):
@@ -60,11 +60,11 @@ def doors(kind: Class) -> Class:
 
 
 def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords: Mapping[str, Any]) -> str | None:
-    """Say of the first argument that does not fit its annotation what was expected; None if all do."""
+    """Describe the first argument that does not fit its annotation; None if all do."""
     try:
         bound = inspect.signature(function).bind(*args, **keywords).arguments
     except TypeError:
-        return None  # too many or too few: Python says it well
+        return None  # too many or too few arguments: Python's message is good
     kinds = annotations_of(function)
     for name, value in bound.items():
         parameter = inspect.signature(function).parameters[name]
@@ -78,7 +78,7 @@ def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords:
 
 
 class _Unloaded(type):
-    """A class, or a module, that only a type checker sees: known by its name."""
+    """A class or module imported only for type checkers: known by its name."""
 
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("_"):
@@ -90,7 +90,7 @@ class _Unloaded(type):
 
 
 class _Names(dict[str, Any]):
-    """The names of a module, also those that only a type checker sees."""
+    """The names of a module, including those imported only for type checkers."""
 
     def __missing__(self, name: str) -> Any:
         if hasattr(builtins, name):
@@ -101,17 +101,17 @@ class _Names(dict[str, Any]):
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
     names = _Names(vars(sys.modules[function.__module__]))
     found = {}
-    # a dataclass's constructor is made from strings, too
+    # the annotations of a dataclass's constructor are strings, too
     for name, text in inspect.get_annotations(function).items():
         try:
             found[name] = eval(text, {}, names) if isinstance(text, str) else text
-        except Exception:  # what cannot be read is not checked
+        except Exception:  # an annotation that cannot be evaluated is not checked
             found[name] = Any
     return found
 
 
 def fits(value: Any, kind: Any) -> bool:
-    """Whether a value can stand where an annotation says ``kind``; arrays may be anything that makes one."""
+    """Whether a value fits the annotation ``kind``; for an array, whatever numpy can convert."""
     if kind == ArrayLike:
         return _makes_array(value)
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
@@ -155,7 +155,7 @@ def _makes_array(value: Any) -> bool:
 
 
 def described(kind: Any, several: bool = False) -> str:
-    """Return in words what an annotation asks for."""
+    """Return an annotation's meaning in words."""
     if kind == ArrayLike:
         kind = np.ndarray
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
@@ -185,7 +185,7 @@ def described(kind: Any, several: bool = False) -> str:
 
 
 def _found(value: Any, kind: Any) -> str:
-    """Say what was given: short values as they are, of lists the first element that does not fit."""
+    """Describe a value: short ones literally, lists by the first element that does not fit."""
     if isinstance(value, (list, tuple)):
         kinds = [one for one in (typing.get_args(kind) or [kind]) if typing.get_origin(one) in _LISTS] or [kind]
         inner = typing.get_args(kinds[0])

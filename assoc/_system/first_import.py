@@ -1,7 +1,7 @@
-"""The package's first import: what programs do before they import anything else.
+"""Steps at the package's first import, before programs import anything else.
 
-Programs, and the processes that are started, import nothing from the current folder, where data of others may lie:
-`python -m` puts it before all other folders. And until a program handles Ctrl-C itself, it ends without a traceback.
+Programs and their processes import nothing from the current folder, which may hold untrusted files: `python -m` would
+search it first. And Ctrl-C ends a program without a traceback until the program handles it.
 """
 
 import _signal  # type: ignore[import-not-found]
@@ -12,7 +12,7 @@ _HOME = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__
 
 
 def path_without() -> list[str]:
-    """Return where modules are looked for, without the current folder unless this package lies there."""
+    """Return the search path for modules, without the current folder unless this package lies there."""
     return [folder for folder in sys.path if _is(folder, _HOME) or not _is(folder, ".")]
 
 
@@ -31,6 +31,6 @@ def _is_program() -> bool:
 
 if _is_program():
     sys.path[:] = path_without()
-    # where programs do not handle it they need the exception
+    # without signal handling, programs need the exception
     if hasattr(_signal, "pthread_sigmask") and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
         _signal.signal(_signal.SIGINT, _signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""Work in a thread that is abandoned when time is over, or at Ctrl-C: for libraries that do not end by themselves."""
+"""Run work in a thread that is abandoned at a time limit or at Ctrl-C: for libraries that cannot be interrupted."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from typing import TypeVar, cast
 
 Answer = TypeVar("Answer")
 
-# seconds that work which was told to stop is given when Python ends
-_FAREWELL = 60.0
-_LOOK = 0.05
-# bytes: what a main thread has; some systems give other threads too little for a compiler
+# seconds that stopped work may still take when Python ends
+_EXIT_WAIT = 60.0
+_POLL = 0.05
+# bytes, as of a main thread; on some systems other threads have too little for a compiler
 _STACK = 16 << 20
 _stack_size = threading.Lock()
 
 
 class StopSignal:
-    """Tells work in another thread to stop, from whenever it can be told."""
+    """Stops work in another thread, at once or as soon as the work can be stopped."""
 
     def __init__(self) -> None:
         self.sent = False
         self._stop: Callable[[], object] | None = None
 
     def connect(self, stop: Callable[[], object]) -> None:
-        """Say how the work is stopped, before it starts."""
+        """Set the function that stops the work, before the work starts."""
         self._stop = stop
         if self.sent:
             stop()
@@ -39,23 +39,23 @@ class StopSignal:
 
 
 def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSignal | None = None) -> Answer | None:
-    """Return what the work returns, or None when it is not back in that time; what it raises is raised.
+    """Return the result of the work, or None if it takes longer than ``seconds``; its exceptions are raised here.
 
-    The time may be infinite: then the work is done aside so that Ctrl-C is heard while a library is at it.
-    The work must let other threads run and must not mind being forgotten: it goes on until it ends by itself. With a
-    `stop` signal it is told to end, and when Python ends it is given some seconds to do so: CP-SAT would take the
-    whole process with it (SIGABRT, whatever the program's exit code was to be).
+    With infinite time the work still runs in a thread, so that Ctrl-C takes effect while a library works.
+    The work must let other threads run, and goes on until it ends by itself after it is abandoned. With a `stop`
+    signal it is asked to end, and gets some seconds to do so when Python ends: CP-SAT would otherwise abort the whole
+    process (SIGABRT, whatever the program's exit code).
     """
     answers: list[Answer] = []
     errors: list[BaseException] = []
 
-    def run_aside() -> None:
+    def run_and_keep() -> None:
         try:
             answers.append(work())
         except BaseException as error:  # handed to the caller below
             errors.append(error)
 
-    thread = threading.Thread(target=run_aside, name=name, daemon=True)
+    thread = threading.Thread(target=run_and_keep, name=name, daemon=True)
     try:
         with _stack_size:
             before = threading.stack_size(_STACK)
@@ -63,19 +63,19 @@ def in_time(work: Callable[[], Answer], seconds: float, name: str, stop: StopSig
                 thread.start()
             finally:
                 threading.stack_size(before)
-        # a signal may have come to another thread: this one looks now and then
+        # another thread may have received a signal: wake up regularly to handle it
         while seconds == math.inf and thread.is_alive():
-            thread.join(_LOOK)
+            thread.join(_POLL)
         if seconds < math.inf:
             thread.join(max(seconds, 0.0))
     except BaseException:
-        _tell(stop, thread)
+        _abandon(stop, thread)
         raise
     if errors:
         raise errors[0]
     if answers:
         return answers[0]
-    _tell(stop, thread)
+    _abandon(stop, thread)
     return None
 
 
@@ -83,9 +83,9 @@ _of_thread = threading.local()
 
 
 def uninterrupted(work: Callable[[], Answer]) -> Answer:
-    """Return what the work returns; an exception of a signal's handler is raised beside it, never within it.
+    """Return the result of the work; a signal handler's exception is raised in the waiting thread, never in the work.
 
-    Handlers run in the main thread, which waits. What it no longer waits for ends at the next `end_if_abandoned`.
+    Handlers run in the main thread, which waits. Abandoned work ends at its next `end_if_abandoned`.
     """
     if threading.current_thread() is not threading.main_thread():
         return work()
@@ -99,35 +99,35 @@ def uninterrupted(work: Callable[[], Answer]) -> Answer:
 
 
 def end_if_abandoned() -> None:
-    """End the work of this thread here if nobody waits for it any more."""
+    """End the work of this thread if nobody waits for it any more."""
     stop = getattr(_of_thread, "stop", None)
     if stop is not None and stop.sent:
         raise KeyboardInterrupt
 
 
-def _tell(stop: StopSignal | None, thread: threading.Thread) -> None:
+def _abandon(stop: StopSignal | None, thread: threading.Thread) -> None:
     if stop is not None:
         stop.send()
-        _leave(thread)
+        _keep_until_exit(thread)
 
 
 _left: list[threading.Thread] = []
 
 
-def _leave(thread: threading.Thread) -> None:
-    """Remember a thread that was told to stop until Python ends."""
+def _keep_until_exit(thread: threading.Thread) -> None:
+    """Keep a stopped thread until Python ends."""
     if not _left:
-        # registered once more where all have ended: that does no harm
-        atexit.register(_take_leave)
-    _left[:] = [one for one in _left if one.is_alive()] + [thread]
+        # registering again after all have ended does no harm
+        atexit.register(_join_at_exit)
+    _left[:] = [other for other in _left if other.is_alive()] + [thread]
 
 
 def threads_left() -> bool:
-    """Whether there is work under way that nobody waits for."""
-    return any(one.is_alive() for one in _left)
+    """Whether abandoned work is still running."""
+    return any(thread.is_alive() for thread in _left)
 
 
-def _take_leave() -> None:
-    for one in _left:
-        if one.is_alive():
-            one.join(_FAREWELL)
+def _join_at_exit() -> None:
+    for thread in _left:
+        if thread.is_alive():
+            thread.join(_EXIT_WAIT)

@@ -1,10 +1,10 @@
 """Small calls of kernels that are not compiled yet are interpreted, while another process compiles them.
 
-Compiling takes seconds for each kernel, once after an installation. A kernel is a Python function, though: on a
-small scene it does in a hundredth of a second uncompiled what it does in a ten-thousandth compiled. So a call
-with small arrays is interpreted as long as the kernel is in no cache, and a process beside this one compiles it; as
-soon as it is in the cache on disk it is loaded. A call with large arrays waits for the compiler, and so does a kernel
-that has been interpreted for longer than compiling would have taken. Results are the same to the last bit.
+After an installation each kernel takes seconds to compile. But a kernel is also a Python function: on a small scene it
+takes a hundredth of a second interpreted, a ten-thousandth compiled. So a call with small arrays is interpreted while
+the kernel is in no cache, and a background process compiles it; once it is in the cache on disk it is loaded. A call
+with large arrays waits for the compiler, and so does a kernel that was interpreted for longer than compiling takes.
+Results are the same to the last bit.
 
 ``ASSOC_INTERPRET=0`` switches this off.
 """
@@ -22,12 +22,12 @@ import numpy as np
 
 from assoc._system.beside import beside, has_room
 
-# elements of a call's arrays, all together, up to which it may be interpreted; and of kernels that search a tree,
+# total elements of a call's arrays up to which it may be interpreted; and the same for kernels that search a tree,
 # whose work grows faster than their arrays
 SMALL, SMALL_SEARCH = 6000, 4800
-# processor seconds for which a kernel is interpreted, all calls together: about what compiling takes
+# processor seconds for which a kernel is interpreted, over all calls: about what compiling takes
 PATIENCE = 6.0
-# seconds between two looks whether the kernel has come into the cache
+# seconds between two checks whether the kernel is in the cache
 _LOOK = 0.5
 
 _switched_on = os.environ.get("ASSOC_INTERPRET", "1") != "0"
@@ -35,7 +35,7 @@ _switched_on = os.environ.get("ASSOC_INTERPRET", "1") != "0"
 
 @contextlib.contextmanager
 def compiled_only() -> Iterator[None]:
-    """Interpret nothing in this thread: for those who want the compiled code now."""
+    """Interpret nothing in this thread: for callers that need compiled code now."""
     before, thread.never = thread.never, True
     try:
         yield
@@ -45,7 +45,7 @@ def compiled_only() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interpreted_only() -> Iterator[None]:
-    """Compile nothing in this thread: for small preparations of what is to be compiled."""
+    """Compile nothing in this thread: for small steps that prepare a compilation."""
     before, thread.interpreting = thread.interpreting, True
     try:
         yield
@@ -54,13 +54,13 @@ def interpreted_only() -> Iterator[None]:
 
 
 class _Thread(threading.local):
-    """What a thread is at."""
+    """Settings of a thread."""
 
     # whether a kernel that is in no cache may be interpreted instead
     may_interpret = False
     # whether nothing may be interpreted
     never = False
-    # whether an interpreted kernel runs: what it calls is interpreted with it
+    # whether an interpreted kernel runs: the kernels that it calls are interpreted with it
     interpreting = False
 
 
@@ -70,22 +70,22 @@ thread = _Thread()
 def first_small(
     kernel: Any, compiled: Callable[..., Any], small: int, stand_in: Callable[..., Any] | None
 ) -> Callable[..., Any]:
-    """Return what a kernel does on arguments of new types: load, interpret or compile.
+    """Return the function that handles arguments of new types: it loads, interprets or compiles.
 
     Parameters
     ----------
     kernel : Dispatcher
     compiled : callable
-        What loads or compiles it; returns None where it is to be interpreted.
+        Loads or compiles the kernel; returns None where it is to be interpreted.
     small : int
         Elements of the arguments up to which a call may be interpreted.
     stand_in : callable, optional
-        What is called instead of the Python function, where that cannot be interpreted.
+        Called instead of the Python function where that cannot be interpreted.
 
     Returns
     -------
     callable
-        For ``kernel._compile_for_args``; it returns what is then called with the same arguments.
+        For ``kernel._compile_for_args``; returns the function to call with the same arguments.
     """
     function = stand_in or kernel.py_func
     spent = 0.0
@@ -96,7 +96,7 @@ def first_small(
         started = time.thread_time()
         thread.interpreting = True
         try:
-            # compiled code is silent about overflow
+            # compiled code ignores overflow
             with np.errstate(all="ignore"):
                 return function(*arguments)
         finally:

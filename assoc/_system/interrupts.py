@@ -1,4 +1,4 @@
-"""Ctrl-C in the middle of kernels, and work that is asked to come to its end."""
+"""Ctrl-C while kernels run, and requests to end early."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ _end_asked = threading.Event()
 
 
 def ask_to_end() -> None:
-    """Ask the searches of this process to end with what they have, and loops over scans to begin no other."""
+    """Ask the searches of this process to return the best they have, and loops over scans to start no further scan."""
     _end_asked.set()
 
 
 def end_is_asked() -> bool:
-    """Whether a program was asked to come to its end."""
+    """Whether this program was asked to end."""
     return _end_asked.is_set()
 
 
 class interruptible(ContextDecorator):  # noqa: N801 - read like those of contextlib
-    """Let Ctrl-C be a KeyboardInterrupt where it comes while a kernel's arguments or results are converted.
+    """Raise KeyboardInterrupt where Ctrl-C arrives while a kernel's arguments or results are converted.
 
-    Python then sees a function that returns a result and has an exception set, and says SystemError; once for
-    every conversion that is nested in another. A class, as every solution of a tiny scene pays for a generator.
+    There Python finds a result together with an exception and raises SystemError, once for each nested conversion.
+    This is a class because a generator would cost time in every solution of a tiny scene.
     """
 
     def __enter__(self) -> None:

@@ -1,10 +1,9 @@
-"""What compiled code depends on, as a digest: the kernel, all it can reach, and the constants that it was given.
+"""Digest of all that compiled code depends on: the kernel, the functions it reaches, and its constants.
 
-numba freezes into a kernel the functions and constants that it names, and those that they name, wherever they are
-written. So the digest follows the names through the modules' globals, when a kernel is first loaded or compiled and
-all are there. Docstrings, comments, annotations and the place in the file are no part of it. Where a name stands for
-something else (it is seldom), the digest is that of the whole package's text: code is compiled too often rather than
-too seldom.
+numba freezes into a kernel the functions and constants that it names, directly or through other functions, in any file.
+So the digest follows names through the modules' globals, when a kernel is first loaded or compiled and all names are
+defined. Docstrings, comments, annotations and line numbers are left out. Where a name stands for an object of an
+unknown kind (seldom), the digest covers the source of the whole package: compiling too often is better than stale code.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ _PLAIN = (int, float, complex, str, bytes, type(None), type(Ellipsis))
 
 
 class KernelStamp:
-    """The digest of a kernel, made when it is asked for, not on import; it is kept as text."""
+    """The digest of a kernel as text, computed on first use and not on import."""
 
     def __init__(self, kernel: FunctionType, options: Mapping[str, object]) -> None:
         self._kernel = kernel
@@ -40,9 +39,9 @@ class KernelStamp:
 
 
 def argument_kinds(kinds: Any) -> tuple[Any, ...]:
-    """Return what compiled code takes from the types of its arguments and what these do not tell themselves.
+    """Return what compiled code depends on in its argument types and what these types do not compare.
 
-    That is the order of the fields of records, and what kernels do that are given as arguments.
+    That is the order of a record's fields, and the code of kernels that are passed as arguments.
     """
     found: list[Any] = []
     for kind in kinds:
@@ -56,7 +55,7 @@ def argument_kinds(kinds: Any) -> tuple[Any, ...]:
 
 
 class _Reached:
-    """What a kernel reaches, described line by line."""
+    """All that a kernel reaches, one line each."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
@@ -79,12 +78,12 @@ class _Reached:
         text = _code(function.__code__, function.__doc__, names)
         self._lines.append(f"{function.__module__} {function.__qualname__} {text}")
         self._add("defaults", (function.__defaults__, tuple(sorted((function.__kwdefaults__ or {}).items()))), names)
-        # attributes are among the names: one too many does no harm
+        # names include attributes: a superfluous name does no harm
         for name in sorted(names & function.__globals__.keys()):
             self._add(name, function.__globals__[name], names)
 
     def _add(self, name: str, value: Any, names: set[str]) -> None:
-        """Describe what a name stands for; of a module, what is used of it is among the names, too."""
+        """Describe what a name stands for; of a module only the attributes among ``names``."""
         if isinstance(value, _PLAIN):
             self._lines.append(f"{name} {type(value).__name__} {value!r}")
         elif isinstance(value, (np.ndarray, np.generic)) and value.dtype != object:
@@ -110,7 +109,7 @@ class _Reached:
                 for one in sorted(used):
                     self._add(f"{value.__name__}.{one}", vars(value)[one], names)
         else:
-            # a declaration of numba's, of a function of the system, says all there is
+            # numba's declaration of a system function is complete in itself
             symbol, declared = getattr(value, "symbol", None), getattr(value, "sig", None)
             if symbol is None or declared is None:
                 raise _UnknownError
@@ -125,11 +124,11 @@ class _Reached:
 
 
 class _UnknownError(Exception):
-    """A name stands for something of which it is not known what compiled code takes from it."""
+    """A name stands for an object of a kind that the digest cannot describe."""
 
 
 def _code(code: CodeType, docstring: str | None, names: set[str]) -> str:
-    """Describe what code does; collects the names that it uses."""
+    """Describe code, and add the names that it uses to ``names``."""
     names.update(code.co_names)
     constants = list(code.co_consts)
     if docstring is not None and constants and constants[0] == docstring:
@@ -151,7 +150,7 @@ def _constant(value: Any, names: set[str]) -> str:
 
 
 def _is_foreign(value: Any) -> bool:
-    """Whether something belongs to a library: numba and Python look after these."""
+    """Whether an object belongs to a library whose changes numba and Python detect themselves."""
     module = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
     return isinstance(module, str) and module.split(".")[0] in ("builtins", "math", "numpy", "cmath", "operator")
 

@@ -1,4 +1,4 @@
-"""Public names of a package that are loaded on first use (PEP 562), so that importing the package stays quick."""
+"""Public names of a package that are loaded on first use (PEP 562), so that importing the package is quick."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
     package : str
         Its ``__name__``.
     homes : mapping
-        For each public name the module that defines it, within the package or, with ``assoc.`` before it, in another
-        one; the name of a subpackage, which has no other home, stands for itself.
+        The module that defines each public name: within the package, or elsewhere if it begins with ``assoc.``.
+        A name without a module is a subpackage.
 
     Returns
     -------
     __getattr__, __dir__ : callables
-        What the package must call them.
+        To be assigned in the package.
     """
     content = vars(sys.modules[package])
 
@@ -35,7 +35,7 @@ def lazy_names(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
         return value
 
     def names() -> list[str]:
-        # what the package itself imports is not offered
+        # names that the package imports for itself are not offered
         return sorted({*homes, *content.get("__all__", ()), *(name for name in content if name.startswith("__"))})
 
     return load, names

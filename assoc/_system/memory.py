@@ -1,8 +1,8 @@
-"""How much memory there is, and a refusal in one line of work that would take more.
+"""Available memory, and refusal of work that would take more.
 
-The limit is what the process can still have: what the machine has left, what its control group (a container) has
-left, and what is left of its address space (``ulimit -v``), whichever is least. A constant would be too small for a
-server and too large for a laptop. Where the system does not say, nothing is refused.
+The limit is the least of what is left of the machine's memory, of the control group's (a container), and of the address
+space (``ulimit -v``). A constant would be too small for a server and too large for a laptop. Where the system gives no
+figures nothing is refused.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from pathlib import Path
 
 from assoc.errors import LimitExceededError
 
-# less than this is not worth asking the system for
+# below this the system is not asked
 _SMALL = 64 * 1024**2
-# the kernel's way of saying that a control group has no limit
+# the kernel's value for a control group without a limit
 _ENDLESS = 1 << 60
-# what remains for everything that no estimate knows of
+# reserve for what estimates leave out
 _SHARE = 0.9
 
 
@@ -30,16 +30,16 @@ def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
     needed : float
         Bytes at the peak.
     what : str
-        What they are for, naming the argument that causes it; the message begins with it.
+        What the memory is for, naming the argument that causes it; the message begins with it.
     advice : str
         What to change.
     own : bool
-        Whether this process takes it, whose address space may be limited, and not others.
+        Whether this process takes the memory, so that the limit of its address space counts.
 
     Raises
     ------
     LimitExceededError
-        There is less.
+        Less is available.
     """
     if needed <= _SMALL:
         return
@@ -51,19 +51,19 @@ def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
 
 
 def fits(needed: float) -> bool:
-    """Whether there is memory for so many bytes more: for searches that grow, and can do without."""
+    """Whether so many more bytes are available: for searches that can do with less."""
     return needed <= _SMALL or needed <= available()
 
 
 def at_most(count: int, each: float) -> int:
-    """How many of ``count`` things of ``each`` bytes there is memory for; at least one."""
+    """Return how many of ``count`` objects of ``each`` bytes fit into memory; at least one."""
     if count * each <= _SMALL:
         return count
     return min(count, int(max(1.0, min(available() / each, 2.0**31))))
 
 
 def available(own: bool = True) -> float:
-    """Bytes that this process (or others that it starts) may still take; infinite where the system does not say."""
+    """Bytes that this process (or others that it starts) may still take; infinite where the system gives no figures."""
     return _SHARE * max(min(_of_machine(), _of_group(), _of_address_space() if own else math.inf), 0.0)
 
 
@@ -86,7 +86,7 @@ def _of_machine() -> float:
     except (OSError, ValueError, IndexError):
         pass
     try:
-        # not what is free, but no more than this can be
+        # an upper limit, not what is free
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):
         return math.inf
@@ -97,7 +97,7 @@ def _of_group() -> float:
 
 
 def _left_in_groups() -> Iterator[float]:
-    """What is left in the control group of this process and in those that it is part of."""
+    """Bytes left in the control group of this process and in the groups that contain it."""
     for root, path, limit, usage, cache in _groups():
         folder = root + path
         while True:
@@ -111,7 +111,7 @@ def _left_in_groups() -> Iterator[float]:
 
 
 def _groups() -> Iterator[tuple[str, str, str, str, bytes]]:
-    """Folder of the hierarchy, path within, names of limit and usage, and of the cache that can be given back."""
+    """Folder of the hierarchy, path within it, file names of limit and usage, and field of the reclaimable cache."""
     try:
         lines = Path("/proc/self/cgroup").read_text().splitlines()
     except OSError:

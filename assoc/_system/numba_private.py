@@ -1,9 +1,9 @@
-"""All that the package uses of numba beyond what numba promises, in one place.
+"""All uses of numba's private names, in one file.
 
-A kernel is a dispatcher of numba's with attributes of its own: a cache (`_KernelCache`), what it does on arguments of
-new types, what it answers kernels that call it. Nothing of numba's modules and classes is replaced or changed. Where
-one of the names of `COMPLETE` is missing, kernels are plain ``numba.njit(cache=True)`` (compiled.py): slower at first
-contact, with the same answers.
+A kernel is a numba dispatcher with attributes of this package: its cache (`_KernelCache`), what it does on arguments of
+new types, and how it is called from other kernels. numba's modules and classes stay unchanged. Where one of the names
+of `COMPLETE` is missing, kernels are plain ``numba.njit(cache=True)`` (compiled.py): slower at first contact, with the
+same results.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numba.core import caching, codegen, compiler, options, registry, types
 from assoc._system import temporary
 from assoc._system.kernel_stamp import KernelStamp, argument_kinds
 
-# numba has no types
+# numba has no type annotations
 _CACHING: Any = caching
 _CODEGEN: Any = codegen
 _COMPILER: Any = compiler
@@ -46,43 +46,43 @@ COMPLETE = all(
     }.items()
     for name in names.split()
 )
-"""Whether this numba has all names of classes that are used here."""
+"""Whether this numba has all the classes and methods used here."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
 SHIPPED = PACKAGE / "_kernels"
-"""Compiled kernels that came with the package; a wheel may hold them (``tests/release/kernels.py``)."""
-# where kernels are kept if numba finds no folder; for the processes that this one starts, too
+"""Compiled kernels shipped with the package; a wheel may hold them (``tests/release/kernels.py``)."""
+# the cache folder if numba finds none, also for the processes that this one starts
 _FOLDER = "ASSOC_CACHE_DIR"
-# nobody calls kernels as functions of C, and inner ones not from Python: what would let them is left out
+# kernels are not called from C, nor inner ones from Python: the code for such calls is left out
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _INNER_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True}
 
 
-class NotCompiled(Exception):  # noqa: N818  (it is no error)
-    """The kernel is in no cache, and is not to be compiled now."""
+class NotCompiled(Exception):  # noqa: N818  (not an error)
+    """The kernel is in no cache and is not to be compiled now."""
 
 
 def make(
     function: Callable[..., Any], may_wait: Callable[[], bool], *, inner: bool = False, literal: bool = False
 ) -> Any:
-    """Make a kernel, with its cache where there is a folder for it.
+    """Make a kernel, with a cache where there is a folder for one.
 
     Parameters
     ----------
     function : callable
     may_wait : callable
-        Whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
+        Returns whether a kernel that is in no cache is to be compiled now; otherwise `NotCompiled` is raised.
     inner : bool
-        Whether kernels alone call it.
+        Whether only kernels call it.
     literal : bool
-        Whether kernels that call it have it compiled anew for each literal number and each width of whole numbers.
+        Whether calls from kernels compile it anew for each literal number and each width of whole numbers.
     """
     chosen = _INNER_OPTIONS if inner else _OPTIONS
     pipeline = _InnerCompiler if inner else _COMPILER.Compiler
     kernel: Any = numba.njit(**chosen, pipeline_class=pipeline)(function)
     if not literal:
         kernel.get_call_template = _called_with_common_types(kernel)
-    # nowhere to keep it, not even for a while: each process compiles for itself
+    # no folder, not even a temporary one: each process compiles for itself
     with contextlib.suppress(OSError):
         kernel._cache = _KernelCache(function, chosen, may_wait)
     return kernel
@@ -94,18 +94,18 @@ def is_cached(kernel: Any) -> bool:
 
 
 def is_kept(kernel: Any) -> bool:
-    """Whether compiled code of a kernel, for whatever arguments, is in this process, on disk, or came along."""
+    """Whether compiled code of a kernel, for any types, is in this process, on disk, or shipped with the package."""
     if kernel.signatures or SHIPPED.is_dir():
         return True
     try:
         return bool(kernel._cache._cache_file._load_index())
     except Exception:
-        # no cache at all, or one that cannot be read
+        # no cache, or an unreadable one
         return False
 
 
 class _KernelCache(_CACHING.FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, with our stamps; it is a help and never an obstacle."""
+    """numba's cache of one kernel, with this package's stamps; its failures are never errors."""
 
     def __init__(self, function: Any, chosen: Mapping[str, object], may_wait: Callable[[], bool]) -> None:
         self._impl_class = functools.partial(_Implementation, _Place(chosen))
@@ -113,20 +113,20 @@ class _KernelCache(_CACHING.FunctionCache):  # type: ignore[misc]
         super().__init__(function)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """Tell records apart whose fields have the same types in another order."""
+        """Tell records apart whose fields have the same types in a different order."""
         return (*super()._index_key(sig, codegen), argument_kinds(sig))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep compiled code; on a full disk, say, it is compiled again next time."""
+        """Save compiled code; if that fails (a full disk) it is compiled again next time."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load compiled code, own or shipped; what cannot be read (cut by a crash) is compiled again, and replaced."""
+        """Load compiled code, local or shipped; unreadable code (cut by a crash) is compiled again and replaced."""
         try:
             found = super().load_overload(sig, target_context)
         except Exception:
-            # an index that cannot be read cannot be added to either
+            # numba cannot add to an index that it cannot read
             with contextlib.suppress(OSError):
                 self.flush()
             found = None
@@ -138,10 +138,10 @@ class _KernelCache(_CACHING.FunctionCache):  # type: ignore[misc]
         return found
 
     def _load_shipped(self, sig: Any, target_context: Any) -> Any:
-        """Load a kernel that was made for x86-64-v3, if this processor can do what that can.
+        """Load a kernel that was compiled for x86-64-v3, if this processor supports that.
 
-        All else must be the same as for own ones: the versions of numba and Python, the system, the types, the stamp.
-        The compiler may not use other arithmetic (no ``fastmath``), so results are the same bytes.
+        Versions of numba and Python, system, types and stamp must match as for local kernels. The compiler may not
+        reorder arithmetic (no ``fastmath``), so results are the same bytes.
         """
         system, _, features = target_context.codegen().magic_tuple()
         if not _usual_settings() or not NEEDED <= {one[1:] for one in features.split(",") if one.startswith("+")}:
@@ -161,23 +161,23 @@ class _Implementation(_CACHING.CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class _Place:
-    """Finds numba's usual place for a kernel's compiled code, and stamps it by what the kernel can reach.
+    """numba's cache folder for a kernel, with a stamp of all that the kernel can reach.
 
     numba's own stamp is that of the kernel's file: an edited helper in another file would leave stale code, and an
-    edited comment would compile anew. Where no folder can be written (a read-only installation and home) it is a
+    edited comment would recompile. Where no folder can be written (a read-only installation and home) it is a
     temporary one.
     """
 
     def __init__(self, chosen: Mapping[str, object]) -> None:
         self._options = chosen
-        # one function may be both
+        # the same function may be compiled as both
         self._kind = "inner" if chosen is _INNER_OPTIONS else "kernel"
 
     def from_function(self, function: Any, file: str) -> Any:
         usual = [] if _FOLDER in os.environ else _CACHING.CacheImpl._locator_classes
         found = (one.from_function(function, file) for one in usual)
         locator = next((one for one in found if one is not None), None) or _temporary_place(function, file)
-        # neither the place in the file nor its time: a copied or checked-out tree keeps its compiled kernels
+        # without line number and file time: a copied or checked-out tree keeps its compiled kernels
         locator.get_source_stamp = lambda: KernelStamp(function, self._options)
         locator.get_disambiguator = lambda: self._kind
         return locator
@@ -186,7 +186,7 @@ class _Place:
 def _temporary_place(function: Any, file: str) -> Any:
     if _FOLDER not in os.environ:
         os.environ[_FOLDER] = tempfile.mkdtemp(prefix="assoc-numba-")
-        # it goes when this process ends
+        # removed when this process ends
         temporary.add(os.environ[_FOLDER])
     locator = _IN_TREE(function, file)
     locator._cache_path = os.path.join(os.environ[_FOLDER], locator.get_suitable_cache_subpath(file))
@@ -195,11 +195,11 @@ def _temporary_place(function: Any, file: str) -> Any:
 
 
 NEEDED = {"avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse4.2", "xsave"}
-"""What x86-64-v3 can do, in LLVM's words."""
+"""The features of x86-64-v3, as LLVM names them."""
 
 
 class _MadeFor:
-    """Stands in numba's key for the processor: the one that shipped kernels were made for."""
+    """Replaces the processor in numba's cache key by the one that shipped kernels were compiled for."""
 
     def __init__(self, system: str) -> None:
         self._system = system
@@ -209,20 +209,20 @@ class _MadeFor:
 
 
 def _usual_settings() -> bool:
-    """Whether numba compiles as it does by itself: for this processor, without checks, without Intel's library."""
+    """Whether numba has its default settings: for this processor, without checks, without Intel's library."""
     given = (_CONFIG.CPU_NAME, _CONFIG.CPU_FEATURES, _CONFIG.BOUNDSCHECK)
     return given == (None, None, None) and not _CONFIG.USING_SVML and not _CONFIG.DEBUGINFO_DEFAULT
 
 
 class _InnerLibrary(_CODEGEN.JITCodeLibrary):  # type: ignore[misc]
-    """The code of an inner kernel, which is optimised in the kernels that call it, and there alone."""
+    """The code of an inner kernel, optimised only within the kernels that call it."""
 
     def _optimize_final_module(self) -> None:
         pass
 
 
 class _InnerCompiler(_COMPILER.Compiler):  # type: ignore[misc]
-    """numba's compiler, which puts what it makes into an `_InnerLibrary`."""
+    """numba's compiler, with an `_InnerLibrary` for its results."""
 
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
         super().__init__(typingctx, targetctx, library, *others)
@@ -231,7 +231,7 @@ class _InnerCompiler(_COMPILER.Compiler):  # type: ignore[misc]
 
 
 def _common(kind: Any) -> Any:
-    """The type for which a kernel is compiled where another one gives it a whole number: always the same."""
+    """Return the type for which a kernel is compiled for whole numbers of any width from another kernel."""
     if isinstance(kind, (_TYPES.IntegerLiteral, _TYPES.BooleanLiteral)):
         kind = kind.literal_type
     if isinstance(kind, _TYPES.Integer) and kind.signed and kind.bitwidth < 64:
@@ -242,7 +242,7 @@ def _common(kind: Any) -> Any:
 
 
 def _called_with_common_types(kernel: Any) -> Callable[..., Any]:
-    """What answers kernels that call this one: numba would compile it for each literal number and each width anew."""
+    """Resolve calls from kernels: by itself numba would compile anew for each literal number and each width."""
     call_template = kernel.get_call_template
 
     def template(args: Any, kws: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Work spread over processes: results in order, and no process left running after an interruption."""
+"""Work spread over processes: results in order, and no process left after an interruption."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from assoc._system import memory, temporary
 from assoc._system.first_import import path_without
 from assoc.errors import InvalidInputError, LimitExceededError
 
-# bytes of a process with numpy, scipy and compiled kernels, and a small task
+# bytes of a process with numpy, scipy, compiled kernels and a small task
 _PROCESS = 100e6
 
 _task: Callable[[Any], Any] | None = None
@@ -29,12 +29,12 @@ _problem = ""
 
 
 def require_processes(jobs: int) -> None:
-    """Refuse more processes than there is memory for."""
+    """Refuse more processes than fit into memory."""
     memory.require(_PROCESS * jobs, f"jobs: {jobs} processes", "take fewer", own=False)
 
 
 def not_sent(reason: object) -> InvalidInputError:
-    """Return the error of a task that other processes cannot get, with its reason."""
+    """Return the error for a task that cannot be sent to other processes, with the reason."""
     return InvalidInputError(
         "jobs: other processes take only what is at the top level of a module that they can import; define your own "
         f"solver or function there ({reason})"
@@ -47,18 +47,18 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     Parameters
     ----------
     task : callable
-        Sent once to each process, so it may hold what all items share; must be picklable if jobs > 1.
+        Sent once to each process, so it may hold data that all items share; must be picklable if jobs > 1.
     items : sequence
         Small and picklable.
     jobs : int
-        Number of processes; 1 works in this one. They are spawned: forking would copy the threads' locks.
+        Number of processes; 1 works in this process. They are spawned: forking would copy the locks of threads.
 
     Raises
     ------
     LimitExceededError
-        A process died, or there is no memory for so many.
+        A process died, or memory does not suffice for ``jobs`` processes.
     InvalidInputError
-        The folder for temporary files is full, or there is none.
+        The folder for temporary files is full or missing.
     """
     jobs = min(jobs, len(items))
     if jobs <= 1:
@@ -71,23 +71,23 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
     path = _written(task)
     with safe_path():
         executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start, initargs=(path, os.getpid()))
-    # all at once at the start: the executor loses count when one dies while it starts another on demand
+    # start all at once: the executor miscounts if one dies while it starts another on demand
     executor._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]
     try:
-        # a signal is heard when all are there: one that is half started could not be ended
+        # signals wait until all are started: a half-started process could not be ended
         with signals_as_they_are(), safe_path(), ThreadPoolExecutor(1) as starter:
             waiting = starter.submit(_submit, executor, items).result()
         for future in waiting:
             yield future.result()
     except BrokenProcessPool:
-        # those that the executor did not know yet when one died
+        # also the processes that the executor had not registered yet
         _end(before)
         raise LimitExceededError(
             "a worker process died: it was killed, ran out of memory, or could not start (a script that uses several "
             'processes must guard its start by if __name__ == "__main__"); fewer processes take less memory'
         ) from None
     except BaseException:
-        # interrupted, or one item failed: the rest is not needed and may take long
+        # interrupted, or an item failed: the remaining items are not needed and may take long
         executor.shutdown(wait=False, cancel_futures=True)
         _end(before)
         raise
@@ -97,24 +97,24 @@ def ordered_map(task: Callable[[Any], Any], items: Sequence[Any], jobs: int) -> 
 
 
 def _submit(executor: ProcessPoolExecutor, items: Sequence[Any]) -> list[Future[Any]]:
-    """Hand in all items, which starts the processes."""
+    """Submit all items, which starts the processes."""
     try:
         return [executor.submit(_run, item) for item in items]
     except OSError as error:
-        # the system has no room for a process; or one died, and the queue was closed while another was started
+        # the system refused a process; or one died, and the queue was closed while another started
         raise BrokenProcessPool(str(error)) from error
 
 
 def _end(before: set[multiprocessing.process.BaseProcess]) -> None:
-    """End all processes that were started since; a second signal does the ended no harm."""
+    """End all processes that were started since; a second signal does ended ones no harm."""
     for child in set(multiprocessing.active_children()) - before:
         child.kill()
 
 
 def _written(task: object) -> str:
-    """Put a task into a file that nobody else can read or write.
+    """Write a task into a file that only this user can access.
 
-    A process that dies before it has read a large task from its pipe would leave this one writing for ever.
+    If it went through a pipe, a process that died before reading a large task would leave this one blocked for ever.
     """
     try:
         with temporary.lock:
@@ -138,9 +138,9 @@ def _written(task: object) -> str:
 
 
 def start_python(module: str, *words: str, **options: Any) -> subprocess.Popen[bytes]:
-    """Start a process that calls ``serve(*words)`` of a module, and finds modules where this process does.
+    """Start a process that calls ``serve(*words)`` of a module, with the search path for modules of this process.
 
-    It reads what is written to its stdin, says nothing, and never looks into the current folder.
+    It reads lines from its stdin, prints nothing, and never imports from the current folder.
     """
     code = f"import sys; sys.path[:] = {path_without()!r}; from {module} import serve; serve(*sys.argv[1:])"
     quiet = subprocess.DEVNULL
@@ -148,7 +148,7 @@ def start_python(module: str, *words: str, **options: Any) -> subprocess.Popen[b
     return subprocess.Popen([sys.executable, "-c", code, *words], **streams, **options)
 
 
-# any text means yes; this one, that it is not the user's
+# any text means yes; this one marks that the package set it, not the user
 _SAFE_PATH, _OWN = "PYTHONSAFEPATH", "assoc"
 _lock = threading.Lock()
 _starting = 0
@@ -156,9 +156,9 @@ _starting = 0
 
 @contextmanager
 def safe_path() -> Iterator[None]:
-    """Let Python processes that are started within not look into the current folder.
+    """Keep Python processes that are started within from importing from the current folder.
 
-    Libraries that start them hand them the ``sys.path`` of this process later, but import modules before that.
+    Libraries send them the ``sys.path`` of this process only after they have imported some modules.
     """
     global _starting
     with _lock:
@@ -175,14 +175,14 @@ def safe_path() -> Iterator[None]:
 
 
 def forget_safe_path() -> None:
-    """Let what a user's own code starts look where it always does."""
+    """Restore the search path for processes that the user's own code starts."""
     if os.environ.get(_SAFE_PATH) == _OWN:
         del os.environ[_SAFE_PATH]
 
 
 @contextmanager
 def signals_as_they_are() -> Iterator[None]:
-    """Keep blocked what is blocked: starting processes lets Ctrl-C and its kin through afterwards."""
+    """Keep blocked signals blocked: starting processes unblocks Ctrl-C and similar signals."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -194,14 +194,14 @@ def signals_as_they_are() -> Iterator[None]:
 
 
 def end_with_parent(parent: int, *paths: str) -> None:
-    """End this worker process soon after its parent, also where that was killed and could not say so.
+    """End this worker process soon after its parent, even if the parent was killed.
 
     Parameters
     ----------
     parent : int
         Process id of the parent.
     paths : str
-        Files that the parent would have removed.
+        Files to remove, which a killed parent cannot remove itself.
     """
 
     def watch() -> None:
@@ -212,7 +212,7 @@ def end_with_parent(parent: int, *paths: str) -> None:
                 os.unlink(path)
         os._exit(1)
 
-    # the thread of a backend that works in the parent itself needs no watch
+    # a backend's thread in the parent process itself needs no watch
     if os.getpid() != parent:
         threading.Thread(target=watch, name="parent", daemon=True).start()
 
@@ -220,17 +220,17 @@ def end_with_parent(parent: int, *paths: str) -> None:
 def _start(path: str, parent: int) -> None:
     global _task, _problem
     forget_safe_path()
-    # Ctrl-C reaches the whole group: only the parent reports it
+    # Ctrl-C reaches the whole group, but only the parent reports it
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
-        # programs wait for it in a thread, and their processes inherit that it is blocked
+        # programs wait for the signal in a thread and block it, and their processes inherit the block
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     end_with_parent(parent, path)
     try:
         with open(path, "rb") as file:
             _task = pickle.load(file)
     except (ImportError, AttributeError) as error:
-        # a worker that dies would say nothing: the first item does
+        # a worker that died here would give no reason: the first item raises the error instead
         _problem = str(error)
 
 

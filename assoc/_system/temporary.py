@@ -1,4 +1,4 @@
-"""Temporary files and folders of this process, on one list: a process that must end at once removes them first."""
+"""List of this process's temporary files and folders: a process that must end at once removes them first."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from contextlib import suppress
 from typing import NoReturn
 
 lock = threading.RLock()
-"""Held while a temporary file is made and listed, or takes its name and leaves the list."""
+"""Held while a temporary file is created and listed, or renamed and taken off the list."""
 
 _paths: dict[str, int] = {}
 
 
 def add(path: str) -> None:
-    """List a file or folder of this process."""
+    """Put a file or folder of this process on the list."""
     with lock:
-        # a forked child has a copy of the list, but must not remove what is on it
+        # a forked child has a copy of its parent's list, and must not remove those files
         _paths[path] = os.getpid()
 
 
 def forget(path: str) -> None:
-    """Take a path off the list: it is gone, or it has got its final name."""
+    """Take a path off the list: it was removed or has got its final name."""
     with lock:
         _paths.pop(path, None)
 
@@ -36,8 +36,8 @@ def remove(path: str) -> None:
 
 
 def end_process(code: int, message: str = "") -> NoReturn:
-    """End the process now: remove unfinished files, let no other thread make more, and wait for nothing else."""
-    # a thread that holds the lock may hang in a file system that does not answer
+    """End the process now: remove unfinished files, keep other threads from making more, wait for nothing else."""
+    # the lock's holder may hang in a file system that does not answer
     lock.acquire(timeout=2.0)
     for path, owner in [*_paths.items()]:
         if owner == os.getpid():

@@ -1,1 +1,1 @@
-"""Text for people: plain and HTML."""
+"""Plain text and HTML for output."""

@@ -1,4 +1,4 @@
-"""HTML from untrusted text: names in files, words of command lines."""
+"""HTML from untrusted text, such as file names and command lines."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 
 
 def escape(text: object) -> str:
-    """Return text that shows as it is, in elements and in quoted attributes."""
+    """Return text escaped for elements and quoted attributes."""
     return html.escape(str(text), quote=True)
 
 
 def script_json(content: Any) -> str:
-    """Return JSON that can stand inside a script element, whatever its strings hold."""
+    """Return JSON that is safe inside a script element, whatever its strings hold."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
-    # no tag, comment or entity can begin inside; JSON reads the escapes back as the same characters
+    # no tag, comment or entity can begin inside; JSON decodes the escapes to the same characters
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def table(headers: Sequence[object], rows: Iterable[Sequence[object]], *, numbers: Sequence[int] = ()) -> str:
-    """Return a plain table; the columns ``numbers`` are set flush right."""
+    """Return a plain table; the columns ``numbers`` are aligned right."""
     right = {*numbers}
 
     def line(cells: Sequence[object], tag: str) -> str:
@@ -34,7 +34,7 @@ def table(headers: Sequence[object], rows: Iterable[Sequence[object]], *, number
 
 
 def facts(content: Mapping[str, object]) -> str:
-    """Return a table of two columns: what, and its value."""
+    """Return a table of two columns, names and values."""
     rows = (
         f'<tr><th scope="row" style="text-align:left">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(value)}</td></tr>'
@@ -44,7 +44,7 @@ def facts(content: Mapping[str, object]) -> str:
 
 
 def warning_list(lines: Iterable[str]) -> str:
-    """Return warnings, each once, under their number; nothing where there are none."""
+    """Return the distinct warnings as a list with their number as heading; empty without warnings."""
     different = list(dict.fromkeys(lines))
     if not different:
         return ""

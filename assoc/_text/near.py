@@ -1,17 +1,17 @@
-"""Names that were mistyped: which known ones are near."""
+"""Suggestions for mistyped names."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
 
-# what is so much less like the name than the nearest one was not meant
+# names that are so much less similar than the nearest one are not suggested
 _MUCH = 0.15
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Ask for the names that are near; empty if none is."""
-    # the dashes of options make any two of them alike
+    """Return a question that suggests similar names; empty if there are none."""
+    # the dashes of options would make any two similar
     bare, plain = str(name).lstrip("-"), {one.lstrip("-"): one for one in known}
     close = difflib.get_close_matches(bare, [*plain], n=3)
     likeness = [difflib.SequenceMatcher(None, one, bare).ratio() for one in close]

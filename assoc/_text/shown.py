@@ -1,4 +1,4 @@
-"""What notebooks show of results: their one line, and the first rows of their table."""
+"""How notebooks show results: one line, and the first rows of a table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Shown:
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show."""
+        """Return HTML for notebooks."""
         line = f"<p>{escape(repr(self))}</p>"
         if hasattr(self, "to_frame"):
             frame = self.to_frame()
