@@ -10,7 +10,7 @@ from assoc._system.door import door
 from assoc.errors import InvalidInputError
 from assoc.problem import AssignmentProblem
 from assoc.scene.scene import Scene
-from assoc.solvers.doubts import doubts_about_costs
+from assoc.solvers.plausibility import cost_warnings
 
 Source = Scene | AssignmentProblem
 
@@ -66,4 +66,4 @@ def _is_table(path: str) -> bool:
 
 def warnings_of(source: Source) -> tuple[str, ...]:
     """Probable mistakes in a scene or a problem, one line each."""
-    return source.warnings if isinstance(source, Scene) else doubts_about_costs(source)
+    return source.warnings if isinstance(source, Scene) else cost_warnings(source)

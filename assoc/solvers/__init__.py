@@ -1,8 +1,7 @@
-"""Interchangeable solvers of the S-D assignment problem; ``assign`` is the front door.
+"""Interchangeable solvers of the S-D assignment problem, called through ``assign``.
 
-What a solver of your own is written with: `Parameters`, `Run`, `Outcome`, and `Packing` and `Cover`; `pheromone` shows
-the ants at work. The last three are loaded on first use, so that who only asks for names and parameters loads no
-compiler.
+A solver of your own is written with `Parameters`, `Run`, `Outcome`, `Packing` and `Cover`; `pheromone` shows the ants
+at work. The last three are loaded on first use: names and parameters of solvers need no compiler.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``assign``: one door to all solvers, which checks what comes in and certifies what goes out."""
+"""``assign``: the entrance to all solvers; checks their input and certifies their output."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
 from assoc.solvers.certificate import certify, cost_of
-from assoc.solvers.doubts import doubts_about_costs
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
+from assoc.solvers.plausibility import cost_warnings
 from assoc.solvers.start import start_columns
 
-# what ends a call, however good its answer is
+# reasons that end a call, however good its answer is
 _EARLY = ("time_limit", "callback", "interrupted", "memory_limit")
 
 
@@ -51,47 +51,47 @@ def assign(
     Parameters
     ----------
     problem : AssignmentProblem
-        What to solve.
+        The problem to solve.
     solver : str, default "exact"
         One of ``assoc.solvers.names()``.
     seed : int, SeedSequence, Generator or None, default 0
-        Source of all randomness: the same seed gives the same solution; None: a random one.
+        Source of all randomness: the same seed gives the same solution; None: a random seed.
     time_limit : float, optional
-        Seconds; when they are over the best solution found is returned.
+        Seconds, after which the best solution found is returned.
     callback : callable, optional
-        Called with each ``TracePoint``; a true answer stops the solver.
+        Called with each ``TracePoint``; if it returns a true value the solver stops.
     start : Solution, optional
-        A solution of this problem, from another solver or an earlier call, to begin with: the answer costs no more.
-        One of an earlier problem is used as far as its tuples are there.
+        A solution to begin with, from another solver or an earlier call: the answer costs no more.
+        One of an earlier problem is used as far as this problem has its tuples.
     watch : callable, optional
-        Of ``aco``: called after each cycle with its ``Cycle``: pheromone, visibility and probability of the tuples.
-        Several ``workers`` call it from threads of their own. ``assoc.solvers.pheromone`` keeps all cycles.
+        For ``aco``: called after each cycle with its ``Cycle``: pheromone, visibility and probability of the tuples.
+        With several ``workers`` it is called from their threads. ``assoc.solvers.pheromone`` keeps all cycles.
     advise : bool, default True
-        Whether to warn of costs that hardly mean what they should. Trackers, whose costs are in order, do not ask.
+        Whether to warn of costs that are probably not likelihood ratios. Trackers switch it off.
     proof : path-like, optional
-        Write a proof of the answer there, as JSON, that ``python -m assoc.check`` replays in exact arithmetic
-        (``assoc.proofs.write_proof``). It is found after the answer, and has no time limit.
+        Write a proof of the answer to this file, as JSON; ``python -m assoc.check`` replays it in exact arithmetic
+        (``assoc.proofs.write_proof``). It is computed after the answer, without time limit.
     **parameters
-        Parameters of that solver (``assoc.solvers.parameters(name)``).
+        Parameters of the solver (``assoc.solvers.parameters(name)``).
 
     Returns
     -------
     Solution
-        Feasible, with a lower bound that is valid whatever the solver.
+        Feasible, with a lower bound that is valid for every solver.
 
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter, a value out of range, or a start of other sensors or that uses a measurement twice.
+        Unknown solver or parameter, a value out of range, or a start that does not fit the problem.
     InfeasibleError
         The problem (without dummies) has no solution, or the solver found none in its time.
     LimitExceededError
-        The solver would need more memory than there is.
+        The solver would need more memory than is available.
 
     Warns
     -----
     AssocWarning
-        No tuple costs less than its measurements as false alarms, so that nothing can be a target. Or the proof could
+        No tuple costs less than its measurements as false alarms, so that no target can be found. Or the proof could
         not be written.
     """
     started, compiled = time.perf_counter(), compile_seconds()
@@ -118,11 +118,11 @@ def assign(
 
             try:
                 write_proof(proof, problem, solution)
-            except ValueError as error:  # the answer comes first
+            except ValueError as error:  # the answer is returned all the same
                 warn(f"proof: not written: {error}")
-    # only where nothing was found is it worth a look why: every column of a problem with dummies is a target
+    # checked only where nothing was found: every column of a problem with dummies is a target
     if advise and problem.dummy and len(solution.tuples) == problem.sizes.sum():
-        for line in doubts_about_costs(problem):
+        for line in cost_warnings(problem):
             warn(line)
     return solution
 
@@ -135,9 +135,9 @@ def _answer(
     run: Run,
     start: Solution | None,
 ) -> Solution:
-    """Run a solver, given as its name and function, on a problem and certify its answer.
+    """Run a solver, given by name and function, on a problem and certify its answer.
 
-    Where costs were lowered, what is better than a start is decided by those of the problem that was given.
+    Where costs were lowered for the solver, answer and start are compared by the original costs.
     """
     solver, solve = called
     prepared = prepare(problem)
@@ -168,23 +168,23 @@ def _answer(
 
 
 def _by_tuple(watch: Callable[[Any], object], problem: AssignmentProblem, packing: Packing) -> Callable[[Any], object]:
-    """Add the tuples of its nodes to what a solver tells of a cycle: it knows columns and rows alone."""
-    # few calls watch, and this loads what other solvers do not need
+    """Add tuples to the cycles that a solver reports: it knows only columns and rows."""
+    # imported here: only calls with ``watch`` need it
     from assoc.solvers.aco.cycle import Cycle, tuples_of
 
-    def told(state: Any) -> object:
+    def with_tuples(state: Any) -> object:
         if isinstance(state, Cycle):
             nodes = tuples_of(problem.tuples, problem.sizes, packing, state.columns, state.rows)
             state = state._replace(tuples=nodes)
         return watch(state)
 
-    return told
+    return with_tuples
 
 
 def _cheaper(
     problem: AssignmentProblem, prepared: Prepared, outcome: Outcome, other: NDArray[np.integer], run: Run
 ) -> Outcome:
-    """Take another choice where it costs less than the solver's: not by weights, whose sums lose the last digits."""
+    """Take the other choice if it costs less than the solver's: by costs, as sums of weights lose the last digits."""
     if cost_of(problem, prepared, other) >= cost_of(problem, prepared, outcome.columns):
         return outcome
     weight = float(prepared.packing.weights[other].sum())

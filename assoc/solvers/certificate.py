@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
+from assoc._types import Floats
 from assoc.errors import InfeasibleError
 from assoc.packing.bounds.dual_ascent import certified_bound, dual_bound, hard_pass
 from assoc.packing.prepare import Prepared, PreparedArrays
@@ -24,7 +25,7 @@ from assoc.solution import Solution
 def certify(
     problem: AssignmentProblem, prepared: Prepared, outcome: Outcome, run: Run, solver: str, parameters: Any
 ) -> Solution:
-    """Turn a choice of columns into a solution of the problem, with a bound that holds.
+    """Turn a choice of columns into a solution of the problem with a valid bound.
 
     Raises
     ------
@@ -42,11 +43,11 @@ def certify(
     if bound == -np.inf and duals is not None:
         hard_pass(packing, duals)
         bound = certified_bound(packing, duals)
-    # also where a bound is no number
+    # also where a bound is not a finite number
     if not bound > -np.inf:
         duals = dual_bound(packing, run=run)
         bound = certified_bound(packing, duals)
-    # packing weights are differences of costs: what they lose to rounding, half an epsilon a sensor, is taken off
+    # packing weights are differences of costs: subtract their rounding, half an epsilon for each sensor
     share = max(4.0, 0.5 * (problem.num_sensors + 3)) * sys.float_info.epsilon
     rounding = share * (magnitude + float(np.abs(prepared.single_cost).sum()))
     cost = math.fsum(costs)
@@ -72,26 +73,32 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
 
 
 def cost_of(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.integer]) -> float:
-    """Cost of a choice of columns, rounded but once; -inf where it is none, which `certify` refuses."""
+    """Cost of a choice of columns, rounded only once; -inf for a choice that `certify` refuses."""
     chosen = np.asarray(columns, dtype=np.int64)
     exact, _, _, costs, _ = as_tuples(problem.tuples, problem.costs, problem.sizes, prepared.arrays, chosen)
     return math.fsum(costs) if exact else -math.inf
 
 
 @njit
-def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, columns: Any) -> Any:
-    """A choice of columns as rows of ``problem.tuples`` in lexicographic order, completed by singletons.
+def as_tuples(
+    tuples: NDArray[np.int32],
+    costs: Floats,
+    sizes: NDArray[np.int32],
+    prepared: PreparedArrays,
+    columns: NDArray[np.int64],
+) -> Any:
+    """Return chosen columns as rows of ``problem.tuples`` in lexicographic order, completed by singletons.
 
-    Returns whether each measurement is used exactly once (each that must be, without dummies), the indices, their
-    tuples and costs, and the sum of the chosen weights' magnitudes. Of tuples that are listed twice it takes the
-    cheaper copies.
+    Returns whether each measurement is used exactly once (without dummies: each that must be), the indices, their
+    tuples and costs, and the sum of the chosen weights' magnitudes. Among tuples that are listed twice it takes the
+    cheaper one.
     """
     cols, weights, slack, origin, row_origin, single, _, _ = prepared
     num_sensors = sizes.size
     start = np.zeros(num_sensors + 1, np.int64)
     for s in range(num_sensors):
         start[s + 1] = start[s] + sizes[s]
-    # no two tuples share a measurement: each is found by its first one
+    # no two tuples share a measurement: the first measurement of a tuple identifies it
     found = np.full(start[num_sensors], -1, np.int64)
     covered = np.zeros(slack.size, np.bool_)
     exact = True
@@ -128,12 +135,12 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
     chosen = np.empty((count, num_sensors), tuples.dtype)
     prices = np.empty(count)
     count = 0
-    # those that the first sensors missed come first
+    # tuples that the first sensors missed come first
     for s in range(num_sensors - 1, -1, -1):
         for r in range(start[s], start[s + 1]):
             if found[r] >= 0 and exact:
                 indices[count] = found[r]
-                # number by number: assigning a row would compile the text for shapes that differ
+                # element by element: assigning a row would compile code for errors of differing shapes
                 for k in range(num_sensors):
                     chosen[count, k] = tuples[found[r], k]
                 prices[count] = costs[found[r]]
@@ -142,8 +149,8 @@ def as_tuples(tuples: Any, costs: Any, sizes: Any, prepared: PreparedArrays, col
 
 
 @inner_njit
-def _cheapest_copy(costs: Any, prepared: PreparedArrays, j: int) -> int:
-    """The column of the same rows as column j that costs least."""
+def _cheapest_copy(costs: Floats, prepared: PreparedArrays, j: int) -> int:
+    """The cheapest column with the same rows as column j."""
     cols, origin, row_ptr, row_cols = prepared.cols, prepared.origin, prepared.row_ptr, prepared.row_cols
     r = -1
     for s in range(cols.shape[1]):
@@ -151,7 +158,7 @@ def _cheapest_copy(costs: Any, prepared: PreparedArrays, j: int) -> int:
     best = j
     for place in range(row_ptr[r], row_ptr[r + 1]):
         k = row_cols[place]
-        # rounding keeps the order of weights: few columns are looked at any further
+        # rounding keeps the order of weights, so few columns need the full comparison
         if prepared.weights[k] <= prepared.weights[best] and costs[origin[k]] < costs[origin[best]]:
             same = True
             for s in range(cols.shape[1]):

@@ -1,4 +1,4 @@
-"""Solvers from elsewhere: what they are given, and what is believed of their answers."""
+"""Users' solvers: they get a copy of the packing, and their answers are checked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from assoc.packing.run import Outcome, Run, SolveFunction
 
 
 def guarded(name: str, solve: Callable[..., object]) -> SolveFunction:
-    """Return a solver that works on a copy of the packing, and whose answer is checked and loses its own bound."""
+    """Return a solver that works on a copy of the packing, and whose answer is checked; its bound is dropped."""
 
     def solve_guarded(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
         return _believed(solve(packing.read_only(), parameters, run), packing, f"solver {name!r}: expected")
@@ -30,7 +30,7 @@ def _believed(outcome: object, packing: Packing, expected: str) -> Outcome:
     Raises
     ------
     InvalidInputError
-        It is no `Outcome`, or a part of it is of another kind, shape or range.
+        The answer is not an `Outcome`, or a part of it has a wrong type, shape or range.
     """
     if not isinstance(outcome, Outcome):
         raise InvalidInputError(f"{expected} it to return an Outcome, got {type(outcome).__name__}")
@@ -60,7 +60,7 @@ def _believed(outcome: object, packing: Packing, expected: str) -> Outcome:
 def _array(values: Any) -> NDArray[Any]:
     try:
         return np.asarray(values)
-    except (TypeError, ValueError, OverflowError):  # lists of several lengths, say
+    except (TypeError, ValueError, OverflowError):  # for example lists of different lengths
         return np.array(None)
 
 

@@ -1,4 +1,4 @@
-"""The names of the solvers, and where to find each: by convention, without importing them all.
+"""Names of the solvers and where to find them, by convention and without importing them all.
 
 Solver ``name`` is the folder ``assoc/solvers/name``. Its ``parameters.py`` has the dataclass ``NameParameters`` and
 imports no compiler, so that ``--help`` is quick; its ``solve.py`` has the function ``solve``.
@@ -21,16 +21,16 @@ from assoc.errors import InvalidInputError
 from assoc.packing.run import SolveFunction
 
 _NAMES = ("greedy", "aco", "genetic", "tabu", "lagrangian", "exact", "milp")
-# solvers from elsewhere, by `register`
+# solvers that users added by `register`
 _REGISTERED: dict[str, tuple[type[Parameters], SolveFunction]] = {}
 
 Own = tuple[str, type[Parameters], SolveFunction]
-"""Name, parameters and function of a solver from elsewhere."""
+"""Name, parameters and function of a user's solver."""
 
 
 @door
 def names() -> list[str]:
-    """Names of all solvers, the package's own first."""
+    """Names of all solvers, the package's first."""
     return [*_NAMES, *_REGISTERED]
 
 
@@ -41,7 +41,7 @@ def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> N
     Parameters
     ----------
     name : str
-        What ``assign(problem, name)`` will call it.
+        The name for ``assign(problem, name)``.
     parameters : type
         Frozen dataclass with a default for every field, child of ``Parameters``.
     solve : callable
@@ -64,12 +64,12 @@ def register(name: str, parameters: type[Parameters], solve: SolveFunction) -> N
 
 
 def own(names: Iterable[str]) -> tuple[Own, ...]:
-    """Return those of the solvers that `register` added: what another process must be told of them."""
+    """Return the solvers that `register` added, so that other processes can `restore` them."""
     return tuple((name, *_REGISTERED[name]) for name in dict.fromkeys(names) if name in _REGISTERED)
 
 
 def restore(solvers: Iterable[Own]) -> None:
-    """Register in this process what `own` returned in another one; importing its module may have done so."""
+    """Register the result of `own` from another process; importing its module may have registered them already."""
     for name, kind, solve in solvers:
         _REGISTERED.setdefault(name, (kind, solve))
 
@@ -81,7 +81,7 @@ def parameters(name: str) -> type[Parameters]:
     Raises
     ------
     InvalidInputError
-        There is no solver of that name.
+        There is no solver with this name.
     """
     if name in _REGISTERED:
         return _REGISTERED[name][0]
@@ -89,12 +89,12 @@ def parameters(name: str) -> type[Parameters]:
 
 
 def solver(name: str) -> SolveFunction:
-    """Return the solve function of a solver; those from elsewhere are guarded (own_solver.py).
+    """Return the solve function of a solver; users' solvers are guarded (own_solver.py).
 
     Raises
     ------
     InvalidInputError
-        There is no solver of that name.
+        There is no solver with this name.
     """
     if name in _REGISTERED:
         from assoc.solvers.own_solver import guarded  # loads a compiler
@@ -110,7 +110,7 @@ def make_parameters(name: str, values: Mapping[str, Any]) -> Parameters:
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter (the near names are listed), or a value out of range.
+        Unknown solver or parameter (similar names are listed), or a value out of range.
     """
     kind = parameters(name)
     known = [f.name for f in fields(kind)] if values else []  # type: ignore[arg-type]

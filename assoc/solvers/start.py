@@ -1,4 +1,4 @@
-"""A solution to begin with, checked and brought into the form in which solvers see the problem."""
+"""Start solutions: checked and translated to columns of a packing."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from assoc.solution import Solution
 def start_columns(
     problem: AssignmentProblem, prepared: Prepared, start: object, run: Run
 ) -> NDArray[np.integer] | None:
-    """Return the columns of a packing that a solution chooses, as far as they are there.
+    """Return the columns of a packing that a start solution chooses, as far as the packing has them.
 
-    Without dummies what is then left uncovered is covered by ejections; None where that fails.
+    Without dummies, rows that stay uncovered are covered by ejections; None where that fails.
 
     Raises
     ------
     InvalidInputError
-        It is no solution: it has other sensors, tuples that are no whole numbers, or uses a measurement twice.
+        The start has other sensors, tuples that are not whole numbers, or uses a measurement twice.
     """
     if not isinstance(start, Solution):
         raise InvalidInputError(f"start: expected a Solution, got {type(start).__name__}")
@@ -45,8 +45,8 @@ def start_columns(
     before = np.cumsum(problem.sizes) - problem.sizes
     packing = prepared.packing
     rows = np.where(packing.cols >= 0, packing.row_origin[packing.cols], -1) if packing.num_columns else packing.cols
-    which = _places(rows, np.where(tuples > 0, tuples + before - 1, -1))
-    # of tuples that are listed twice the cheaper one
+    which = _indices_among(rows, np.where(tuples > 0, tuples + before - 1, -1))
+    # the cheaper one of tuples that are listed twice
     columns = np.flatnonzero(which >= 0)
     columns = columns[np.argsort(packing.weights[columns], kind="stable")]
     columns = np.sort(columns[np.unique(which[columns], return_index=True)[1]])
@@ -57,12 +57,12 @@ def start_columns(
     return cover.columns() if cover.is_complete else None
 
 
-def _places(rows: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Place of each line of rows (-1: none) among the wanted ones, which share no row; -1 where it is none of them."""
+def _indices_among(rows: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Index of each line of rows (-1: none) among the wanted ones, which share no row; -1 where it is not there."""
     owner = np.full(max(int(rows.max(initial=-1)), int(wanted.max(initial=-1))) + 2, -1)
     for column in wanted.T:
         owner[column[column >= 0]] = np.flatnonzero(column >= 0)
     if not len(rows):
         return np.zeros(0, dtype=np.int64)
-    place = owner[rows[np.arange(len(rows)), np.argmax(rows >= 0, axis=1)]]
-    return np.where((place >= 0) & (rows == wanted[place]).all(axis=1), place, -1)
+    index = owner[rows[np.arange(len(rows)), np.argmax(rows >= 0, axis=1)]]
+    return np.where((index >= 0) & (rows == wanted[index]).all(axis=1), index, -1)

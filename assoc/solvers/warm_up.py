@@ -1,7 +1,7 @@
-"""Compile all that solvers may need, before the first scan that is in a hurry.
+"""Compile all kernels that solvers may need, before the first scan with a time limit.
 
-Kernels are compiled at their first call and kept on disk. Which of them a scan needs depends on how hard it is: easy
-ones never meet branch and bound, and the first hard one would wait for half a minute.
+Kernels are compiled at their first call and kept on disk. Which ones a scan needs depends on its difficulty: easy scans
+never use branch and bound, so the first hard one would wait for half a minute.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from assoc.problem import AssignmentProblem
 from assoc.solvers import registry
 from assoc.solvers.assign import assign
 
-# measurements a sensor, and tuples: enough for large parts, few enough for tenths of a second
+# measurements of each sensor, and tuples: enough for large components, few enough for tenths of a second
 _ROWS = 24
 _TUPLES = 2000
-# iterations without improvement, or nodes, after which a search has met all its kernels
+# iterations without improvement, or nodes, after which a search has used all its kernels
 _LIMITS = {"patience": 12, "nodes": 60}
 
-# solvers that need branch and bound, on hard problems at least; a second process compiles that, half of all there is,
-# while this one compiles what they need besides
+# solvers that need branch and bound, at least on hard problems; a second process compiles it, half of all kernels,
+# while this process compiles the rest
 _BRANCHING = ("exact", "aco", "genetic", "tabu")
-# solvers that `exact` takes iterations of, in large components
+# solvers whose iterations `exact` uses in large components
 _WITH_EXACT = ("genetic", "tabu")
 
 
@@ -46,8 +46,8 @@ _WITH_EXACT = ("genetic", "tabu")
 def warm_up(solvers: Iterable[str] | None = None) -> float:
     """Compile the kernels of solvers, or load them, so that no later call of ``assign`` has to.
 
-    Call it once after installation: it then takes up to a minute, and uses two processes. Afterwards it takes a second
-    or two; worth a call at the start of a program with time limits. On a terminal it says on stderr what it is at.
+    Call it once after installation, when it takes up to a minute and uses two processes. Afterwards it takes a second
+    or two, and can be called at the start of a program with time limits. On a terminal it shows progress on stderr.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
     Returns
     -------
     float
-        Seconds that it took.
+        Seconds that the call took.
 
     Raises
     ------
     InvalidInputError
-        There is no solver of a name.
+        A name is not that of a solver.
     """
     started = time.perf_counter()
     names = [name for name in registry.names() if name != "milp"] if solvers is None else list(solvers)
@@ -86,13 +86,13 @@ def warm_up(solvers: Iterable[str] | None = None) -> float:
             say(name)
             prepare([name])
         wait_for_kernels()
-        # only large problems sort so, and their time limits are the hardest to keep
+        # only large problems use this sort, and their time limits are the hardest to keep
         ascending(np.zeros(10_000))
     return time.perf_counter() - started
 
 
 class _Line:
-    """One line on a terminal that says what is being prepared."""
+    """One line on a terminal that names the solver being prepared."""
 
     def __enter__(self) -> Callable[[str], None]:
         self._shown = sys.stderr is not None and sys.stderr.isatty()
@@ -110,7 +110,7 @@ class _Line:
 
 
 def _begin_searches(names: list[str]) -> None:
-    """Compile what solvers need before their first branch and bound, and what they do between two of them."""
+    """Compile the kernels that solvers use before their first branch and bound, and between two of them."""
     packing = packing_form.prepare(_small_problem()).packing
     run = Run(0)
     if "exact" in names:
@@ -118,7 +118,7 @@ def _begin_searches(names: list[str]) -> None:
 
         reduction = Reduction(packing, run)
         reduction.reduce()
-        # summed up to decide whether these multipliers alone are a proof
+        # the sum that decides whether these multipliers alone are a proof
         _ = reduction.proof
     component = split_components(packing, dual_bound(packing, run=run), np.arange(packing.num_columns))[0]
     component.offer_greedy()
@@ -143,7 +143,7 @@ def _begin_searches(names: list[str]) -> None:
 
 
 def prepare(names: Iterable[str]) -> None:
-    """Compile what some solvers need."""
+    """Compile the kernels of some solvers."""
     with compiled_only():
         for name in names:
             _solve_all(name, _problems())
@@ -153,16 +153,16 @@ def _solve_all(name: str, problems: list[AssignmentProblem]) -> None:
     known = {field.name for field in fields(registry.parameters(name))}  # type: ignore[arg-type]
     limits: dict[str, Any] = {key: value for key, value in _LIMITS.items() if key in known}
     for problem in problems:
-        # with a limit and without: what looks at the clock is asked to look
+        # with and without a time limit: kernels that check the time take another path
         for limit in (None, 1e3):
             with contextlib.suppress(InfeasibleError):
                 assign(problem, name, time_limit=limit, **limits)
-            # what was prepared is made anew
+            # a copy, so that it is prepared anew
             problem._prepared = None
 
 
 def _problems() -> list[AssignmentProblem]:
-    """Problems of random costs with dummies, an axial one, an easy one of two sensors, and an empty one."""
+    """Problems with random costs and dummies, an axial one, an easy one of two sensors, and an empty one."""
     rng = np.random.default_rng(1)
     dense = _random_problem(rng, _ROWS, _TUPLES)
     axial = AssignmentProblem.from_dense(rng.integers(0, 30, size=(11, 11, 11)).astype(float), dummy=False)
@@ -173,7 +173,7 @@ def _problems() -> list[AssignmentProblem]:
 
 
 def _small_problem() -> AssignmentProblem:
-    """A problem that is not closed by its bound, and too small for dives in the linear program."""
+    """A problem that its bound does not close, and that is too small for dives in the linear program."""
     return _random_problem(np.random.default_rng(2), 8, 150)
 
 

@@ -1,4 +1,4 @@
-"""What one cycle leaves: the pheromone, visibility and probability of every node that the ants know."""
+"""State of a colony after a cycle: pheromone, visibility and probability of every node."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Cycle(NamedTuple):
     Attributes
     ----------
     number : int
-        Of the cycle, from 1; mode mmas counts for each component.
+        Number of the cycle, from 1; mode mmas counts for each component.
     columns : int array, shape (n,)
         Columns of the packing that are nodes of this colony.
     rows : int array, shape (r,)
-        Rows of the packing whose staying uncovered is a node; the last r nodes.
+        Rows of the packing that may stay uncovered, as nodes; these are the last r nodes.
     pheromone, visibility, probability : float arrays, shape (n + r,)
-        tau_j, eta_j, and p_j of eq. 8, of the first ant of the next cycle (unless something better is found in between,
-        which makes ants stricter). Mode paper: where all nodes are allowed. Mode mmas: at a row of which all columns
-        still fit; of a column the mean over its rows.
+        tau_j, eta_j, and p_j of eq. 8, for the first ant of the next cycle (a better solution found in between makes
+        ants stricter). Mode paper: while all nodes are allowed. Mode mmas: at a row whose columns all still fit; for a
+        column the mean over its rows.
     tuples : int32 array, shape (n + r, S), or None
-        The tuple of the problem that each node is, as ``assign`` tells it; solvers do not know.
+        The tuple of each node, set by ``assign``; None inside solvers, which know only columns.
     """
 
     number: int
@@ -55,16 +55,16 @@ def tuples_of(
     Parameters
     ----------
     tuples : int32 array, shape (M, S)
-        Of the problem from which the packing was made.
+        Tuples of the problem from which the packing was made.
     sizes : int array, shape (S,)
-        Measurements of each of its sensors.
+        Number of measurements of each sensor.
     packing : Packing
     columns, rows : int arrays
-        Columns, and rows that stay uncovered: false alarms.
+        Columns, and rows that stay uncovered (false alarms).
     """
     starts = np.cumsum(sizes) - sizes
     through = packing.row_origin[rows]
-    # sensors without measurements start where the next one does
+    # a sensor without measurements starts at the same index as the next sensor
     sensor = np.searchsorted(starts, through, side="right") - 1
     alone = np.zeros((rows.size, sizes.size), dtype=np.int32)
     alone[np.arange(rows.size), sensor] = through - starts[sensor] + 1
@@ -78,7 +78,7 @@ def cycle_of(whole: Packing, component: Component, colony: Colony) -> Cycle:
     row_of = np.full(packing.num_rows, -1, dtype=np.int64)
     row_of[packing.cols[used]] = whole.cols[component.origin][used]
     free = np.flatnonzero(packing.slack & (row_of >= 0))
-    # a column adds its reduced cost to the bound, a row that stays uncovered its multiplier's negative
+    # a column adds its reduced cost to the bound, an uncovered row minus its multiplier
     seen = np.exp(-component.reduced / component.temperature)
     seen_alone = np.where(packing.slack, np.exp(np.minimum(component.duals, 0.0) / component.temperature), 0.0)
     value = colony.pheromone**parameters.alpha * seen**parameters.beta

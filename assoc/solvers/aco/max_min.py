@@ -3,17 +3,17 @@
 An ant visits the rows in random order. For a row that is still uncovered it chooses among the columns that
 fit, and staying uncovered where the row has slack, with the probability of eq. 8 of the ant colony paper,
 
-    p_j = tau_j^alpha eta_j^beta / sum over what is allowed,    eta_j = exp(-rc_j / T)
+    p_j = tau_j^alpha eta_j^beta / sum over the allowed choices,    eta_j = exp(-rc_j / T)
 
-The visibility eta is that of the reduced cost rc_j: what choosing j adds to the lower bound; T halves from
-ant to ant over a range of 500. Pheromone lies
-between tau_min and 1 (hyper-cube form of eq. 9: tau <- rho tau + (1 - rho) [j in the best]) and starts at 1.
+The visibility eta uses the reduced cost rc_j, which is what choosing j adds to the lower bound. T is halved from ant to
+ant, over a range of 500. Pheromone lies between tau_min and 1 and starts at 1 (hyper-cube form of eq. 9:
+tau <- rho tau + (1 - rho) [j in the best]).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from assoc.solvers.aco.parameters import AcoParameters
 
 
-# cycles without improvement until the pheromone is laid anew
+# cycles without improvement after which the pheromone is reset
 _RENEWAL = 15
 
 
 class Colony:
-    """The pheromone of one component and the ants that walk on it."""
+    """The pheromone of one component and its ants."""
 
     def __init__(
         self,
@@ -44,10 +44,10 @@ class Colony:
         self._tell = tell
         self.pheromone = np.ones(component.packing.num_columns)
         self.slack_pheromone = np.ones(component.packing.num_rows)
-        # a tuple chosen nowhere keeps a chance of about 1 / (2 n) against all n rivals of a row together
+        # an unchosen tuple keeps a chance of about 1 / (2 n) against all n rivals of a row together
         degree = component.packing.row_cols.size / max(component.packing.num_rows, 1)
         self.lowest = 1.0 / (2.0 * max(degree, 1.0))
-        # the best since the pheromone was laid anew
+        # the best solution since the pheromone was reset
         self.recent: NDArray[np.int32] | None = None
         self.least = np.inf
         self.dives = 0
@@ -60,7 +60,7 @@ class Colony:
         """One cycle: all ants walk, the best is improved, the pheromone evaporates and is laid."""
         packing, p = component.packing, self.parameters
         if component.best is not None and component.weight < min(self.known, self.least) - component.tolerance:
-            # found by others since the last cycle: by refinement, or by another worker
+            # a better solution came from refinement or another worker since the last cycle
             self.recent, self.least = component.best.copy(), component.weight
         trail = Trail(self.pheromone, self.slack_pheromone, float(p.alpha), float(p.beta), component.temperature)
         inserts, deadline = component.inserts, component.deadline
@@ -90,7 +90,7 @@ class Colony:
 
 
 @njit
-def _update(pheromone: Floats, slack_pheromone: Floats, owner: Any, share: float, lowest: float) -> None:
+def _update(pheromone: Floats, slack_pheromone: Floats, owner: NDArray[np.int32], share: float, lowest: float) -> None:
     """Eq. 9 in hyper-cube form with max-min limits."""
     for j in range(pheromone.size):
         pheromone[j] *= 1.0 - share
@@ -98,7 +98,7 @@ def _update(pheromone: Floats, slack_pheromone: Floats, owner: Any, share: float
         j = owner[r]
         slack_pheromone[r] *= 1.0 - share
         if j >= 0:
-            # a column is met once for each of its rows: setting, not adding
+            # set, not added: the loop meets a column once for each of its rows
             pheromone[j] = -abs(pheromone[j])
         else:
             slack_pheromone[r] += share

@@ -1,19 +1,19 @@
 """The ant colony of the paper, equations 7 to 11 to the letter.
 
-Nodes are the tuples, false alarms among them. In the first cycle each ant starts on a random different node
-and goes on to the allowed node of largest visibility eta = 1 / c (eq. 7). In later cycles an ant starts on a
-node of its own previous tour and draws the next node by eq. 8. A tour ends when no node is allowed; then
-pheromone evaporates and is laid, 1 / L_k on each node of ant k's tour (eqs. 9-11); it starts equal to the
+Nodes are the tuples, false alarms among them. In the first cycle each ant starts on a different random node
+and moves to the allowed node of largest visibility eta = 1 / c (eq. 7). In later cycles an ant starts on a
+node of its own previous tour and draws the next node by eq. 8. A tour ends when no node is allowed. Then
+pheromone evaporates, and ant k lays 1 / L_k on each node of its tour (eqs. 9-11). Pheromone starts equal to the
 visibility. The search ends when all ants have walked the same tour.
 
-Eq. 7 needs positive costs, and eq. 5 gives negative ones: c is replaced by an order-keeping positive
-transform, which the parameter ``visibility`` selects; L_k is the sum of the transformed costs of a tour.
-Costs count from the false alarms: tuples that cost no less than their singletons are not nodes.
+Eq. 7 needs positive costs, but eq. 5 also gives negative ones: c is replaced by a positive transform that keeps the
+order, selected by the parameter ``visibility``; L_k is the sum of the transformed costs of a tour.
+Costs are relative to the false alarms: tuples that cost no less than their singletons are not nodes.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +58,7 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     while cycle < parameters.iterations:
         if cycle > 0:
             if not lengths.all():
-                # time was over before every ant had walked
+                # the time limit came before every ant had walked
                 break
             starts = tours[np.arange(parameters.ants), run.rng.integers(0, lengths)].astype(np.int64)
         probability = pheromone**parameters.alpha * visibility**parameters.beta  # numerator of eq. 8
@@ -89,25 +89,25 @@ def solve_as_in_the_paper(packing: Packing, parameters: AcoParameters, run: Run)
     bound, duals = bound_of_choice(packing, best, run)
     run.record(cycle, float(packing.weights[best].sum()), bound)
     if cut_off:
-        # said only now: a run that is stopped does not raise its bound
+        # reported only now: a run that is stopped does not raise its bound
         run.stopped_by = run.stopped_by or "iterations"
     return Outcome(best, cycle, bound, duals)
 
 
 def false_alarms(packing: Packing) -> NDArray[np.int64]:
-    """Rows that may be false alarms: none without dummies, where rows that stay uncovered are no choice of an ant."""
+    """Rows that may be false alarms: none without dummies, where ants cannot choose to leave rows uncovered."""
     return np.zeros(0, dtype=np.int64) if packing.is_axial else np.arange(packing.num_rows)
 
 
 def nodes_of(packing: Packing, alone: NDArray[np.int64]) -> tuple[NDArray[np.int32], Floats]:
-    """Rows of the nodes, first the packing's columns, then those of one row alone; their costs."""
+    """Rows of the nodes, first the packing's columns, then the single rows; and their costs."""
     singles = np.full((alone.size, packing.cols.shape[1]), -1, dtype=np.int32)
     singles[:, 0] = alone
     return np.concatenate([packing.cols, singles]), np.concatenate([packing.weights, np.zeros(alone.size)])
 
 
 def transformed(costs: Floats, kind: str, scale: float) -> Floats:
-    """Return positive costs in the same order, for eq. 7.
+    """Return the costs as positive numbers in the same order, for eq. 7.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
         ``kind="reciprocal"`` and a cost is not positive.
     """
     if kind == "exponential":
-        # beyond e^600 differences of visibility no longer matter but powers of it would overflow
+        # beyond e^600 differences of visibility no longer matter, but its powers would overflow
         return np.exp(np.minimum((costs - costs.min()) / scale, 150.0))
     if kind == "shifted":
         return costs - costs.min() + scale
@@ -125,7 +125,7 @@ def transformed(costs: Floats, kind: str, scale: float) -> Floats:
 
 
 @njit
-def _weights(costs: Floats, tours: Any, lengths: Any) -> Floats:
+def _weights(costs: Floats, tours: NDArray[np.int32], lengths: NDArray[np.int64]) -> Floats:
     """Sum of the costs of each ant's tour."""
     weights = np.zeros(lengths.size)
     for k in range(lengths.size):
@@ -136,11 +136,18 @@ def _weights(costs: Floats, tours: Any, lengths: Any) -> Floats:
 
 @njit
 def _cycle(
-    nodes: Any, value: Floats, greedy: bool, starts: Any, tours: Any, lengths: Any, rng: Any, deadline: float
-) -> Any:
-    """Walk all ants' tours; the owner (node) of each row for each ant.
+    nodes: NDArray[np.int32],
+    value: Floats,
+    greedy: bool,
+    starts: NDArray[np.int64],
+    tours: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+    rng: np.random.Generator,
+    deadline: float,
+) -> NDArray[np.int32]:
+    """Walk all ants' tours; returns the owner (node) of each row for each ant.
 
-    Ants that would start after the deadline do not walk.
+    Ants do not start after the deadline.
     """
     num, num_sensors = nodes.shape
     num_ants, num_rows = tours.shape
@@ -196,7 +203,7 @@ def _cycle(
 
 
 @njit
-def _lay(pheromone: Floats, positive: Floats, tours: Any, lengths: Any, rho: float) -> None:
+def _lay(pheromone: Floats, positive: Floats, tours: NDArray[np.int32], lengths: NDArray[np.int64], rho: float) -> None:
     """Eqs. 9-11."""
     for j in range(pheromone.size):
         pheromone[j] *= rho

@@ -13,10 +13,10 @@ TRANSFORMS = ("exponential", "shifted", "reciprocal")
 
 @dataclass(frozen=True)
 class AcoParameters(SearchParameters):
-    """Parameters of the ant colony; the names are the paper's.
+    """Parameters of the ant colony, named as in the paper.
 
-    Those of `SearchParameters` are for mode mmas, but for ``iterations``: mode paper is the published rule alone, on
-    the whole problem.
+    Those of `SearchParameters` apply to mode mmas, except ``iterations``, which applies to both. Mode paper is the
+    published rule alone, on the whole problem.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class AcoParameters(SearchParameters):
     ants : int
         Ants in a cycle; 15 in the paper.
     divers : int
-        Mode mmas with refinement "full": further ants of each cycle, which build their covers in the linear program.
+        Mode mmas with refinement "full": additional ants of each cycle, which build covers in the linear program.
     alpha, beta : float
         Exponents of pheromone and visibility in eq. 8; 2 and 1 in the paper.
     rho : float
@@ -59,7 +59,7 @@ class AcoParameters(SearchParameters):
         self._number("scale", above=0.0)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """In mode paper: the ants' tours, and the owners of rows from which they are made."""
+        """Mode paper: the ants' tours, and the owners of rows from which they are made."""
         if self.mode != "paper":
             return super().memory(num_columns, num_rows)
         return 8.0 * self.ants * num_rows, f"ants = {self.ants} on {num_rows} measurements", "take fewer ants"

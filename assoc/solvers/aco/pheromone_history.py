@@ -1,4 +1,4 @@
-"""The pheromone of the ant colony cycle by cycle, for those who want to see it at work."""
+"""The pheromone of the ant colony after each cycle."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from assoc.solvers.assign import assign
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PheromoneHistory(Shown):
-    """What the ants left on the nodes, and how they saw them.
+    """Pheromone, visibility and probability of all nodes after each cycle.
 
     Attributes
     ----------
     cycles : int array (K,)
-        Numbers of the cycles, from 1. Mode mmas counts the cycles of each component: a component that was done earlier
+        Numbers of the cycles, from 1. Mode mmas counts the cycles of each component: a component that ended earlier
         keeps its last values.
     pheromone, visibility, probability : arrays (K, N)
-        tau_j, eta_j and p_j of eq. 8 after each cycle (`Cycle`). NaN where no ant has walked: mode mmas leaves a
-        component that its bound proves at once.
+        tau_j, eta_j and p_j of eq. 8 after each cycle (`Cycle`). NaN where no ant has walked: mode mmas skips a
+        component that its bound closes at once.
     tuples : int32 array (N, S)
-        The tuple that a node is; false alarms are the tuples with one measurement. What cannot be chosen or left
-        is no node: tuples dearer than their false alarms, and measurements that no tuple holds.
+        The tuple of each node; false alarms are the tuples with one measurement. Tuples that cost more than their
+        false alarms, and measurements in no tuple, are not nodes: there is nothing to choose.
     costs : array (N,)
-        Their costs, counted from the false alarms.
+        Costs of the tuples less those of their false alarms.
     chosen : bool array (N,)
-        Whether the node is in the best solution found.
+        Whether the node is in the best solution.
     solution : Solution
-        What ``assign`` returns.
+        The result of ``assign``.
     """
 
     cycles: NDArray[np.int64]
@@ -59,7 +59,7 @@ class PheromoneHistory(Shown):
         return f"PheromoneHistory({len(self.cycles)} cycles, {len(self.tuples)} tuples, {self.solution!r})"
 
     def top(self, nodes: int) -> PheromoneHistory:
-        """Return the history of so many nodes: what was chosen, then what has the most pheromone in the end."""
+        """Return the history of ``nodes`` nodes: chosen ones first, then those with the most pheromone at the end."""
         last = self.pheromone[-1] if len(self.pheromone) else np.zeros(len(self.tuples))
         kept = np.lexsort((-np.nan_to_num(last), ~self.chosen))[:nodes]
         return PheromoneHistory(
@@ -93,7 +93,7 @@ def pheromone(
         As in ``assoc.assign``; the search is that of ``assign(problem, "aco", ...)``. With several ``workers`` the
         first one's colony is shown.
     **parameters
-        Of ``aco``, ``mode`` among them.
+        Parameters of ``aco``, ``mode`` among them.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def pheromone(
     InfeasibleError
         The problem (without dummies) has no solution.
     LimitExceededError
-        The cycles take more memory than there is.
+        The cycles take more memory than is available.
     """
     kept: list[Cycle] = []
 
@@ -120,12 +120,12 @@ def pheromone(
 
     solution = assign(problem, "aco", seed=seed, time_limit=time_limit, callback=callback, watch=keep, **parameters)
     packing = prepare(problem).packing
-    # what is a node in no cycle is none
+    # leave out nodes that are in no cycle
     alone = false_alarms(packing) if parameters.get("mode") == "paper" else np.flatnonzero(packing.slack)
     _, costs = nodes_of(packing, alone)
     tuples = tuples_of(problem.tuples, problem.sizes, packing, np.arange(packing.num_columns), alone)
     chosen = {tuple(row) for row in solution.tuples.tolist()}
-    cycles = 1 + np.arange(max((one.number for one in kept), default=0))
+    cycles = 1 + np.arange(max((cycle.number for cycle in kept), default=0))
     states = _by_cycle(kept, packing, alone, len(cycles))
     best = np.array([tuple(row) in chosen for row in tuples.tolist()], dtype=np.bool_)
     return PheromoneHistory(cycles, states[0], states[1], states[2], tuples, costs, best, solution)
@@ -133,14 +133,14 @@ def pheromone(
 
 def _by_cycle(kept: list[Cycle], packing: Packing, alone: NDArray[np.int64], count: int) -> Floats:
     """Pheromone, visibility and probability of all nodes after each cycle, shape (3, K, N)."""
-    place = np.full(packing.num_rows, -1, dtype=np.int64)
-    place[alone] = packing.num_columns + np.arange(alone.size)
+    node_of_row = np.full(packing.num_rows, -1, dtype=np.int64)
+    node_of_row[alone] = packing.num_columns + np.arange(alone.size)
     num = packing.num_columns + alone.size
     states = np.full((3, count, num), np.nan)
-    for one in kept:
-        nodes = np.concatenate([one.columns, place[one.rows]])
-        states[:, one.number - 1, nodes] = np.stack([one.pheromone, one.visibility, one.probability])
+    for cycle in kept:
+        nodes = np.concatenate([cycle.columns, node_of_row[cycle.rows]])
+        states[:, cycle.number - 1, nodes] = np.stack([cycle.pheromone, cycle.visibility, cycle.probability])
     for k in range(1, count):
-        # what had no cycle of this number is as it was
+        # components without a cycle of this number keep their values
         states[:, k] = np.where(np.isnan(states[:, k]), states[:, k - 1], states[:, k])
     return states

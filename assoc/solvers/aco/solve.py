@@ -24,8 +24,8 @@ def solve(packing: Packing, parameters: AcoParameters, run: Run) -> Outcome:
     if parameters.mode == "paper":
         return solve_as_in_the_paper(packing, parameters, run)
 
-    def tell(component: Component, colony: Colony) -> None:
+    def report(component: Component, colony: Colony) -> None:
         if run.watch is not None and component.worker == 0:
             run.watch(cycle_of(packing, component, colony))
 
-    return search_components(lambda component, rng: Colony(component, parameters, tell), packing, run, parameters)
+    return search_components(lambda component, rng: Colony(component, parameters, report), packing, run, parameters)

@@ -14,11 +14,11 @@ class ExactParameters(Parameters):
     Attributes
     ----------
     nodes : int
-        Nodes of branch and bound at the most; what is then open keeps its gap.
+        Most nodes of branch and bound; components that are open then keep their gap.
     patience : int
-        Iterations of tabu search and breeding without improvement on an open component of 150 measurements and more,
-        for every 60 of them, before branching starts. While it is branched on, one more iteration follows every three
-        turns, and less often, down to every 30 turns, where they bring nothing. Smaller components are branched on
+        Iterations of tabu search and breeding without improvement before branching starts, on an open component of 150
+        measurements and more, for every 60 of them. During branching one more iteration follows every three
+        turns, and less often, down to every 30 turns, if they bring nothing. Smaller components are branched on
         alone for a hundred turns.
     """
 

@@ -1,10 +1,10 @@
 """Dual ascent, rounding and reduced-cost fixing in turn, on all components at once.
 
 At each temperature of the dual ascent (dual_ascent.py) the columns of smallest reduced cost are rounded to a
-cover. Between its weight and the bound lies each component's gap: columns with a larger reduced cost cannot
+cover. The gap of each component lies between its weight and the bound: columns with a larger reduced cost cannot
 be in a better solution and are dropped, rows without columns go with them, and components whose gap is
-closed are done. Most components of a gated scene never need more than this. The whole course is one kernel,
-which comes back now and then for a look at the clock.
+closed are done. Most components of a gated scene need no more than this. The whole course is one kernel,
+which returns regularly so that Python can check the time.
 """
 
 from __future__ import annotations
@@ -39,71 +39,71 @@ from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_ejec
 from assoc.packing.packing import Packing, PackingArrays, assembled, find
 from assoc.packing.run import Run
 
-# passes at one temperature; the last temperatures get more, because by then few columns are left
+# passes at one temperature; the last temperatures get more, because few columns are left by then
 _PASSES = np.array([7, 10, 10, 20, 30, 60, 60, 100, 200, 200, 200])
-# visits of columns between two looks at the clock: about ten milliseconds
+# visits of columns between two checks of the time: about ten milliseconds
 _VISITS = 3_000_000
-# classes of reduced cost, by which columns are sorted before rounding
+# classes of reduced cost into which columns are sorted before rounding
 _CLASSES = 256
-# elements up to which a call may be interpreted: a problem of the usual number and the state of the reduction
+# elements up to which a call may be interpreted: a problem of the usual size and the state of the reduction
 _SMALL = 8000
 
 
 class _State(NamedTuple):
-    """What is still open: its packing, and where that comes from in the whole.
+    """The open part: its packing, and the origin of its columns and rows.
 
     Attributes
     ----------
     packing : PackingArrays
     origin, rows : int32 arrays, shapes (N,) and (R,)
-        Columns and rows of the whole.
+        Indices of columns and rows in the whole packing.
     smooth, hard : float arrays, shape (R,)
         Multipliers of the smoothed ascent, and the feasible ones of the best bounds.
     owner : int32 array, shape (R,)
         The best cover of each component that has one.
     weight, bound, temperature : float arrays, shape (C,)
-        Of each component: weight of its best cover (``inf``: none), best bound, temperature.
+        For each component: weight of its best cover (``inf``: none), best bound, temperature.
     """
 
     packing: PackingArrays
-    origin: Any
-    rows: Any
-    smooth: Any
-    hard: Any
-    owner: Any
-    weight: Any
-    bound: Any
-    temperature: Any
+    origin: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    smooth: Floats
+    hard: Floats
+    owner: NDArray[np.int32]
+    weight: Floats
+    bound: Floats
+    temperature: Floats
 
 
 class _Closed(NamedTuple):
-    """What is done, filled as it comes.
+    """The closed part, filled step by step.
 
     Attributes
     ----------
     counts : int64 array, shape (3,)
         Temperatures done, closed columns, closed components.
     columns : int64 array
-        Optimal columns of the whole.
+        Optimal columns, as indices in the whole packing.
     values : float array, shape (R, 2)
         Bound and weight of each closed component.
     proof : float array, shape (R,)
-        Multipliers of all rows of the whole.
+        Multipliers of all rows of the whole packing.
     """
 
-    counts: Any
-    columns: Any
-    values: Any
-    proof: Any
+    counts: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Floats
+    proof: Floats
 
 
 class _Incumbent(NamedTuple):
     """Best bounds and covers: ``bound`` (C,), ``duals`` (R,), ``owner`` (R,), ``weight`` (C,)."""
 
-    bound: Any
-    duals: Any
-    owner: Any
-    weight: Any
+    bound: Floats
+    duals: Floats
+    owner: NDArray[np.int32]
+    weight: Floats
 
 
 class Reduction:
@@ -112,7 +112,7 @@ class Reduction:
     Attributes
     ----------
     closed_columns : list of int arrays
-        Optimal columns of the components that are done, as columns of the packing given at the start.
+        Optimal columns of the closed components, as columns of the packing given at the start.
     closed_bound, closed_weight : float
         Sum of their bounds and of their weights.
     """
@@ -127,11 +127,11 @@ class Reduction:
 
     @property
     def proof(self) -> Floats | None:
-        """Multipliers of all rows that alone prove ``closed_bound``; None where dropping columns was part of it.
+        """Multipliers of all rows that alone prove ``closed_bound``; None where the proof also needs dropped columns.
 
-        Columns are dropped by the multipliers of the moment. Those found later, for the rows and columns that
-        are left, may give a dropped column a negative reduced cost; passes over the whole problem mend that,
-        on small problems mostly without loss.
+        Columns are dropped by the multipliers of that moment. Later multipliers, of the rows and columns that are
+        left, may give a dropped column a negative reduced cost; passes over the whole problem repair that, mostly
+        without loss on small problems.
         """
         duals = self._proof.copy()
         hard_sweeps(self._whole.arrays, duals, np.empty(self._whole.num_columns), 2)
@@ -139,7 +139,7 @@ class Reduction:
         return duals if loss <= TOLERANCE * max(1.0, abs(self.closed_bound)) else None
 
     def reduce(self) -> list[Component]:
-        """Run through all temperatures; return the components that are still open."""
+        """Go through all temperatures; return the components that are still open."""
         num, granularity = self._whole.num_rows, self._whole.granularity
         counts = np.zeros(3, dtype=np.int64)
         closed = _Closed(counts, np.empty(num, dtype=np.int64), np.empty((num, 2)), self._proof)
@@ -152,7 +152,7 @@ class Reduction:
         return self._open_components(state) if state else []
 
     def _beginning(self) -> _State:
-        """The whole with its incumbents; the first call of the kernel fills in multipliers and temperatures."""
+        """The whole packing with its incumbents; the kernel's first call fills in multipliers and temperatures."""
         num, rows, components = self._whole.num_columns, self._whole.num_rows, self._whole.num_components
         owner, weight = self._incumbents()
         return _State(
@@ -168,7 +168,7 @@ class Reduction:
         )
 
     def _incumbents(self) -> tuple[NDArray[np.int32], Floats]:
-        """What is known, for the components that it covers as they must be: the column of each row, and weights."""
+        """The known cover, for the components that it covers completely: the column of each row, and weights."""
         whole = self._whole
         if self._run.start is None:
             return np.full(whole.num_rows, -1, dtype=np.int32), np.full(whole.num_components, np.inf)
@@ -194,17 +194,17 @@ class Reduction:
 
 
 def _state(arrays: Any) -> _State | None:
-    """The state of the arrays that a kernel returns."""
+    """Make a state of the arrays that a kernel returns."""
     count = len(PackingArrays._fields)
     return None if arrays is None else _State(PackingArrays(*arrays[:count]), *arrays[count:])
 
 
 @partial(njit, small=_SMALL)
 def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -> Any:
-    """Go through temperatures, from the first where none is done, until none is left or the visits are used up.
+    """Go through the temperatures, from the first or from where the last call stopped, until the visits are used up.
 
-    Returns the arrays of the new state, in its order; None: nothing is open. A plain tuple: where Ctrl-C comes while a
-    result is converted, numba calls a record's class without having found it, and the process dies.
+    Returns the arrays of the new state in order; None if nothing is open. They are a plain tuple: if Ctrl-C comes while
+    a result is converted, numba calls a record's class before it has found it, and the process crashes.
     """
     packing, origin, rows, smooth, hard, owner, weight, bound, temperature = state
     counts, closed_columns, closed, proof = done
@@ -220,7 +220,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         updated, reduced = np.empty(num), np.empty(num)
         point = SmoothPoint(smooth, updated, np.empty(num), np.empty(num_rows))
         visits += smooth_passes(packing, point, temperature, _PASSES[counts[0]], deadline)
-        # the first cover and the first bound are worth being late for
+        # the first cover and the first bound are worth being late
         if counts[0] > 0 and is_over(deadline):
             break
         duals = smooth.copy()
@@ -236,7 +236,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         kept = 0
         for j in range(keep.size):
             kept += keep[j]
-        # assembling anew pays when much is gone; till then what is closed is closed again at every temperature
+        # rebuilding pays off when much is gone; until then closed components are closed again at every temperature
         if 3 * kept >= 2 * keep.size and counts[0] < _PASSES.size:
             continue
         row_start = packing.row_start
@@ -249,10 +249,10 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
                     if j >= 0 and first_row(packing.cols, j) == r:
                         closed_columns[counts[1]] = origin[j]
                         counts[1] += 1
-        # a dropped row's multiplier stays part of the proof: rows can only leave with all their columns
+        # a dropped row's multiplier stays part of the proof: rows leave only with all their columns
         for r in range(rows.size):
             proof[rows[r]] = hard[r]
-        # number by number here and below: numba compiles every ``values[places]`` anew
+        # element by element here and below: numba compiles every ``values[places]`` anew
         num_sensors = packing.cols.shape[1]
         chosen, place = np.empty(kept, np.int32), np.full(keep.size, -1, np.int32)
         cols_kept, weights_kept = np.empty((kept, num_sensors), np.int32), np.empty(kept)
@@ -263,7 +263,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
                 for s in range(num_sensors):
                     cols_kept[kept, s] = packing.cols[j, s]
                 kept += 1
-        # rows without slack of components that are done have been covered: they leave as rows with slack do
+        # rows without slack in closed components have been covered: they leave as rows with slack do
         free = packing.slack.copy()
         parent = np.empty(num_rows, np.int32)
         for c in range(alive.size):
@@ -278,7 +278,7 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
         for j in range(column.size):
             place[column[j]] = j
             new_origin[j] = origin[column[j]]
-        # what a component falls into starts from the same cover and the same multipliers
+        # the parts of a component start from the same cover and the same multipliers
         new_owner, new_rows = np.empty(row.size, np.int32), np.empty(row.size, np.int32)
         new_smooth, new_hard = np.empty(row.size), np.empty(row.size)
         for r in range(row.size):
@@ -306,10 +306,10 @@ def _reduce(state: _State, done: _Closed, granularity: float, deadline: float) -
 
 
 @inner_njit
-def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadline: float) -> Any:
-    """A cover from the columns of small reduced cost, improved by insertion."""
+def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadline: float) -> NDArray[np.int32]:
+    """Build a cover from the columns of small reduced cost, and improve it by insertion."""
     weights, slack, col_start = packing.weights, packing.slack, packing.col_start
-    # sorted by counting: classes of 1/64 temperature are fine enough, and ties stay in their order
+    # counting sort: classes of 1/64 temperature are fine enough, and ties stay in order
     which = np.full(weights.size, _CLASSES, np.int32)
     start = np.zeros(_CLASSES + 1, np.int64)
     for c in range(temperature.size):
@@ -354,7 +354,7 @@ def _round(packing: PackingArrays, reduced: Floats, temperature: Floats, deadlin
 
 
 @inner_njit
-def _cover_weights(packing: PackingArrays, owner: Any) -> Floats:
+def _cover_weights(packing: PackingArrays, owner: NDArray[np.int32]) -> Floats:
     """Weight of the chosen columns of each component."""
     cols, weights, row_start = packing.cols, packing.weights, packing.row_start
     result = np.zeros(row_start.size - 1)
@@ -368,11 +368,18 @@ def _cover_weights(packing: PackingArrays, owner: Any) -> Floats:
 
 @njit
 def best_of_both(
-    cols: Any, weights: Floats, top: int, end: int, owner: Any, other: Any, parent: Any, gain: Floats
-) -> float:  # fmt: skip
-    """Take over from another complete cover of a component what is lighter there; the weight then.
+    cols: NDArray[np.int32],
+    weights: Floats,
+    top: int,
+    end: int,
+    owner: NDArray[np.int32],
+    other: NDArray[np.int32],
+    parent: NDArray[np.int32],
+    gain: Floats,
+) -> float:
+    """Take over from another complete cover of a component where that is lighter; returns the weight then.
 
-    Where two covers differ, the columns of both fall into groups that share no row: each can be exchanged alone.
+    Where two covers differ, the columns of both form groups that share no row: each can be exchanged alone.
     """
     for r in range(top, end):
         parent[r] = r
@@ -399,8 +406,10 @@ def best_of_both(
 
 
 @inner_njit
-def _compare(packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float) -> Any:
-    """Take over better bounds and covers; the columns worth keeping and the components still open."""
+def _compare(
+    packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced: Floats, granularity: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Take over better bounds and covers; returns which columns to keep and which components are still open."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     col_start, row_start = packing.col_start, packing.row_start
     bound, duals, owner, weight = best
@@ -423,10 +432,10 @@ def _compare(packing: PackingArrays, best: _Incumbent, new: _Incumbent, reduced:
         if new_bound[c] >= bound[c]:
             bound[c] = new_bound[c]
             copy_to(duals[top:end], new_duals[top:end])
-        # whole-numbered weights: what is not better by nearly 1 is not better
+        # where weights are whole numbers, a better solution is better by at least 1
         step = 0.999 * granularity
         gap = weight[c] - new_bound[c] - step
-        # the saved bound and multipliers may be better than these; either is a proof
+        # the saved bound and multipliers may be better than the new ones; either is a proof
         if weight[c] - bound[c] <= max(TOLERANCE * max(1.0, abs(bound[c])), step):
             alive[c] = False
             if granularity > 0.0:

@@ -1,4 +1,4 @@
-"""The exact solver's course: reduce, improve, fix, and search the open components in turns until all are proved."""
+"""The exact solver's course: reduce, improve, fix, and search the open components in turn until all are proved."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from assoc.solvers.genetic.population import Breeding
 from assoc.solvers.tabu.moves import TabuSearch
 from assoc.solvers.tabu.parameters import TabuParameters
 
-# rows from which tabu search and breeding pay beside the branching from the start: its passes need no good incumbent.
-# Elsewhere they join it after so many turns, about a second: who stops a long search wants a good incumbent
+# rows from which tabu search and breeding run from the start: below, branching closes most gaps without a good
+# incumbent, and they join it only after `_ALONE` turns (about a second), for users who stop a long search
 _LARGE = 150
 _ALONE = 100
-# turns of branching between their iterations
+# turns of branching between iterations of metaheuristics
 _TURNS = 3
 # columns up to which a component is branched on before anything else, and for how many nodes
 _SMALL = 2000
 _SHORT = 20
-# columns from which a problem may be hard enough for its branching to be compiled beforehand
+# columns from which a problem may be so hard that its branching should be compiled in advance
 _HARD = 500
-# columns for each row from which it surely is
+# columns per row from which it certainly is
 _DENSE = 15
 
 
@@ -48,19 +48,19 @@ class _Searches(Turns):
 
 @dataclass(slots=True)
 class _Task:
-    """A component: improved by metaheuristics where it is large, then branched on."""
+    """A component: improved by metaheuristics if it is large, then branched on."""
 
     component: Component
     all: _Searches
     branching: Branching | None = None
     heuristics: tuple[TabuSearch, Breeding] | None = None
     improvements: int = 0
-    # of branching: since the last iteration of a metaheuristic, and in all
+    # turns of branching: since the last iteration of a metaheuristic, and in all
     turns: int = 0
     age: int = 0
 
     def turn(self) -> bool:
-        """One iteration of a metaheuristic, or some nodes of branch and bound and now and then an iteration."""
+        """One iteration of a metaheuristic, or some nodes of branch and bound and sometimes an iteration."""
         component = self.component
         if not self.all.run.should_stop() and self.all.nodes_left > 0:
             if self._improves:
@@ -69,7 +69,7 @@ class _Task:
             if self.branching is None:
                 self.branching = Branching(component, self.all.run)
                 component.stalled = 0
-            # some ten milliseconds of work between two looks at the clock
+            # some ten milliseconds of work between two checks of the time
             if not self._branch(self.branching, max(1, 20_000 // max(component.packing.num_columns, 1))):
                 self._join()
                 return False
@@ -81,13 +81,13 @@ class _Task:
         return True
 
     def split(self) -> list[_Task]:
-        """Tasks for what the component falls apart into: in one search the nodes of independent components multiply."""
-        # branching should start on as few columns as the incumbent allows
+        """Tasks for the parts of the component: in one search the nodes of independent parts would multiply."""
+        # branching should start with as few columns as the incumbent allows
         share = 0.9 if self.branching is None and not self._improves else 2 / 3
-        return [_Task(one, self.all) for one in split_component(self.component, share) or ()]
+        return [_Task(part, self.all) for part in split_component(self.component, share) or ()]
 
     def branch_shortly(self) -> bool:
-        """Branch at once; whether that was all: a small component is mostly done before its bound could be better."""
+        """Branch at once; returns whether that closed it: small components mostly close before a better bound would."""
         component, nodes = self.component, min(_SHORT, self.all.nodes_left)
         if component.closed or component.packing.num_columns > _SMALL or nodes <= 0 or self.all.run.should_stop():
             return component.closed
@@ -95,20 +95,20 @@ class _Task:
         return self._branch(self.branching, nodes) or component.closed
 
     def _branch(self, branching: Branching, nodes: int) -> bool:
-        """Do some nodes; whether nothing is left to search."""
+        """Search some nodes; returns whether nothing is left to search."""
         self.all.iterations += branching.advance(min(nodes, self.all.nodes_left))
         return branching.search.done
 
     @property
     def _improves(self) -> bool:
-        """Whether the incumbent is to be brought near the optimum before any branching."""
+        """Whether to improve the incumbent before any branching."""
         component, patience = self.component, self.all.patience
-        # small components are branched at once, and without an incumbent there is nothing to improve
+        # small components are branched on at once, and without incumbent there is nothing to improve
         large = self.branching is None and component.best is not None and component.packing.num_rows >= _LARGE
         return large and component.stalled * 60 < patience * component.packing.num_rows
 
     def _join(self) -> None:
-        """Give metaheuristics half the time as long as they improve the incumbent; then less and less."""
+        """Give metaheuristics half the time while they improve the incumbent, then less and less."""
         component = self.component
         self.turns += 1
         self.age += 1
@@ -118,7 +118,7 @@ class _Task:
             self._search_better()
 
     def _search_better(self) -> None:
-        """One iteration of a metaheuristic, and exact sub-steps on the incumbent.
+        """Do one iteration of a metaheuristic, and exact sub-steps on the incumbent.
 
         Tabu search and breeding take turns: they get stuck in different places.
         """
@@ -146,7 +146,7 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
     searches.bounds.append(reduction.closed_bound)
     tasks = [_Task(component, searches) for component in components]
     if tasks:
-        # what is known before the search of hard ones: worth seeing where the search takes long
+        # report what is known before the search of hard components, which may take long
         searches.record(tasks)
     deadline = run.deadline()
     done: list[_Task] = []
@@ -156,7 +156,7 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
         if task.branch_shortly():
             done.append(task)
         else:
-            left.extend(_Task(one, searches) for one in _sharpen(task.component, run))
+            left.extend(_Task(part, searches) for part in _sharpen(task.component, run))
     tasks = done + left
     searches.record(tasks)
     searches.take(tasks)
@@ -168,9 +168,9 @@ def search_to_the_end(packing: Packing, node_limit: int, patience: int, run: Run
 
 
 def _sharpen(component: Component, run: Run) -> list[Component]:
-    """Ascend anew, with time enough at every temperature, on a component that the reduction left open."""
+    """Repeat the dual ascent, with enough time at every temperature, on a component that the reduction left open."""
     if run.should_stop():
-        # one pass over a million columns takes longer than a short limit allows
+        # one pass over a million columns takes longer than a short time limit
         return [component]
     component.take_over(dual_bound(component.packing, run=run))
     if not component.closed and not run.should_stop():

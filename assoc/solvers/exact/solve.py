@@ -1,4 +1,4 @@
-"""Exact: bound, heuristic, reduced-cost fixing, then branch and bound on what is left."""
+"""Exact: bound, heuristic, reduced-cost fixing, then branch and bound on the rest."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from assoc.solution import OPTIMALITY_TOLERANCE
 from assoc.solvers.exact.parameters import ExactParameters
 from assoc.solvers.exact.search import search_to_the_end
 
-# column visits of the search that closes what is left where costs cancel
+# column visits of the search that closes the remaining gap where costs cancel
 _VISITS = 20_000_000
 
 
@@ -26,17 +26,17 @@ def solve(packing: Packing, parameters: ExactParameters, run: Run) -> Outcome:
     Raises
     ------
     InfeasibleError
-        There is no solution (proved), or none was found in the time.
+        There is no solution (proved), or none was found in time.
     """
     outcome = search_to_the_end(packing, parameters.nodes, parameters.patience, run)
     return outcome if run.stopped_by else _where_costs_cancel(packing, outcome, run)
 
 
 def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome:
-    """Close a gap that is small beside the weights but not beside the cost, which is their difference to the offset.
+    """Close a gap that is small relative to the weights but not to the cost, where offset and weights cancel.
 
-    The components were searched to 1e-9 of their weights. The incumbent is the optimum to that already, so that a
-    search which asks for more has little left to do.
+    The components were solved to 1e-9 of their weights, and the incumbent is optimal to that precision. So a search
+    with a smaller tolerance has little left to do.
     """
     last = run.trace[-1]
     wanted = 0.2 * OPTIMALITY_TOLERANCE * max(1.0, abs(last.cost))
@@ -44,7 +44,7 @@ def _where_costs_cancel(packing: Packing, outcome: Outcome, run: Run) -> Outcome
         return outcome
     chosen = packing.weights[outcome.columns]
     weight, size = float(chosen.sum()), float(np.abs(chosen).sum())
-    # a gap that another cause has left open, or that rounding alone would leave, is not closed so
+    # gaps with another cause, or below the rounding error, cannot be closed so
     if weight - outcome.lower_bound >= 1e-8 * size or wanted < 1e-14 * size:
         return outcome
     search = BranchAndBound(packing, dual_bound(packing, run=run), weight, wanted, run.deadline(), run.memory_allows)

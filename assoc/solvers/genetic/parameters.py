@@ -15,11 +15,11 @@ class GeneticParameters(SearchParameters):
     Attributes
     ----------
     population : int
-        Solutions that live at a time.
+        Size of the population.
     offspring : int
         Children in a generation.
     tournament : int
-        A parent is the best of so many drawn at random.
+        A parent is the best of so many members drawn at random.
     """
 
     population: int = field(default=20, metadata={"help": "solutions that live at a time"})
@@ -34,7 +34,7 @@ class GeneticParameters(SearchParameters):
         self._require(good, "tournament", "a whole number from 1 to population")
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """The members in a list, and again as an array, of every worker."""
+        """Memory of the members, as a list and as an array, for every worker."""
         what = f"population = {self.population} on {num_rows} measurements"
         members = 8.0 * self.population * num_rows * self.workers
         threads = super().memory(num_columns, num_rows)

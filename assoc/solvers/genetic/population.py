@@ -1,15 +1,15 @@
 """Crossover that keeps tuples, repair, and survival of the fittest without duplicates.
 
 A child first takes the tuples that both parents have. The other tuples of both are then offered in an order
-drawn by their reduced costs, and taken where they fit; what then lies open is repaired by insertion with ejection
-(insertion.py) and exact sub-steps (cluster.py), or without refinement filled with what fits. A child replaces the
-worst member if it is better and no member costs the same.
+drawn by their reduced costs, and taken where they fit. Open rows are repaired by insertion with ejection
+(insertion.py) and exact sub-steps (cluster.py), or without refinement filled with columns that fit. A child replaces
+the worst member if it is better and no member has the same cost.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class Breeding:
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
         """One generation; the first one fills the population."""
         if component.best is not None and component.weight < self.known - component.tolerance and self.fitness.size:
-            # found by others since: by refinement, or by another worker
+            # a better solution came from refinement or another worker meanwhile
             self._admit(component, component.best.copy(), component.weight)
         self._breed(component, rng)
         self.known = component.weight
@@ -61,13 +61,13 @@ class Breeding:
             owner = component.dive(self.dives, rng)
             self._admit(component, owner, component.settle(owner, rng, self.parameters.clusters))
         for _ in range(self.parameters.offspring):
-            one, two = self._parent(rng), self._parent(rng)
-            owner = self._child(component, one, two, rng)
+            mother, father = self._parent(rng), self._parent(rng)
+            owner = self._child(component, mother, father, rng)
             weight = component.settle(owner, rng, self.parameters.clusters)
             self._admit(component, owner, weight)
             if component.closed or component.late:
                 return
-        # a population that has become one family starts anew, around its best and without it by turns
+        # a population of near copies starts anew, alternately around its best member and without it
         if component.stalled and component.stalled % _RENEWAL == 0:
             keep = int(np.argmin(self.fitness))
             kept = slice(keep, keep + (component.stalled // _RENEWAL) % 2)
@@ -78,7 +78,7 @@ class Breeding:
         members = [*self.members]
         fitness = [*self.fitness]
         if component.best is not None and self.known == np.inf:
-            # a first population, and not one that is to be without it
+            # only in the first population: a later one may be meant to do without it
             members.append(component.best.copy())
             fitness.append(component.weight)
         while len(members) < self.parameters.population:
@@ -87,9 +87,9 @@ class Breeding:
                 owner = component.dive(number, rng)
                 weight = component.settle(owner, rng, self.parameters.clusters)
             else:
-                # random greedy solutions, strict and loose ones by turns
+                # random greedy solutions, from strict to loose
                 owner = component.random_cover(2.0 ** (number % 10), rng)
-                # beside covers from the linear program they are there to be different, not to be good
+                # beside covers from the linear program they provide diversity, not quality
                 weight = component.weight_of(owner) if dives else component.settle(owner, rng, 0)
                 component.offer(owner, weight)
             members.append(owner)
@@ -102,14 +102,14 @@ class Breeding:
         drawn = rng.integers(0, self.fitness.size, size=self.parameters.tournament)
         return int(drawn[np.argmin(self.fitness[drawn])])
 
-    def _child(self, component: Component, one: int, two: int, rng: np.random.Generator) -> NDArray[np.int32]:
-        mother, father = self.members[one], self.members[two]
+    def _child(self, component: Component, first: int, second: int, rng: np.random.Generator) -> NDArray[np.int32]:
+        mother, father = self.members[first], self.members[second]
         owner = _cross(component.arrays, component.reduced, mother, father, component.temperature, rng)
         if component.inserts:
             rows = np.arange(owner.size, dtype=np.int32)
             insert_and_eject(component.arrays, owner, rows, component.deadline)
         else:
-            # what lies open takes what fits, in an order drawn by reduced cost, or no child could gain a tuple
+            # fill open rows with columns that fit, in an order drawn by reduced cost: else no child could gain a tuple
             order = ascending(component.reduced / component.temperature + rng.gumbel(size=component.reduced.size))
             Cover(component.packing, owner).add_greedily(order)
         return np.asarray(owner)
@@ -126,12 +126,12 @@ class Breeding:
 def _cross(
     packing: PackingArrays,
     reduced: Floats,
-    mother: Any,
-    father: Any,
+    mother: NDArray[np.int32],
+    father: NDArray[np.int32],
     temperature: float,
-    rng: Any,
-) -> Any:
-    """A child of two covers: what they share, then what fits of the rest."""
+    rng: np.random.Generator,
+) -> NDArray[np.int32]:
+    """Return a child of two covers: the columns they share, then those of the rest that fit."""
     cols, slack = packing.cols, packing.slack
     num_rows = slack.size
     owner = np.full(num_rows, -1, np.int32)

@@ -1,4 +1,4 @@
-"""Genetic algorithm: solutions are bred, and what parents agree on is kept."""
+"""Genetic algorithm: solutions are bred, and children keep the tuples that their parents share."""
 
 from __future__ import annotations
 

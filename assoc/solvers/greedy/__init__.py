@@ -1,1 +1,1 @@
-"""The cheapest tuple that still fits, again and again."""
+"""Greedy: the cheapest tuple that still fits, again and again."""

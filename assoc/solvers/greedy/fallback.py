@@ -1,6 +1,6 @@
-"""What is returned when time is over and nothing better is known: the greedy choice, made while there is time.
+"""The greedy choice as a fallback at the time limit, made while there is time.
 
-It stands at the doors (assign, kbest, marginals).
+It is used by assign, kbest and marginals.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 from assoc.solvers.greedy.solve import greedy_choice
 
-# of the time that preparing took: about what ends a run takes, a bound and the answer
+# share of the time that preparing took: about what a bound and the answer take at the end of a run
 _RESERVE = 0.25
-# columns from which the choice takes so long that it must be made first, not last: some milliseconds
+# columns from which the greedy choice takes some milliseconds, so that it must be made first and not last
 LARGE = 20_000
 
 
 def prepare_fallback(packing: Packing, run: Run) -> None:
-    """Make the greedy choice first, where a time limit would leave no time for it afterwards."""
+    """Make the greedy choice first, if the time limit would leave no time for it later."""
     if run.time_limit is not None and run.fallback is None and packing.num_columns >= LARGE:
         run.fallback = greedy_choice(packing, run)
         run.reserve = min(_RESERVE * run.runtime(), 0.5 * run.time_limit)
 
 
 def better_of(packing: Packing, columns: NDArray[np.integer], run: Run) -> NDArray[np.integer]:
-    """Return a choice that time has cut short, or the greedy one where that is lighter."""
+    """Return a choice that the time limit has cut short, or the greedy one if it has less weight."""
     greedy = run.fallback
     if greedy is None and packing.num_columns < LARGE:
         greedy = greedy_choice(packing, run)

@@ -1,4 +1,4 @@
-"""Greedy: take the tuple of least cost that is still free, again and again."""
+"""Greedy: take the cheapest tuple that still fits, again and again."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from assoc.packing.run import Outcome, Run
 
 
 def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
-    """Choose columns in order of weight; one iteration is one column looked at.
+    """Choose columns in order of weight; one iteration is one column tried.
 
-    Without dummies the greedy choice can run into a dead end; it is then completed by ejections and, where these do
-    not help, by a search.
+    Without dummies the greedy choice can run into a dead end; it is then completed by ejections or, if these fail, by
+    a search.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def solve(packing: Packing, parameters: Parameters, run: Run) -> Outcome:
 
 
 def greedy_choice(packing: Packing, run: Run) -> NDArray[np.int32] | None:
-    """Return the columns of the greedy choice; None where it ends in a dead end that time does not lead out of."""
+    """Return the columns of the greedy choice; None at a dead end that is not resolved in time."""
     cover = Cover.empty(packing)
     cover.add_greedily(ascending(packing.weights))
     return cover.columns() if cover.complete(run) else None

@@ -1,4 +1,4 @@
-"""Columns arranged for the Lagrangian method, and what its two halves share."""
+"""Columns arranged for the Lagrangian method, and helpers of relaxation and recovery."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from assoc.packing.packing import Packing
 
 
 class Arranged(NamedTuple):
-    """A packing of N columns and R rows, its sensors in order of relaxation, as the kernels take it."""
+    """A packing of N columns and R rows for the kernels, its sensors in order of relaxation."""
 
     cols: NDArray[np.int32]
     """Rows of each column, int32 (N, S), the sensors in order of relaxation."""
@@ -32,7 +32,7 @@ class Arranged(NamedTuple):
 def arrange(packing: Packing) -> Arranged:
     """Arrange a packing.
 
-    Sensors whose measurements must all be used come first, so that the 2-D problem keeps what is hardest.
+    Sensors whose measurements must all be used come first, so that the 2-D problem keeps the hardest constraints.
     """
     arrays = packing.arrays
     cols, sensor, by_pair, group_start = _arrange(arrays.cols, arrays.slack)
@@ -40,8 +40,8 @@ def arrange(packing: Packing) -> Arranged:
 
 
 @njit
-def _arrange(cols: Any, slack: Any) -> Any:
-    """Columns with the sensors in order of relaxation, the sensor of each row, and the columns by pair.
+def _arrange(cols: NDArray[np.int32], slack: NDArray[np.bool_]) -> Any:
+    """Return the columns with sensors in order of relaxation, the sensor of each row, and the columns by pair.
 
     The columns of each group share their rows of the first two sensors; groups come in order of the first row.
     """
@@ -69,7 +69,7 @@ def _arrange(cols: Any, slack: Any) -> Any:
             ordered[j, place[s]] = cols[j, s]
     for r in range(num_rows):
         sensor[r] = place[sensor[r]]
-    # sorted by counting, by the second row and then by the first
+    # counting sort, by the second row and then by the first
     by_pair, other = np.empty(num, np.int64), np.empty(num, np.int64)
     for j in range(num):
         by_pair[j] = j
@@ -97,7 +97,7 @@ def _arrange(cols: Any, slack: Any) -> Any:
 
 
 @inner_njit
-def priced(cols: Any, weights: Floats, duals: Floats, j: int, first: int) -> float:
+def priced(cols: NDArray[np.int32], weights: Floats, duals: Floats, j: int, first: int) -> float:
     """Weight of a column less the multipliers of its rows in sensors from ``first`` on."""
     value = weights[j]
     for s in range(first, cols.shape[1]):
@@ -107,7 +107,7 @@ def priced(cols: Any, weights: Floats, duals: Floats, j: int, first: int) -> flo
 
 
 @inner_njit
-def number_rows(sensor: Any, which: int, local: Any, rows: Any) -> int:
+def number_rows(sensor: NDArray[np.int64], which: int, local: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
     """Number the rows of one sensor."""
     count = 0
     for r in range(sensor.size):
@@ -119,8 +119,8 @@ def number_rows(sensor: Any, which: int, local: Any, rows: Any) -> int:
 
 
 @inner_njit
-def alone_prices(rows: Any, num: int, slack: Any) -> Floats:
-    """Cost of leaving each of these rows out: 0 with slack, infinite without."""
+def alone_prices(rows: NDArray[np.int64], num: int, slack: NDArray[np.bool_]) -> Floats:
+    """Cost of leaving each of these rows uncovered: 0 with slack, infinite without."""
     prices = np.zeros(num)
     for i in range(num):
         if not slack[rows[i]]:
@@ -130,6 +130,6 @@ def alone_prices(rows: Any, num: int, slack: Any) -> Floats:
 
 @inner_njit
 def drop_needless_prices(left: Floats, right: Floats) -> None:
-    """Where all on the left must be matched and both sides are as long, the right needs no price."""
+    """Set the prices on the right to 0 where all on the left must be matched and both sides have the same size."""
     if left.size == right.size and (left.size == 0 or left.min() == np.inf):
         right[:] = 0.0

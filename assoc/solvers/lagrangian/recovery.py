@@ -1,4 +1,4 @@
-"""Up: from the multipliers to a feasible choice of columns, sensor by sensor."""
+"""The recovery: from multipliers to a feasible choice of columns, sensor by sensor."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from assoc.solvers.lagrangian.arranged import Arranged, alone_prices, drop_needl
 
 
 class _Partial(NamedTuple):
-    """The tuples as far as they are built up."""
+    """The partial tuples."""
 
-    of_row: Any
-    """Partial tuple of each row so far, int64 (R,)."""
-    size: Any
-    """Rows of each partial tuple, int64 (R,)."""
-    must: Any
-    """Whether a partial tuple has a row that must be covered, bool (R,)."""
+    of_row: NDArray[np.int64]
+    """Partial tuple of each row so far, (R,)."""
+    size: NDArray[np.int64]
+    """Rows of each partial tuple, (R,)."""
+    must: NDArray[np.bool_]
+    """Whether a partial tuple has a row that must be covered, (R,)."""
 
 
 def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
-    """Return a feasible choice of columns built up sensor by sensor, None where that met a dead end."""
+    """Return a feasible choice of columns built up sensor by sensor; None at a dead end."""
     owner = np.full(duals.size, -1, dtype=np.int32)
     if arranged.cols.shape[1] == 1:
-        # with one sensor there is nothing to assign upward: each row takes its cheapest column
+        # with one sensor there is nothing to assign: each row takes its cheapest column
         order = np.argsort(-arranged.weights, kind="stable")
         owner[arranged.cols[order, 0]] = order
     elif not _recover(arranged, duals, owner):
@@ -39,8 +39,8 @@ def recover(arranged: Arranged, duals: Floats) -> NDArray[np.int32] | None:
 
 
 @inner_njit
-def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
-    """Which partial tuple column j continues: -1 none (it has no row so far), -2 it does not fit."""
+def _prefix(cols: NDArray[np.int32], j: int, stop: int, of_row: NDArray[np.int64], size: NDArray[np.int64]) -> int:
+    """The partial tuple that column j continues: -1 for none (it has no row so far), -2 if it does not fit."""
     found = -1
     members = 0
     for s in range(stop):
@@ -57,7 +57,7 @@ def _prefix(cols: Any, j: int, stop: int, of_row: Any, size: Any) -> int:
 
 @inner_njit
 def _keep_cheapest(indptr: Any, indices: Any, column: Any, costs: Floats, num_right: int) -> None:
-    """Leave one edge for each pair that edges join, the cheapest: dense problems have as many as a sensor has rows."""
+    """Keep only the cheapest edge between two nodes: dense problems have one for each row of a sensor."""
     place = np.full(num_right, -1, np.int64)
     end = first = 0
     for p in range(indptr.size - 1):
@@ -75,7 +75,7 @@ def _keep_cheapest(indptr: Any, indices: Any, column: Any, costs: Floats, num_ri
 
 
 @njit
-def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
+def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> bool:
     """Assign the tuples so far to the next sensor, from the second to the last; False at a dead end."""
     cols, weights, slack, sensor, _, _ = arranged
     num_rows, num_sensors = duals.size, cols.shape[1]
@@ -165,9 +165,9 @@ def _recover(arranged: Arranged, duals: Floats, owner: Any) -> bool:
 
 @inner_njit
 def _grow(arranged: Arranged, partial: _Partial, partner: Any, column: Any, right: Any, level: int) -> int:
-    """Join partial tuples to their partners of the next sensor; returns how many there are then.
+    """Join partial tuples to their partners of the next sensor; returns the number of partial tuples.
 
-    One that is left alone and that no column ends (``column`` is -1) is broken up into its rows.
+    A partial tuple without partner that is no column itself (``column`` is -1) is broken up into its rows.
     """
     slack, sensor = arranged.slack, arranged.sensor
     of_row, size, must = partial

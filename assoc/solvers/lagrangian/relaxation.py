@@ -1,10 +1,9 @@
-"""Down: the constraints of all sensors but two are relaxed, and what remains is a 2-D assignment."""
+"""The relaxation: constraints of all sensors but two are relaxed, and a 2-D assignment remains."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
@@ -27,11 +26,11 @@ def relax(arranged: Arranged, duals: Floats) -> tuple[Floats, Floats] | None:
 
 
 @njit
-def _relax(arranged: Arranged, duals: Any, subgradient: Any) -> bool:
-    """Complete the multipliers by those of the 2-D assignment; False where there is none."""
+def _relax(arranged: Arranged, duals: Floats, subgradient: Floats) -> bool:
+    """Add the multipliers of the 2-D assignment; False where there is no assignment."""
     cols, weights, slack, sensor, by_pair, group_start = arranged
     num_rows, num_sensors = duals.size, cols.shape[1]
-    # columns of the relaxed sensors alone belong to no pair: their multipliers are lowered until none pays
+    # columns with rows of relaxed sensors only belong to no pair: lower their multipliers until none pays
     for g in range(group_start.size - 1):
         j = by_pair[group_start[g]]
         if cols[j, 0] < 0 and (num_sensors < 2 or cols[j, 1] < 0):
@@ -110,8 +109,8 @@ def _relax(arranged: Arranged, duals: Any, subgradient: Any) -> bool:
 
 
 @inner_njit
-def _use(cols: Any, j: int, subgradient: Any) -> None:
-    """Count the relaxed rows of a column as used once more."""
+def _use(cols: NDArray[np.int32], j: int, subgradient: Floats) -> None:
+    """Count one more use of the relaxed rows of a column."""
     for s in range(2, cols.shape[1]):
         if cols[j, s] >= 0:
             subgradient[cols[j, s]] -= 1.0

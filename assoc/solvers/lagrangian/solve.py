@@ -1,4 +1,4 @@
-"""Lagrangian relaxation from S dimensions to two, and recovery upward again.
+"""Lagrangian relaxation from S dimensions to two, and recovery of a solution from two to S.
 
 The constraints of sensors 3..S are relaxed with multipliers u (u <= 0 where a measurement may stay
 unused, free where it must be used). For each pair of measurements of the first two sensors only the cheapest
@@ -6,10 +6,10 @@ column, by weight less its u, matters; what remains is a two-dimensional assignm
 
     L(u) = sum(u) + min { 2-D assignment of c_ij = min_j' (w_j' - u of its rows in sensors 3..S) } <= optimum
 
-Its duals together with u are feasible multipliers of the whole problem, which is how the bound is
-certified. Multipliers move along the subgradient g_r = 1 - (times that r is used) by Polyak's step. From
-the pairs a solution is recovered sensor by sensor: the tuples so far are assigned to the measurements of
-the next sensor, those of later sensors still priced by u, each step again an exact 2-D assignment.
+Its duals together with u are feasible multipliers of the whole problem, which certify the bound. Multipliers move
+along the subgradient g_r = 1 - (times that r is used) by Polyak's step. From the pairs a solution is recovered sensor
+by sensor: the tuples so far are assigned to the measurements of the next sensor, with u for those of later sensors.
+Each step is again an exact 2-D assignment.
 
 The multipliers start from the smoothed dual ascent (packing/bounds/dual_ascent.py), which is near the LP bound
 in milliseconds; columns whose reduced cost exceeds the gap are dropped on the way.
@@ -62,7 +62,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
             raise infeasible(packing)
         return Outcome(np.zeros(0, dtype=np.int64), 0, 0.0, np.zeros(packing.num_rows))
     if parameters.warm_start:
-        # coarse: it need only be good enough to drop most columns before the rest is done
+        # coarse: only good enough to drop most columns before the full ascent on the rest
         duals = dual_bound(packing, levels=_COARSE_LEVELS, passes=_COARSE_PASSES, run=run)
     else:
         duals = np.zeros(packing.num_rows)
@@ -85,7 +85,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
         if not cover.complete(run):
             raise infeasible(packing, run)
         columns = cover.columns().astype(np.int64)
-    # the proof of a bound over the columns that are left needs the columns that were dropped, too
+    # the proof of a bound over the columns left also needs the columns that were dropped
     proof = search.proof
     bound = min(search.bound, float(packing.weights[columns].sum()))
     if search.cut_off:
@@ -94,7 +94,7 @@ def solve(packing: Packing, parameters: LagrangianParameters, run: Run) -> Outco
 
 
 class Subgradient:
-    """The state of the method: multipliers, best bound, best solution, and the columns that are left."""
+    """State of the method: multipliers, best bound, best solution, and the columns left."""
 
     def __init__(
         self, packing: Packing, duals: Floats, parameters: LagrangianParameters, run: Run, bound: float
@@ -110,16 +110,16 @@ class Subgradient:
         self.cut_off = False
         self._focus(packing, duals, np.arange(packing.num_columns))
 
-    def _focus(self, packing: Packing, duals: Floats, place: NDArray[np.int64]) -> None:
-        """Work on these columns from now on; ``place`` are theirs in the whole problem."""
+    def _focus(self, packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> None:
+        """Restrict the work to these columns; ``origin`` holds their indices in the whole problem."""
         self.packing = packing
-        self.place = place
+        self.origin = origin
         self.arranged = arrange(packing)
         self.duals = duals
         self.best = duals
 
     def iterate(self) -> None:
-        """Relax, recover, step, until the gap is closed or nothing moves any more."""
+        """Relax, recover and step until the gap is closed or nothing changes any more."""
         factor = self.parameters.step
         stalled = 0
         while self.iterations < self.parameters.iterations:
@@ -127,7 +127,7 @@ class Subgradient:
             before = self.bound
             subgradient = self._relax()
             if subgradient is None:
-                # the columns left allow no solution better than the best one
+                # the columns left allow no better solution than the best one
                 self._raise_bound(self.weight, None)
                 break
             if self.run.should_stop() and (self.columns is not None or self.run.fallback is not None):
@@ -155,12 +155,12 @@ class Subgradient:
             self.cut_off = True
 
     def polish(self) -> None:
-        """Improve the best solution by cluster search, within the columns that are left."""
+        """Improve the best solution by cluster search within the columns left."""
         if self.columns is None or self._gap_closed() or self.run.should_stop():
             return
         search = ClusterSearch(Priced.of(self.packing, self.best))
         search.size = _POLISH_TUPLES * self.packing.cols.shape[1]
-        cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.place, self.columns)))
+        cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.origin, self.columns)))
         for _ in range(_POLISH_ROUNDS):
             if self.run.should_stop():
                 return
@@ -170,7 +170,7 @@ class Subgradient:
             if change == 0.0:
                 return
             self.weight = cover.weight
-            self.columns = self.place[cover.columns()]
+            self.columns = self.origin[cover.columns()]
             self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
             if self._gap_closed():
                 return
@@ -184,7 +184,7 @@ class Subgradient:
         return closed
 
     def _relax(self) -> Floats | None:
-        """Solve the 2-D relaxation; returns the subgradient, None where it has no solution."""
+        """Solve the 2-D relaxation; returns the subgradient, or None if it has no solution."""
         answer = relax(self.arranged, self.duals)
         if answer is None:
             return None
@@ -207,7 +207,7 @@ class Subgradient:
         if not self.parameters.polish:
             return
         if better:
-            # it may be good enough as it is, for the gap asked for or for the caller
+            # it may already be good enough for the requested gap or the callback
             self.run.record(self.iterations, self.weight, min(self.bound, self.weight))
             if self._gap_closed() or self.run.should_stop():
                 return
@@ -216,32 +216,32 @@ class Subgradient:
         self._offer(cover)
 
     def _offer(self, cover: Cover) -> bool:
-        """Keep a cover if it is the best so far; whether it was."""
+        """Keep a cover if it is the best so far; returns whether it was."""
         weight = cover.weight
         if weight >= self.weight:
             return False
         self.weight = weight
-        self.columns = self.place[cover.columns()]
+        self.columns = self.origin[cover.columns()]
         return True
 
     def _drop_columns(self) -> bool:
-        """Drop what no better solution can use; True if that was worth it."""
+        """Drop columns that no better solution can use; returns whether enough were dropped to rebuild the packing."""
         if self.weight == math.inf:
             return False
         room = self.weight - self.bound + 1e-9 * max(1.0, abs(self.weight))
         reduced = reduced_costs(self.packing, self.best)
-        # the multipliers prove their own bound, which may be less than the best
+        # the multipliers prove a bound that may be below the best
         slack = max(0.0, self.bound - certified_bound(self.packing, self.best))
         keep = reduced <= room + slack
         if np.count_nonzero(keep) > 0.5 * keep.size:
             return False
         smaller = self.packing.restrict(keep)
-        place = self.place[smaller.origin]
-        self._focus(smaller, self.best[smaller.row_origin], place)
+        origin = self.origin[smaller.origin]
+        self._focus(smaller, self.best[smaller.row_origin], origin)
         return True
 
     def _refine(self) -> None:
-        """Do the smoothed dual ascent in full, on the columns that are left."""
+        """Do the full smoothed dual ascent on the columns left."""
         duals = dual_bound(self.packing, run=self.run)
         bound = certified_bound(self.packing, duals)
         if bound > certified_bound(self.packing, self.best):

@@ -1,4 +1,4 @@
-"""What a backend answers, in the packing's own units, and what its answer is checked by."""
+"""A backend's answer in the packing's units, and checks of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Answer(NamedTuple):
     columns : int array or None
         The chosen columns, where there is a solution.
     bound : float
-        No solution weighs less; -inf where the backend has no bound.
+        No solution has less weight; -inf where the backend has no bound.
     proven : bool
         Whether the columns are optimal.
     infeasible : bool
@@ -35,7 +35,7 @@ class Answer(NamedTuple):
 
 
 def solution_or_none(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Return the columns if they are a solution, else None."""
+    """Return the columns if they are a solution of the packing, else None."""
     rows = packing.cols[columns]
     covered = np.bincount(rows[rows >= 0], minlength=packing.num_rows)
     wrong = (covered > 1).any() or (covered[~packing.slack] != 1).any()
@@ -43,6 +43,6 @@ def solution_or_none(packing: Packing, columns: NDArray[np.int64]) -> NDArray[np
 
 
 def most_columns(packing: Packing) -> int:
-    """Return how many columns a solution can have at the most."""
+    """Return the largest number of columns that a solution can have."""
     sizes = np.count_nonzero(packing.cols >= 0, axis=1)
     return packing.num_rows // max(int(sizes.min()), 1)

@@ -1,4 +1,4 @@
-"""CP-SAT: integer costs, and their rounding, which is taken off the bound."""
+"""CP-SAT, with integer costs; their rounding is subtracted from the bound."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from assoc.solvers.milp.parameters import MilpParameters
 
 # largest rounding of a whole solution's costs
 _ROUNDING = 1e-7
-# CP-SAT's sums must stay below 2^63, and its presolve, which substitutes equations, needs room for some more
+# CP-SAT's sums must stay below 2^63, and its presolve, which substitutes equations, needs some more room
 _LARGEST_SUM = 57
 
 
@@ -26,8 +26,8 @@ def solve_by_cp_sat(
     start: NDArray[np.integer] | None,
     stop: StopSignal | None,
 ) -> Answer:
-    """Solve by CP-SAT on integer weights, from the columns of a solution if one is known."""
-    # who takes the other backends does not load this one
+    """Solve by CP-SAT on integer weights, starting from the columns of a known solution."""
+    # imported here: not needed with the other backends
     with loading():
         from ortools.sat import cp_model_pb2
         from ortools.sat.python import cp_model
@@ -63,7 +63,7 @@ def solve_by_cp_sat(
         chosen = np.fromiter((solver.boolean_value(x) for x in take), dtype=np.bool_, count=len(take))
         columns = solution_or_none(packing, np.flatnonzero(chosen))
     rounding = float(np.abs(scaled - integers).max()) * most_columns(packing)
-    # before CP-SAT has a bound of its own, it reports 0
+    # CP-SAT reports 0 while it has no bound
     least = float(integers[integers < 0].sum())
     bound = solver.best_objective_bound
     known = status == states.OPTIMAL or (status == states.FEASIBLE and bound != 0.0)
@@ -77,7 +77,7 @@ def solve_by_cp_sat(
 
 
 def _integer_exponent(packing: Packing) -> int:
-    """Return k: weights times 2^k are rounded to integers."""
+    """Return k, the exponent: weights times 2^k are rounded to integers."""
     # frexp: x < 2^e
     room = _LARGEST_SUM - math.frexp(float(np.abs(packing.weights).sum()))[1]
     rounding = _ROUNDING * min(1.0, float(np.abs(packing.weights).max()))

@@ -1,4 +1,4 @@
-"""SCIP and HiGHS through MathOpt: float costs, and tolerances that are taken off the bound."""
+"""SCIP and HiGHS through MathOpt, with float costs; their tolerances are subtracted from the bound."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _LARGEST_COST = 7
 def solve_by_math_opt(
     packing: Packing, parameters: MilpParameters, seconds: float, start: NDArray[np.integer] | None
 ) -> Answer:
-    """Solve by SCIP or HiGHS through MathOpt, SCIP from the columns of a solution if one is known."""
-    # who takes the other backend does not load this one
+    """Solve by SCIP or HiGHS through MathOpt; SCIP starts from the columns of a known solution."""
+    # imported here: not needed with the other backend
     with loading():
         from ortools.math_opt.python import mathopt
 
@@ -42,7 +42,7 @@ def solve_by_math_opt(
         for name in ("mip_feasibility", "primal_feasibility", "dual_feasibility"):
             options.highs.double_options[f"{name}_tolerance"] = _TOLERANCE
     known = mathopt.ModelSolveParameters()
-    if start is not None and parameters.backend == "scip":  # MathOpt hands HiGHS no hints
+    if start is not None and parameters.backend == "scip":  # MathOpt passes no hints to HiGHS
         values = np.isin(np.arange(packing.num_columns), start).astype(float).tolist()
         known.solution_hints = [mathopt.SolutionHint(dict(zip(model.variables(), values, strict=True)))]
     result = mathopt.solve(model, kind, params=options, model_params=known)
@@ -52,7 +52,7 @@ def solve_by_math_opt(
         values = np.array(list(result.variable_values().values()))
         columns = solution_or_none(packing, np.flatnonzero(values > 0.5))
     bound = result.best_objective_bound()
-    # reduced costs may be negative by the tolerance, in each column of a solution; nodes are cut off by gap
+    # the reduced cost of each column in a solution may be negative by the tolerance; nodes are pruned by the gap
     bound -= _TOLERANCE * (most_columns(packing) + 2.0 * abs(bound)) if math.isfinite(bound) else 0.0
     return Answer(
         columns,
@@ -64,7 +64,7 @@ def solve_by_math_opt(
 
 
 def _model(packing: Packing, weights: NDArray[np.float64]) -> Any:
-    """Return the packing as MathOpt's protocol buffer: much quicker to fill than a model by names."""
+    """Return the packing as MathOpt's protocol buffer, which is much quicker to fill than a model by names."""
     from ortools.math_opt import model_pb2
 
     num, rows = packing.num_columns, packing.num_rows

@@ -20,10 +20,10 @@ class MilpParameters(Parameters):
     Attributes
     ----------
     backend : {"scip", "cp_sat", "highs"}
-        Which solver of OR-Tools.
+        Backend of OR-Tools.
     workers : int
         Threads of scip and cp_sat; with more than one the answer may be another of the same cost.
-        HiGHS takes no number from OR-Tools and decides for itself.
+        HiGHS ignores it and chooses its own number.
     """
 
     backend: str = field(default="scip", metadata={"help": "scip, cp_sat or highs"})
@@ -34,7 +34,7 @@ class MilpParameters(Parameters):
         self._whole("workers", most=1024)
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """The backend's model; with each worker come a stack and a copy of it."""
+        """Memory of the backend's model; each worker adds a stack and a copy of the model."""
         if num_columns == 0:
             return None
         workers = self.workers if self.backend == "cp_sat" else 1

@@ -1,18 +1,17 @@
-"""Mixed-integer programming by OR-Tools: the field's general exact methods behind the same door.
+"""Mixed-integer programming by OR-Tools: general exact solvers with the interface of the others.
 
 The model is the packing itself: x_j in {0, 1} for each column, for each row sum x_j <= 1, or = 1 where the
 row has no slack. The backends are
 
 - ``scip`` and ``highs``: float costs, scaled by a power of two (exact) so that the largest is of order 100;
-  relative gap, dual feasibility and integrality tolerances 1e-9, all set explicitly. The bound reported is
-  theirs less what these tolerances can add up to.
+  relative gap, dual feasibility and integrality tolerances 1e-9, all set explicitly. What these tolerances can add up
+  to is subtracted from the backend's bound.
 - ``cp_sat``: integer costs round(2^k w). k is the largest with sum |2^k w| < 2^57, but no larger than
   needed to keep the rounding of a whole solution below 1e-7 (or 1e-7 max |w|, if smaller). The largest
-  rounding that occurred, times the columns a solution can have, is taken off its bound.
+  rounding that occurred, times the columns a solution can have, is subtracted from its bound.
 
-When the time is over the better of the backend's solution and a greedy one, improved by insertion, is
-returned, with the better of the backend's bound and the dual bound. A backend that is not back by then is left
-behind in a thread of its own.
+At the time limit the better of the backend's solution and a greedy one, improved by insertion, is returned, with the
+better of the backend's bound and the dual bound. A backend that has not returned by then is abandoned in its thread.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from assoc.solvers.milp.cp_sat import solve_by_cp_sat
 from assoc.solvers.milp.math_opt import solve_by_math_opt
 from assoc.solvers.milp.parameters import MilpParameters
 
-# seconds that a model takes for each entry of its matrix, at the least (measured: 1.3e-6 and 2.8e-6)
+# least seconds that building a model takes for each entry of its matrix (measured: 1.3e-6 and 2.8e-6)
 _ENTRY_MATH_OPT, _ENTRY_CP_SAT = 3e-6, 6e-6
 
 
@@ -44,7 +43,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     Raises
     ------
     InfeasibleError
-        There is no solution, or none was found in the time.
+        There is no solution, or none was found in time.
     """
     if packing.num_columns == 0:
         if packing.is_axial:
@@ -53,7 +52,7 @@ def solve(packing: Packing, parameters: MilpParameters, run: Run) -> Outcome:
     bound, duals = -math.inf, None
     columns: NDArray[np.integer] | None = None
     if run.time_limit is not None:
-        # made first: when the time is over it would be too late
+        # computed first: at the time limit it would be too late
         columns = _quick(packing, run)
         duals = dual_bound(packing, run=Run(run.rng, time_limit=0.3 * run.time_limit, started=run.started))
         bound = certified_bound(packing, duals)
@@ -82,16 +81,16 @@ def _solve(
 
 
 def _solve_in_time(packing: Packing, parameters: MilpParameters, run: Run) -> Answer:
-    """Solve in the time that is left, or give up; Ctrl-C is heard meanwhile.
+    """Solve in the remaining time, or give up; Ctrl-C is handled meanwhile.
 
-    Backends look at the clock between steps of their own, and before their first step not at all: a large one
-    may be late by many seconds. So the backend works in a thread, which is left behind when time is over (CP-SAT is
-    told to stop); and where already the model would take longer than there is time it is not made.
+    Backends check the time only between their own steps, and not before the first: on a large problem they may be late
+    by many seconds. So the backend works in a thread, which is abandoned at the time limit (CP-SAT is asked to stop).
+    A model that would take longer to build than the time left is not built.
     """
     entry = _ENTRY_CP_SAT if parameters.backend == "cp_sat" else _ENTRY_MATH_OPT
     answer = None
     if run.remaining() >= entry * packing.row_cols.size:
-        # MathOpt's own interrupter makes SCIP 9 complain on stderr: its time limit must do
+        # with MathOpt's interrupter SCIP 9 prints warnings on stderr: use its time limit instead
         stop = StopSignal() if parameters.backend == "cp_sat" else None
         seconds = run.remaining()
         answer = in_time(lambda: _solve(packing, parameters, 0.98 * run.remaining(), run, stop), seconds, "milp", stop)
@@ -113,9 +112,9 @@ def _quick(packing: Packing, run: Run) -> NDArray[np.integer] | None:
 
 
 def _better(
-    packing: Packing, one: NDArray[np.integer] | None, other: NDArray[np.integer] | None
+    packing: Packing, first: NDArray[np.integer] | None, second: NDArray[np.integer] | None
 ) -> NDArray[np.integer] | None:
-    """Return the lighter of two solutions, of which there may be none."""
-    if one is None or other is None:
-        return other if one is None else one
-    return one if float(packing.weights[one].sum()) <= float(packing.weights[other].sum()) else other
+    """Return the solution of less weight; either may be missing."""
+    if first is None or second is None:
+        return second if first is None else first
+    return first if float(packing.weights[first].sum()) <= float(packing.weights[second].sum()) else second

@@ -1,13 +1,13 @@
 """Moves of the tabu search: forced insertion with ejection, tenure, aspiration.
 
 The gain of every column is kept up to date: it changes only for columns on rows that changed. A move inserts
-the column of least gain that is not tabu; what it ejects may not return for ``tenure`` moves, unless it
-would lead to a solution better than the best (aspiration). Rows that a move leaves open are filled at once.
+the column of least gain that is not tabu; columns that it ejects may not return for ``tenure`` moves, unless that
+leads to a solution better than the best (aspiration). Rows that a move leaves open are filled at once.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from assoc.solvers.tabu.parameters import TabuParameters
 
 
-# every third restart is from a new solution, the others from the best
+# every third restart is from a new solution, the others are from the best
 _FRESH = 3
-# new solutions of which the best is taken
+# number of new solutions, of which the best is used
 _COVERS = 12
-# those from the linear program, where covers are built there
+# how many of them come from the linear program, where covers are built there
 _DIVES = 3
 
 
 class _Rules(NamedTuple):
-    """Moves done before, moves to do, tenure, and the column that is forced in first (-1: none)."""
+    """Moves done before, moves to do, tenure, and the column that is inserted first (-1: none)."""
 
     clock: int
     moves: int
@@ -54,7 +54,7 @@ class TabuSearch:
         self.owner: NDArray[np.int32] | None = None if component.best is None else component.best.copy()
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
-        """Some moves, then exact sub-steps on the best solution they met."""
+        """Do some moves, then exact sub-steps on the best solution found."""
         p = self.parameters
         forced = -1
         if self.owner is None:
@@ -63,7 +63,7 @@ class TabuSearch:
             self.restarts += 1
             self.until[:] = 0
             if self.restarts % _FRESH == 0:
-                # far from the best, where no chain of moves from it leads
+                # far from the best solution: regions that no chain of moves from it reaches
                 self.owner = self._afresh(component, rng)
             else:
                 self.owner = component.best.copy()
@@ -82,7 +82,7 @@ class TabuSearch:
                 self.owner = best
 
     def _afresh(self, component: Component, rng: np.random.Generator) -> NDArray[np.int32]:
-        """Return the best of some covers, dives or random greedy ones, each improved by exact sub-steps."""
+        """Return the best of some new covers, by dives or random greedy ones, each improved by exact sub-steps."""
         best, least = component.best, np.inf
         dives = component.dives
         for number in range(_DIVES if dives else _COVERS):
@@ -96,10 +96,10 @@ class TabuSearch:
         return Cover.empty(component.packing).owner if best is None else best.copy()
 
     def _force(self, component: Component, rng: np.random.Generator) -> int:
-        """Return a column to insert and hold: on a row that costs much more than its multiplier allows.
+        """Return a column to insert and hold, on a row that costs much more than its multiplier allows.
 
-        The excess of the present solution over the bound is the sum of the reduced costs of its columns and
-        of -u over its uncovered rows: where a term is large, something better is near.
+        The current solution exceeds the bound by the sum of the reduced costs of its columns and of -u over its
+        uncovered rows: where a term is large, a better solution is near.
         """
         assert self.owner is not None
         packing, owner = component.packing, self.owner
@@ -107,7 +107,7 @@ class TabuSearch:
         excess = np.maximum(excess, 0.0)
         total = excess.sum()
         if total == 0.0:
-            # multipliers that are large and cancel: what a row costs more is lost in their rounding
+            # large multipliers that cancel each other: rounding hides what a row costs more
             return -1
         row = int(rng.choice(excess.size, p=excess / total))
         columns = packing.row_cols[packing.row_ptr[row] : packing.row_ptr[row + 1]]
@@ -120,8 +120,16 @@ class TabuSearch:
 
 
 @njit
-def _moves(packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Rules, rng: Any, deadline: float) -> int:
-    """Move; ``owner`` becomes the last solution, ``best`` the best one met; the clock after that.
+def _moves(
+    packing: PackingArrays,
+    owner: NDArray[np.int32],
+    best: NDArray[np.int32],
+    until: NDArray[np.int64],
+    rules: _Rules,
+    rng: np.random.Generator,
+    deadline: float,
+) -> int:
+    """Do moves: ``owner`` becomes the last solution, ``best`` the best one; returns the number of moves done so far.
 
     A ``forced`` column is inserted first and held for a third of the moves.
     """
@@ -157,7 +165,7 @@ def _moves(packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Ru
                     least = gain[j]
                     chosen = j
         if chosen < 0:
-            # everything is tabu: a random column is forced in
+            # everything is tabu: insert a random column
             chosen = rng.integers(0, num)
             if owner[first_row(cols, chosen)] == chosen or chosen == held:
                 continue
@@ -175,7 +183,7 @@ def _moves(packing: PackingArrays, owner: Any, best: Any, until: Any, rules: _Ru
         for i in range(count):
             until[ejected[i]] = clock + tenure + rng.integers(0, tenure + 1)
         num_changed = insert(cols, owner, chosen, changed, 0)
-        # rows left open take the best column that is free for them
+        # cover rows left open by the best column that fits
         last = num_changed
         for i in range(last):
             r = changed[i]

@@ -14,11 +14,11 @@ class TabuParameters(SearchParameters):
     Attributes
     ----------
     tenure : int
-        Moves for which an ejected tuple may not return; a random number up to as many again is added.
+        Moves for which an ejected tuple may not return; a random number of up to as many is added.
     moves : int
-        Moves in one iteration.
+        Moves of one iteration.
     restart : int
-        After so many iterations without improvement the search goes back to the best solution and perturbs it.
+        Iterations without improvement after which the search goes back to the best solution and perturbs it.
     """
 
     tenure: int = field(default=7, metadata={"help": "moves for which an ejected tuple may not return"})

@@ -1,4 +1,4 @@
-"""Tabu search: always the best insertion that is not forbidden, even when it makes things worse."""
+"""Tabu search: always the best insertion that is not tabu, even when it makes the solution worse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is legal in a problem and almost surely a mistake: costs that are no likelihood ratios."""
+"""Warnings of problems that are legal but probably a mistake: costs that are not likelihood ratios."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from assoc.problem import AssignmentProblem
 
-# a few measurements may well be false alarms, all of them: two sensors must have this many
+# in a small problem all measurements may be false alarms: two sensors must have at least this many
 _ENOUGH = 3
 
 
-def doubts_about_costs(problem: AssignmentProblem) -> tuple[str, ...]:
-    """Return a line where no cost speaks for a target, as with distances or likelihoods in the place of costs."""
+def cost_warnings(problem: AssignmentProblem) -> tuple[str, ...]:
+    """Return a warning if no cost favours a target, as when distances or likelihoods are given instead of costs."""
     several = np.count_nonzero(problem.tuples, axis=1) > 1
     if not problem.dummy or not several.any() or np.count_nonzero(problem.sizes >= _ENOUGH) < 2:
         return ()
@@ -19,7 +19,7 @@ def doubts_about_costs(problem: AssignmentProblem) -> tuple[str, ...]:
     sensor = singletons.argmax(axis=1)
     alone = np.full((problem.num_sensors, int(problem.sizes.max()) + 1), np.inf)
     alone[:, 0] = 0.0
-    # one that is listed twice counts with its smaller cost
+    # a tuple that is listed twice counts with its smaller cost
     np.minimum.at(alone, (sensor, singletons.max(axis=1)), problem.costs[~several])
     together = alone[np.arange(problem.num_sensors), problem.tuples[several]].sum(axis=1)
     if (problem.costs[several] < together).any():
