@@ -1,7 +1,7 @@
-"""Parameter studies: a design of settings, run on one core, on all, or on a cluster, and kept as it comes.
+"""Parameter studies: a design of settings, run on one core, on all, or on a cluster; every result is saved at once.
 
 >>> import assoc.sweeps
->>> frame = assoc.sweeps.load("study/")    # one row a run, doctest: +SKIP
+>>> frame = assoc.sweeps.load("study/")    # one row per run, doctest: +SKIP
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Intervals by the bootstrap, for runs that share problems and repeats."""
+"""Bootstrap intervals for runs that share problems and repeats."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ def mean_interval(
     values : array, shape (problems, repeats)
         NaN where a run is missing.
     weights : array, shape (problems, repeats), optional
-        The mean is then ``sum(weights * values) / sum(weights)``; 1 each without it.
+        Weights of the mean ``sum(weights * values) / sum(weights)``; 1 by default.
     level : float, default 0.95
     resamples : int, default 2000
     seed : int, default 0
-        The same interval every time.
+        Fixed, so that the interval is reproducible.
 
     Returns
     -------
     (float, float)
-        NaN without values; the mean itself, twice, with a single one.
+        The ends; NaN without values, and both equal to a single value.
 
     References
     ----------
     A. B. Owen, The pigeonhole bootstrap, Annals of Applied Statistics 1 (2007): resampling rows and columns
-    is on the safe side where runs of one problem, or of one repeat, are alike.
+        is conservative where runs of one problem, or of one repeat, are alike.
     """
     share = np.where(np.isnan(values), 0.0, 1.0 if weights is None else weights)
     if not share.any():
         return np.nan, np.nan
     of_rows, of_columns = _draws(*values.shape, resamples, seed)
-    # from the middle of the values, so that large equal numbers give an interval of no width
+    # relative to the middle of the values, so that large equal numbers give an interval of width 0
     middle = weighted_mean(values, weights)
     away = np.where(share > 0, values - middle, 0.0)
     total = ((of_rows @ (share * away)) * of_columns).sum(axis=1)
@@ -58,12 +58,12 @@ def mean_interval(
 
 
 def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0) -> Floats:
-    """Means of several settings over the same resampled problems and repeats, to compare them in pairs.
+    """Means of several settings over the same resampled problems and repeats, for comparison in pairs.
 
     Parameters
     ----------
     tables : array, shape (settings, problems, repeats)
-        Without gaps.
+        Without NaN.
     resamples : int, default 2000
     seed : int, default 0
 
@@ -79,7 +79,7 @@ def resampled_means(tables: Floats, *, resamples: int = RESAMPLES, seed: int = 0
 
 @lru_cache(maxsize=8)
 def _draws(rows: int, columns: int, resamples: int, seed: int) -> tuple[Floats, Floats]:
-    """How often each row and each column is drawn, for each resample."""
+    """Number of times that each row and each column is drawn, for each resample."""
     rng = np.random.default_rng(seed)
     resamples = max(200, min(resamples, _MOST_NUMBERS // max(rows, columns)))
     of_rows = rng.multinomial(rows, np.full(rows, 1 / rows), resamples).astype(float)
@@ -88,7 +88,7 @@ def _draws(rows: int, columns: int, resamples: int, seed: int) -> tuple[Floats, 
 
 
 def weighted_mean(values: Floats, weights: Floats | None = None) -> float:
-    """Mean of the values that are not NaN; NaN if there is none or the weights are all 0."""
+    """Mean of the values that are not NaN; NaN if there are none or the weights are all 0."""
     known = ~np.isnan(values)
     share = np.ones(int(known.sum())) if weights is None else weights[known]
     return float(np.average(values[known], weights=share)) if share.sum() > 0 else float("nan")

@@ -1,4 +1,4 @@
-"""A digest of the code that results depend on; during development the version does not change, but this does."""
+"""A digest of the code that results depend on: it changes during development, when the version does not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def code_digest() -> str:
     Returns
     -------
     str
-        Empty where the package has no source files (it was put into an archive, say).
+        Empty if the package has no source files (for example in an archive).
     """
     package = Path(__file__).resolve().parent.parent
     files = sorted(path for room in _ROOMS for path in (package / room).rglob("*.py"))

@@ -1,4 +1,4 @@
-"""Designs: which settings a study runs. A grid takes every combination, a random design draws them."""
+"""Designs: the settings that a study runs. A grid takes every combination, a random design draws some."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assoc.sweeps.setting import Setting, parameter
 from assoc.sweeps.space import Range, Space, read_text, read_value
 
 MOST_SETTINGS = 1_000_000
-"""A design of more settings is refused: it is a typing error."""
+"""Largest number of settings of a design; more are taken for a typing error."""
 
 
 @door
@@ -29,17 +29,17 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
     solver : str
         One of ``assoc.solvers.names()``.
     space : mapping of str to list
-        Values of each parameter; the last one varies fastest. Without any it is the solver's defaults.
+        Values of each parameter; the last one varies fastest. Empty: the solver's defaults.
 
     Returns
     -------
     list of Setting
-        No setting twice.
+        Without duplicates.
 
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter, a value out of range, no values.
+        Unknown solver or parameter, a value out of range, or a parameter without values.
     LimitExceededError
         More than a million settings.
     """
@@ -48,7 +48,7 @@ def grid(solver: str, space: Mapping[str, Any] | None = None) -> list[Setting]:
 
 @door
 def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int | None = 0) -> list[Setting]:
-    """Settings drawn at random; the first n of a longer design are the design of length n.
+    """Draw settings at random; the first n of a longer design are the design of length n.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def random_settings(solver: str, space: Mapping[str, Any], count: int, seed: int
     space : mapping
         For each parameter a list of values or ``{"low": .., "high": .., "log": True}``.
     count : int
-        How many.
+        Number of settings to draw.
     seed : int or None, default 0
-        None: a random one.
+        None: a random seed.
 
     Returns
     -------
     list of Setting
-        At most ``count``: a setting that was drawn twice is there once.
+        At most ``count``, without duplicates.
     """
     return _drawn(solver, _spaces(solver, space), count, whole_seed(seed), "count")
 
@@ -111,12 +111,12 @@ def _drawn(solver: str, spaces: Mapping[str, Space], count: int, seed: int, labe
 def read_words(words: Sequence[str], solvers: Sequence[str], label: str = "--grid") -> dict[str, dict[str, Space]]:
     """Read ``name=values`` or ``solver.name=values`` for each of the solvers.
 
-    A name without a solver counts for every solver that has this parameter.
+    A name without a solver applies to every solver with this parameter.
 
     Raises
     ------
     InvalidInputError
-        A word of another form, a parameter that no solver has or that is given twice, no values.
+        A word of another form, a parameter that no solver has or that is given twice, or a parameter without values.
     """
     found: dict[str, dict[str, Space]] = {solver: {} for solver in solvers}
     for word in words:
@@ -129,10 +129,10 @@ def read_words(words: Sequence[str], solvers: Sequence[str], label: str = "--gri
             raise InvalidInputError(f"{label}: {name}: {owner!r} is no solver of the study: {', '.join(solvers)}")
         plain = plain.replace("-", "_")
         owners = _owners(plain, [owner] if dot else list(solvers), label)
-        for one in owners:
-            if plain in found[one]:
-                raise InvalidInputError(f"{label}: {plain} is given twice for {one}")
-            found[one][plain] = read_text(parameter(one, plain), text, f"{label}: {name}")
+        for solver in owners:
+            if plain in found[solver]:
+                raise InvalidInputError(f"{label}: {plain} is given twice for {solver}")
+            found[solver][plain] = read_text(parameter(solver, plain), text, f"{label}: {name}")
     return found
 
 
@@ -145,7 +145,7 @@ def _owners(name: str, solvers: list[str], label: str) -> list[str]:
         except InvalidInputError as error:
             complaints.append(str(error))
     if not owners:
-        # the error that suggests a similar name helps most
+        # prefer the error that suggests a similar name
         complaints.sort(key=lambda text: "did you mean" not in text)
         raise InvalidInputError(f"{label}: {complaints[0]}")
     return owners
@@ -160,13 +160,13 @@ def settings_from(
     Parameters
     ----------
     tables : mapping
-        Solver to a table, or to a list of tables: parameter to a value, a list of values, or
+        For each solver a table or a list of tables: parameter to a value, a list of values, or
         ``{low, high, log}`` (drawn, with ``random``).
     random : int, optional
-        Draw so many settings from each table that has a list or a range; without it every combination is taken.
+        Number of settings to draw from each table with a list or a range; by default every combination is taken.
     seed : int, default 0
     label : str
-        What errors begin with.
+        Prefix of errors.
     """
     found: list[Setting] = []
     drawn = False
@@ -189,14 +189,14 @@ def settings_from(
 
 
 def _is_open(spaces: Mapping[str, Space]) -> bool:
-    """Whether there is something to draw."""
+    """Whether there is something to draw: a range, or several values."""
     return any(isinstance(space, Range) or len(space.values) > 1 for space in spaces.values())
 
 
 def designed(
     designs: Sequence[tuple[str, Mapping[str, Space]]], random: int | None, seed: int, label: str = "--grid"
 ) -> list[Setting]:
-    """Settings of several solvers, none twice: every combination, or with `random` so many of what can be drawn."""
+    """Settings of several solvers without duplicates: every combination, or ``random`` drawn ones of each solver."""
     found: list[Setting] = []
     for solver, spaces in designs:
         if random is not None and _is_open(spaces):

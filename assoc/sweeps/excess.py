@@ -1,4 +1,4 @@
-"""The excess of runs over the best known cost: at the end, and over time."""
+"""The excess of runs over the best known cost, at the end and over time."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _CURVE_POINTS = 60
 
 
 def with_excess(frame: pd.DataFrame, traces: pd.DataFrame) -> pd.DataFrame:
-    """Traces of the runs of a frame, with the cost above the best known of their scan in the column ``excess``."""
+    """Traces of the runs of a frame; the column ``excess`` is the cost above the best known one of the scan."""
     best = frame.groupby(["scene", "scan"])["cost"].min().rename("best")
     traces = traces[traces["setting"].isin(frame["setting"].unique())].join(best, on=["scene", "scan"])
     excess = traces["cost"] - traces["best"]
-    # rounding errors are no excess
+    # rounding errors do not count as excess
     return traces.assign(excess=excess.where(excess > 1e-9 * traces["best"].abs().clip(lower=1.0), 0.0))
 
 
 def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average the excess of runs over time; each run counts with its best solution so far.
+    """Average the excess of runs over time, each run with its best solution so far.
 
     Parameters
     ----------
     traces : DataFrame
-        Of `with_excess`, not empty.
+        From `with_excess`, not empty.
     column : {"iteration", "seconds"}
 
     Returns
@@ -46,6 +46,6 @@ def mean_excess(traces: pd.DataFrame, column: str) -> tuple[NDArray[np.float64],
     order = np.lexsort((at, run))
     starts = np.flatnonzero(np.r_[True, np.diff(run[order]) > 0])
     for rows in np.split(order, starts[1:]):
-        place = np.searchsorted(at[rows], grid, side="right") - 1
-        total += excess[rows][np.maximum(place, 0)]
+        index = np.searchsorted(at[rows], grid, side="right") - 1
+        total += excess[rows][np.maximum(index, 0)]
     return grid, total / starts.size

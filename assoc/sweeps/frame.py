@@ -1,4 +1,4 @@
-"""A study as a table: one row a run."""
+"""A study as a table with one row per run."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RESULTS = (
 
 @door
 def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
-    """Read the runs of a study; also of one that is still running.
+    """Read the runs of a study, which may still be running.
 
     Parameters
     ----------
@@ -45,26 +45,26 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row for each run, in the order of solver, parameters, scene, scan, repeat. Columns:
-        ``solver``; the parameters (empty where a solver does not have one; a parameter called like a result,
-        ``iterations`` say, is ``parameter_iterations``); ``repeat``; ``seed`` (``assoc.assign`` with this
-        seed gives this run again); ``scene`` (the name of scene or problem), ``scan``; ``cost``,
+        One row per run, in the order of solver, parameters, scene, scan, repeat. Columns:
+        ``solver``; the parameters (empty where a solver does not have one; a parameter with the name of a result,
+        such as ``iterations``, is ``parameter_iterations``); ``repeat``; ``seed`` (``assoc.assign`` with this
+        seed repeats the run); ``scene`` (the name of scene or problem), ``scan``; ``cost``,
         ``lower_bound``, ``gap``, ``optimal``; ``iterations``; ``time`` in the solver, seconds; ``stopped_by``;
-        ``true_tuples``, ``correct_tuples`` (empty where the truth is not known); ``setting`` (its key).
+        ``true_tuples``, ``correct_tuples`` (empty if the truth is unknown); ``setting`` (its key).
 
     Raises
     ------
     InvalidInputError
-        There is no study in the folder, or it is damaged.
+        The folder holds no study, or a damaged one.
     """
     import pandas as pd
 
     manifest, settings, runs = _read(folder)
     columns = {name: [run[i] for run in runs] for i, name in enumerate(COLUMNS)}
     frame = pd.DataFrame({"solver": [settings[key]["solver"] for key in columns["setting"]]}, dtype="str")
-    parameters = list(dict.fromkeys(name for one in settings.values() for name in one["parameters"]))
+    parameters = list(dict.fromkeys(name for setting in settings.values() for name in setting["parameters"]))
     for name in parameters:
-        values = {key: _plain(one["parameters"].get(name)) for key, one in settings.items()}
+        values = {key: _plain(setting["parameters"].get(name)) for key, setting in settings.items()}
         column = pd.Series([values[key] for key in columns["setting"]])
         frame[column_of(name)] = column
     for name in ("repeat", "seed"):
@@ -87,14 +87,14 @@ def load(folder: str | os.PathLike[str]) -> pd.DataFrame:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as it can be sorted by: what someone changed to lists, tables, long numbers as text."""
+    """Return a value that can be sorted: lists, tables and long numbers of an edited log become text."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return str(value)
     return value if value is None or isinstance(value, (str, bool, int, float)) else str(value)
 
 
 def column_of(parameter: str) -> str:
-    """Name of the column of a parameter."""
+    """Column name of a parameter."""
     return f"parameter_{parameter}" if parameter in RESULTS else parameter
 
 
@@ -109,18 +109,18 @@ def load_traces(folder: str | os.PathLike[str]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row for each improvement that was kept (at most 16 of a run): ``setting``, ``scene``, ``scan``,
+        One row per saved improvement (at most 16 for each run): ``setting``, ``scene``, ``scan``,
         ``repeat``, ``iteration``, ``seconds``, ``cost``.
     """
     import pandas as pd
 
     manifest, _, runs = _read(folder)
-    place = {name: i for i, name in enumerate(COLUMNS)}
+    index = {name: i for i, name in enumerate(COLUMNS)}
     rows = [
-        (run[place["setting"]], manifest.sources.get(run[place["source"]]), run[place["scan"]], run[place["repeat"]])
+        (run[index["setting"]], manifest.sources.get(run[index["source"]]), run[index["scan"]], run[index["repeat"]])
         + tuple(point)
         for run in runs
-        for point in run[place["trace"]]
+        for point in run[index["trace"]]
     ]
     return pd.DataFrame(rows, columns=["setting", "scene", "scan", "repeat", "iteration", "seconds", "cost"])
 
@@ -136,7 +136,7 @@ def _read(folder: str | os.PathLike[str]) -> tuple[Manifest, dict[str, Any], lis
             settings[entry["setting_key"]] = entry
             continue
         for key, row in zip(run_keys(entry), _rows(entry), strict=True):
-            # a run is there once, even if two processes should have done it
+            # each run once, even if two processes should have done it
             runs.setdefault(key, row)
     known = [row for row in runs.values() if row[0] in settings]
     return manifest, settings, known

@@ -1,4 +1,4 @@
-"""A setting: a solver with all its parameters, and a key that stays the same on every machine."""
+"""A setting: a solver with all its parameters, and a key that is the same on every machine."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Setting:
     solver : str
         One of ``assoc.solvers.names()``.
     parameters : mapping
-        Those that differ from the solver's defaults, or more; the others are filled in.
+        Parameters that differ from the defaults; the others are filled in.
 
     Raises
     ------
     InvalidInputError
-        Unknown solver or parameter (the near names are listed), or a value out of range.
+        Unknown solver or parameter (similar names are listed), or a value out of range.
     """
 
     solver: str
@@ -48,7 +48,7 @@ class Setting:
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.solver}: {error}") from None
         object.__setattr__(
-            self, "parameters", MappingProxyType({one.name: getattr(made, one.name) for one in fields(made)})
+            self, "parameters", MappingProxyType({field.name: getattr(made, field.name) for field in fields(made)})
         )
 
     @cached_property
@@ -59,12 +59,12 @@ class Setting:
 
     @cached_property
     def words(self) -> tuple[int, int]:
-        """The key as two words for seeds."""
+        """The key as two integers for seeds."""
         return int(self.key[:8], 16), int(self.key[8:], 16)
 
     @cached_property
     def family(self) -> tuple[Any, ...]:
-        """Solver and the choices that are not numbers: settings of a family run the same code."""
+        """Solver and its parameters that are not numbers: settings of a family run the same code."""
         chosen = ((k, v) for k, v in self.parameters.items() if isinstance(v, (str, bool)))
         return (self.solver, *chosen)
 
@@ -75,23 +75,23 @@ class Setting:
         return isinstance(other, Setting) and self.key == other.key
 
     def __reduce__(self) -> Any:
-        # a worker knows solvers from elsewhere only if it is told
+        # a worker has to be sent users' solvers
         return _received, (registry.own([self.solver]), self.solver, dict(self.parameters))
 
 
 def _received(solvers: tuple[registry.Own, ...], solver: str, parameters: Mapping[str, Any]) -> Setting:
-    """A setting in the process that it was sent to."""
+    """Restore a setting in the process that it was sent to."""
     registry.restore(solvers)
     return Setting(solver, parameters)
 
 
 def parameter(solver: str, name: str) -> Parameter:
-    """Return the parameter of a solver that text can give.
+    """Return a solver's parameter that text can give.
 
     Raises
     ------
     InvalidInputError
-        The solver has none of this name; the near names are listed.
+        The solver has no parameter of this name; similar names are listed.
     """
     for option in parameters_of(registry.parameters(solver)):
         if option.name == name:

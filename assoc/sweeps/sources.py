@@ -1,4 +1,4 @@
-"""What a study runs on, and a digest of it: the same content is the same source, whatever the name of its file."""
+"""The scenes and problems of a study, identified by a digest: equal content is the same source in any file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from assoc.scene.scene import Scene
 
 @dataclass(frozen=True)
 class StudySource:
-    """A scene or a problem under its name.
+    """A scene or a problem with a name.
 
     Parameters
     ----------
     content : Scene or AssignmentProblem
     name : str
-        For people: the file's name, say.
+        For display, for example the file's name.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class StudySource:
     fingerprint: str = field(default="")
 
     def __post_init__(self) -> None:
-        # names of files may hold bytes that are no text, and columns of tables cannot
+        # file names may hold bytes that are not valid text, which table columns refuse
         object.__setattr__(self, "name", self.name.encode("utf-8", "backslashreplace").decode())
         if not self.fingerprint:
             object.__setattr__(self, "fingerprint", fingerprint(self.content))
@@ -50,7 +50,7 @@ class StudySource:
 
 
 def fingerprint(content: Source) -> str:
-    """Digest of what a file of it would hold (its arrays; not the archive's dates)."""
+    """Digest of the arrays that a file of the content holds (not of the archive's dates)."""
     digest = hashlib.sha256(type(content).__name__.encode())
     with tempfile.TemporaryDirectory(prefix="assoc-") as folder:
         path = Path(folder) / "content.npz"
@@ -73,7 +73,7 @@ def load_sources(files: Sequence[str]) -> tuple[StudySource, ...]:
 
 
 def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[StudySource, ...]:
-    """Sources under the names of their files: the last part of the path where that tells them apart.
+    """Sources with the names of their files: the last part of the path where that is unique.
 
     Raises
     ------
@@ -92,27 +92,27 @@ def named_sources(contents: Sequence[Source], files: Sequence[str]) -> tuple[Stu
 
 
 def study_sources(given: Any) -> tuple[StudySource, ...]:
-    """Scenes and problems, one or several, with or without names, as sources; unnamed ones are numbered.
+    """Scenes and problems, one or several, with or without names, as sources; those without a name are numbered.
 
     Raises
     ------
     InvalidInputError
-        There are none, or something is neither a scene nor a problem.
+        There are no sources, or one is neither a scene nor a problem.
     """
     every = (given,) if isinstance(given, (StudySource, Scene, AssignmentProblem)) else tuple(given)
     if not every:
         raise InvalidInputError("the study has no scenes and no problems")
     found = []
-    for number, one in enumerate(every, start=1):
-        if isinstance(one, (Scene, AssignmentProblem)):
-            kind = "scene" if isinstance(one, Scene) else "problem"
-            one = StudySource(one, getattr(one, "name", "") or f"{kind} {number}")
-        if not isinstance(one, StudySource):
-            raise InvalidInputError(f"sources: expected scenes or problems, got a {type(one).__name__}")
-        found.append(one)
-    names = [one.name for one in found]
-    # tables tell sources apart by their names
+    for number, item in enumerate(every, start=1):
+        if isinstance(item, (Scene, AssignmentProblem)):
+            kind = "scene" if isinstance(item, Scene) else "problem"
+            item = StudySource(item, getattr(item, "name", "") or f"{kind} {number}")
+        if not isinstance(item, StudySource):
+            raise InvalidInputError(f"sources: expected scenes or problems, got a {type(item).__name__}")
+        found.append(item)
+    names = [source.name for source in found]
+    # tables distinguish sources by their names
     return tuple(
-        replace(one, name=f"{one.name} ({number})") if names.count(one.name) > 1 else one
-        for number, one in enumerate(found, start=1)
+        replace(source, name=f"{source.name} ({number})") if names.count(source.name) > 1 else source
+        for number, source in enumerate(found, start=1)
     )

@@ -1,4 +1,4 @@
-"""What values a parameter of a design may take: a list, or a range to draw from."""
+"""The values that a design may take for a parameter: a list, or a range to draw from."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from assoc.errors import InvalidInputError
 
 @dataclass(frozen=True)
 class Values:
-    """A list of values, none of them twice."""
+    """A list of values without duplicates."""
 
     values: tuple[Any, ...]
 
     def draw(self, rng: np.random.Generator) -> Any:
-        """Draw one of them."""
+        """Draw a value."""
         return self.values[int(rng.integers(len(self.values)))]
 
 
@@ -33,7 +33,7 @@ class Range:
     logarithmic : bool
         Whether equal ratios are equally likely, rather than equal differences.
     whole : bool
-        Only whole numbers.
+        Whether only whole numbers are drawn.
     """
 
     low: float
@@ -62,7 +62,7 @@ def read_text(parameter: Parameter, text: str, label: str) -> Space:
     Raises
     ------
     InvalidInputError
-        No values, or one of the wrong type.
+        There are no values, or one has the wrong type.
     """
     parts = text.split(":")
     if parameter.kind in (int, float) and len(parts) in (2, 3):
@@ -77,7 +77,7 @@ def read_text(parameter: Parameter, text: str, label: str) -> Space:
 
 
 def read_value(parameter: Parameter, value: Any, label: str) -> Space:
-    """Read what a TOML file gives: one value, a list of them, or ``{low = .., high = .., log = true}``."""
+    """Read a value of a TOML file: one value, a list of them, or ``{low = .., high = .., log = true}``."""
     if isinstance(value, dict):
         unknown = sorted({*value} - {"low", "high", "log"})
         if unknown or not {"low", "high"} <= {*value} or parameter.kind not in (int, float):
@@ -88,16 +88,16 @@ def read_value(parameter: Parameter, value: Any, label: str) -> Space:
         return Values((parameter.check(value, label),))
     if not value:
         raise InvalidInputError(f"{label}: the list is empty, expected at least one value")
-    return values([parameter.check(one, label) for one in value])
+    return values([parameter.check(item, label) for item in value])
 
 
 def values(found: list[Any]) -> Values:
-    """Return the values without doubles, in the order given."""
+    """Return the values without duplicates, in the given order."""
     return Values(tuple(dict.fromkeys(found)))
 
 
 def make_range(parameter: Parameter, low: float, high: float, logarithmic: bool, label: str) -> Range:
-    """Return a checked range."""
+    """Check and return a range."""
     if parameter.kind is int and max(abs(low), abs(high)) >= 2**62:
         raise InvalidInputError(f"{label}: expected whole numbers within +-4e18, got a larger one")
     if not (math.isfinite(low) and math.isfinite(high) and low < high):

@@ -1,8 +1,8 @@
-"""The folder of a study: a manifest, and a log to which results are only ever appended.
+"""The folder of a study: a manifest, and a log to which results are appended.
 
-A line of the log is the checksum of what follows it, a blank, and JSON: a setting, or a batch of runs as columns.
-A line that was cut short (the power failed, the process was killed) fails its checksum and is passed over; the
-next line begins on a new line of the file. So whatever happens at whatever moment, finished batches stay.
+A line of the log is the checksum of the rest of the line, a blank, and JSON: a setting, or a batch of runs as columns.
+A truncated line (after a power failure or a killed process) fails its checksum and is skipped; the
+next entry begins on a new line of the file. So finished batches are never lost.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MANIFEST = "study.json"
 LOG = "runs.jsonl"
 REPORT = "tuning.json"
 
-# bytes of the manifest, and of a line of the log: a batch has a few thousand runs
+# bytes of the manifest, and of a line of the log; a batch has a few thousand runs
 _LONGEST = 32_000_000
 _NEW_MANIFEST = (
     f"the runs in {LOG} are not affected: start the same sweep in a new folder, and copy its {MANIFEST} here"
@@ -48,7 +48,7 @@ COLUMNS = (
     "correct_tuples",
     "trace",
 )
-"""Of a batch, each a list with one entry a run. ``setting`` and ``source`` are keys."""
+"""Columns of a batch, each a list with one entry per run. ``setting`` and ``source`` are keys."""
 
 RunKey = tuple[str, str, int, int]
 """Key of the setting, fingerprint of the source, repeat, scan."""
@@ -56,7 +56,7 @@ RunKey = tuple[str, str, int, int]
 
 @dataclass(frozen=True)
 class Manifest:
-    """What all runs of a study have in common; a folder takes runs of one study only.
+    """Properties that all runs of a study share; a folder takes the runs of one study only.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Manifest:
     gating : mapping
         Options of ``assoc.build_problem``.
     code : str
-        Digest of the solvers' and costs' source files; empty where it is not known.
+        Digest of the solvers' and costs' source files; empty if unknown.
     """
 
     package: str
@@ -80,7 +80,7 @@ class Manifest:
     code: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what the file holds."""
+        """Return the content of the file."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -115,19 +115,19 @@ class Manifest:
 
 
 class Store:
-    """An open study folder; one process at a time may write to it.
+    """An open study folder; only one process at a time may write to it.
 
     Parameters
     ----------
     folder : path-like
-        Made if it is not there.
+        Created if missing.
     manifest : Manifest
-        Must be that of the study in the folder, if there is one.
+        Must equal that of a study already in the folder.
 
     Raises
     ------
     InvalidInputError
-        Another study, another process at work in it, something else than a study, or no permission.
+        The folder holds another study or something else, is used by another process, or is not writable.
     """
 
     def __init__(self, folder: str | os.PathLike[str], manifest: Manifest) -> None:
@@ -173,24 +173,24 @@ class Store:
         return log
 
     def append(self, settings: Sequence[Setting], batch: Mapping[str, list[Any]]) -> int:
-        """Write a batch, with those of its settings that are new, and wait until the disk has it.
+        """Write a batch, with its new settings, and wait until it is on the disk.
 
         Parameters
         ----------
         settings : sequence of Setting
-            All that the batch refers to.
+            All settings of the batch.
         batch : mapping
-            The lists of `COLUMNS`; runs that are there already are left out.
+            The lists of `COLUMNS`; runs that are already saved are left out.
 
         Returns
         -------
         int
-            Number of runs that are new.
+            Number of new runs.
 
         Raises
         ------
         InvalidInputError
-            The disk is full, say. What was there before stays.
+            The file cannot be written (the disk is full, for example). What was saved before stays.
         """
         keys = list(run_keys(batch))
         fresh = [i for i, key in enumerate(keys) if key not in self.done]
@@ -200,7 +200,8 @@ class Store:
             return 0
         new = {setting.key: setting for setting in settings if setting.key not in self.settings}
         entries: list[Mapping[str, Any]] = [
-            {"setting_key": key, "solver": one.solver, "parameters": dict(one.parameters)} for key, one in new.items()
+            {"setting_key": key, "solver": setting.solver, "parameters": dict(setting.parameters)}
+            for key, setting in new.items()
         ]
         data = memoryview(b"".join(log_line(entry) for entry in [*entries, batch]))
         path = self.folder / LOG
@@ -210,7 +211,7 @@ class Store:
                 data = data[self._log.write(data) :]
             os.fsync(self._log.fileno())
         except BaseException as error:
-            # half a line would damage the next one, which is written when the disk has room again
+            # remove a partial line, which would damage the next one
             with suppress(OSError):
                 os.ftruncate(self._log.fileno(), before)
             if not isinstance(error, OSError):
@@ -246,7 +247,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     Raises
     ------
     InvalidInputError
-        There is no study in the folder, or it is of a later version, or damaged.
+        The folder holds no study, or one of a later version, or a damaged one.
     """
     path = Path(folder) / MANIFEST
     if not Path(folder).is_dir():
@@ -270,7 +271,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     if content.get("version") != VERSION:
         raise InvalidInputError(f"{path}: has version {content.get('version')!r}, this program reads version {VERSION}")
     try:
-        sources = {str(one["fingerprint"]): str(one["name"]) for one in content["sources"]}
+        sources = {str(source["fingerprint"]): str(source["name"]) for source in content["sources"]}
         limit = None if content["time_limit"] is None else float(content["time_limit"])
         gating, code = dict(content["gating"]), str(content.get("code", ""))
         return Manifest(str(content["assoc"]), int(content["seed"]), sources, limit, gating, code)
@@ -279,7 +280,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
 
 
 def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
-    """Yield the entries of the log in order; None for a line whose checksum is wrong."""
+    """Yield the entries of the log in order; None for a line with a wrong checksum."""
     path = Path(folder) / LOG
     try:
         with open_regular(path) as file:
@@ -295,7 +296,7 @@ def read_log(folder: str | os.PathLike[str]) -> Iterator[dict[str, Any] | None]:
 
 
 def damaged_lines(folder: str | os.PathLike[str]) -> int:
-    """Count the lines of the log that were not finished, or were changed afterwards."""
+    """Count the lines of the log that are truncated or were changed."""
     return sum(entry is None for entry in read_log(folder))
 
 
@@ -318,7 +319,7 @@ def _read_log_line(line: bytes) -> dict[str, Any] | None:
 
 
 def _sound(entry: Mapping[str, Any]) -> bool:
-    """Whether an entry has the shape that is written: a setting, or a batch of runs."""
+    """Whether an entry has the expected form: a setting, or a batch of runs."""
     if "setting_key" in entry:
         kinds = {"setting_key": str, "solver": str, "parameters": dict}
         return all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
@@ -334,7 +335,7 @@ def _text(value: object) -> bool:
 
 
 def _whole(value: object) -> bool:
-    # what a column of 64 bits holds
+    # within the range of 64 bits
     return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
 
 
@@ -359,7 +360,7 @@ _KINDS: Mapping[str, Callable[[object], bool]] = {
 
 
 def _lock(folder: Path) -> IO[bytes]:
-    """Lock the folder against a second process; the lock ends with the process, however that ends."""
+    """Lock the folder against a second process; the lock ends with the process in any case."""
     path = folder / ".lock"
     try:
         file = open_regular(path, "ab")

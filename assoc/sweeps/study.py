@@ -1,4 +1,4 @@
-"""A study: settings, sources and repeats; results are kept, and only missing runs are run."""
+"""A study: settings, sources and repeats; results are saved, and only missing runs are run."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class Counts:
     total : int
         Runs of the design.
     before : int
-        Those that were there already.
+        Runs that were saved before.
     new : int
-        Those done since.
+        Runs done since the start.
     solving : float
-        Seconds that the new ones took in the solvers, summed.
+        Total seconds of the new runs in the solvers.
     """
 
     total: int
@@ -45,7 +45,7 @@ class Counts:
 
     @property
     def done(self) -> int:
-        """Runs of the design that are done."""
+        """Number of runs of the design that are done."""
         return self.before + self.new
 
 
@@ -57,24 +57,24 @@ class Study(Shown):
     Parameters
     ----------
     sources : Scene, AssignmentProblem, or sequence of them
-        Each scan is a run of its own. Sources that are given with a name (`StudySource`) keep it.
+        Each scan is a run of its own. Sources with a name (`StudySource`) keep it.
     settings : Setting or sequence of Setting
-        As from `grid`.
+        Settings, for example from `grid`.
     repeats : int, or range
-        Number of runs of each setting on each scan, each with its own seed; or which ones.
+        Number of runs of each setting on each scan, each with its own seed; or the numbers of these runs.
     seed : int or None, default 0
-        All seeds derive from it and from what a run is; None: a random one.
+        All seeds derive from it and from what is run; None: a random seed.
     time_limit : float, optional
         Seconds for each run.
     gating : mapping
         Options of ``assoc.build_problem``.
     scans : sequence of range, optional
-        The scans of each source; all without it.
+        Scans of each source; by default all.
 
     Raises
     ------
     InvalidInputError
-        No settings or no sources, or numbers out of range.
+        There are no settings or no sources, or numbers are out of range.
     """
 
     sources: Any
@@ -97,7 +97,7 @@ class Study(Shown):
         put(self, "time_limit", checked_time_limit(self.time_limit))
         if self.scans is None:
             put(self, "scans", [range(source.num_scans) for source in self.sources])
-        if not all(isinstance(one, Sequence) and all(map(is_whole, one)) for one in self.scans or ()):
+        if not all(isinstance(scans, Sequence) and all(map(is_whole, scans)) for scans in self.scans or ()):
             raise InvalidInputError("scans: expected the numbers of the scans of each source, as ranges")
         if not isinstance(self.gating, Mapping):
             raise InvalidInputError(f"gating: expected a mapping, got {type(self.gating).__name__}")
@@ -107,7 +107,7 @@ class Study(Shown):
 
     @property
     def manifest(self) -> Manifest:
-        """What a folder must say to hold this study."""
+        """The manifest that a folder must have to hold this study."""
         names = {source.fingerprint: source.name for source in self.sources}
         return Manifest(__version__, whole_seed(self.seed), names, self.time_limit, dict(self.gating), code_digest())
 
@@ -118,9 +118,9 @@ class Study(Shown):
         return len(self.settings) * len(self.repeats) * sum(map(len, self.scans))
 
     def all_runs(self) -> Iterator[RunNumbers]:
-        """All runs, as (setting, source, repeat, scan): all settings once before the next repeat."""
+        """All runs as (setting, source, repeat, scan): all settings before the next repeat."""
         assert self.scans is not None and isinstance(self.repeats, range)
-        # loops, because itertools.product would first make a list of all repeats, however many there are
+        # loops, because itertools.product would first list all repeats, however many
         for repeat in self.repeats:
             for source, scans in enumerate(self.scans):
                 for setting in range(len(self.settings)):
@@ -128,13 +128,13 @@ class Study(Shown):
                         yield setting, source, repeat, scan
 
     def missing(self, store: Store) -> Iterator[RunNumbers]:
-        """Those runs that the store does not have."""
-        # a copy: runs that are added meanwhile are not asked for again
+        """Runs that the store does not have."""
+        # a copy: the store grows meanwhile
         done = frozenset(store.done)
         return (run for run, key in zip(self.all_runs(), self.keys(), strict=True) if key not in done)
 
     def keys(self) -> Iterator[RunKey]:
-        """Keys of all runs, in their order."""
+        """Keys of all runs in order."""
         settings = [setting.key for setting in self.settings]
         sources = [source.fingerprint for source in self.sources]
         return ((settings[run[0]], sources[run[1]], run[2], run[3]) for run in self.all_runs())
@@ -147,18 +147,18 @@ class Study(Shown):
         scheduler: str | None = None,
         progress: Progress | None = None,
     ) -> Counts:
-        """Run what is missing, and keep every result as it comes.
+        """Run what is missing, and save every result at once.
 
         Results are the same on every backend and with any number of workers; only times differ.
 
         Parameters
         ----------
         folder : path-like
-            Made if it is not there; a study in it goes on if it is this one (the design may have changed).
+            Created if missing; a study in it is continued if it is this one (the design may have changed).
         jobs : int, default 1
             Number of processes on this machine.
         scheduler : str, optional
-            Address of a dask scheduler, whose workers then do the work.
+            Address of a dask scheduler, whose workers then do the runs.
         progress : callable, optional
             Called with the `Counts` at the start and after each batch.
 
@@ -169,7 +169,7 @@ class Study(Shown):
         Raises
         ------
         InvalidInputError
-            The folder holds something else or cannot be written, or the scheduler does not answer.
+            The folder holds something else or is not writable, or the scheduler does not answer.
         """
         with Store(folder, self.manifest) as store:
             return self.run_in(store, jobs=jobs, scheduler=scheduler, progress=progress)
@@ -183,7 +183,7 @@ class Study(Shown):
         progress: Progress | None = None,
         on_result: Callable[[Result], object] | None = None,
     ) -> Counts:
-        """Do as `run` does, in a store that is open; ``on_result`` is called with each result that is kept."""
+        """Do the same as `run` with an open store; ``on_result`` is called with each saved result."""
         from assoc.sweeps.backends import dask, local
 
         missing = sum(1 for _ in self.missing(store))
@@ -217,12 +217,12 @@ class Study(Shown):
 
 
 def _settings(given: Any) -> tuple[Setting, ...]:
-    """All settings, each once."""
+    """All settings without duplicates."""
     if isinstance(given, Setting):
         return (given,)
-    for one in given:
-        if not isinstance(one, Setting):
-            raise InvalidInputError(f"settings: expected settings as from grid, got a {type(one).__name__}")
+    for setting in given:
+        if not isinstance(setting, Setting):
+            raise InvalidInputError(f"settings: expected settings as from grid, got a {type(setting).__name__}")
     found = tuple(dict.fromkeys(given))
     if not found:
         raise InvalidInputError("the design is empty: no settings to run")

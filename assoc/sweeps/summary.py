@@ -1,4 +1,4 @@
-"""A study in a table: one row a setting, means with intervals."""
+"""A study as a table with one row per setting: means with intervals."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 INTERVAL = "95 %"
-"""Header of the interval of the measure before it."""
+"""Header of the interval of the measure in the column before."""
 
 MEASURES = ("cost", "gap", "optimal", "iterations", "time", "correct")
-"""What is averaged; "correct" is the share of the true tuples that were found."""
+"""Measures that are averaged; "correct" is the share of the true tuples that were found."""
 
 FACTORS = {"optimal": 100.0, "correct": 100.0, "time": 1e3}
-"""What measures are multiplied by where people read them: per cent, milliseconds."""
+"""Factors of measures in printed tables: per cent, milliseconds."""
 
 
 @door
@@ -35,15 +35,15 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
     Parameters
     ----------
     study : DataFrame or path-like
-        What `load` returned, or the folder.
+        Result of `load`, or the folder of the study.
 
     Returns
     -------
     DataFrame
-        One row for each setting: ``solver``, the parameters that differ, ``setting``, ``runs``, and for each of
+        One row per setting: ``solver``, the parameters that differ, ``setting``, ``runs``, and for each of
         ``cost``, ``gap``, ``optimal`` (the share certified optimal), ``iterations``, ``time`` (seconds) and
         ``correct`` its mean and its 95 % interval (``_low``, ``_high``) by the bootstrap over problems and repeats.
-        ``infeasible`` counts the runs without a solution, which are in no mean.
+        ``infeasible`` counts the runs without a solution; no mean includes them.
     """
     import pandas as pd
 
@@ -67,7 +67,7 @@ def summarize(study: pd.DataFrame | str | os.PathLike[str]) -> pd.DataFrame:
 
 
 def varied(frame: pd.DataFrame) -> list[str]:
-    """Columns of the parameters of which a study has several values within one solver."""
+    """Columns of the parameters that have several values within one solver."""
     if "repeat" not in frame.columns:
         raise InvalidInputError("study: expected the runs of assoc.sweeps.load, got a table without 'repeat'")
     last = list(frame.columns).index("repeat")
@@ -77,7 +77,7 @@ def varied(frame: pd.DataFrame) -> list[str]:
 
 
 def by_problem(runs: pd.DataFrame, values: Floats) -> Floats:
-    """Values, one for each run, as an array (problems, repeats) with NaN where there is no run."""
+    """Values of runs as an array (problems, repeats), with NaN where there is no run."""
     problem = runs.groupby(["scene", "scan"], sort=True).ngroup().to_numpy()
     repeats, column = np.unique(runs["repeat"].to_numpy(), return_inverse=True)
     table = np.full((int(problem.max()) + 1, len(repeats)), np.nan)
@@ -86,9 +86,9 @@ def by_problem(runs: pd.DataFrame, values: Floats) -> Floats:
 
 
 def measured(runs: pd.DataFrame, measure: str) -> Floats:
-    """Values of a measure, one for each run; NaN where it has none.
+    """Values of a measure for each run; NaN where it has none.
 
-    ``correct`` is the share of the true tuples of one run; means of it are weighted by their number.
+    ``correct`` is the share of the true tuples of a run; its means are weighted by their number.
     """
     if measure == "correct":
         true = numbers(runs["true_tuples"])
@@ -97,25 +97,25 @@ def measured(runs: pd.DataFrame, measure: str) -> Floats:
     if measure == "optimal":
         return np.where(runs["cost"].isna(), np.nan, values)
     if measure == "gap":
-        # a gap of the size of rounding errors is 0
+        # a gap within rounding errors is 0
         values = np.where(values <= 1e-9 * np.maximum(1.0, runs["cost"].abs()), 0.0 * values, values)
     return np.where(np.isfinite(values), values, np.nan)
 
 
 def numbers(column: pd.Series[Any]) -> Floats:
-    """Return a column as floats, NaN where it has no value."""
+    """Return a column as floats, NaN where it is empty."""
     return column.to_numpy(dtype=float, na_value=np.nan)
 
 
 def summary_rows(summary: pd.DataFrame, *, brief: bool = False) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells of a summary for people; the columns before "runs" say which setting a row is.
+    """Headers and cells of a summary for display; the columns before "runs" identify the setting.
 
     Parameters
     ----------
     summary : DataFrame
-        Of `summarize`.
+        Result of `summarize`.
     brief : bool, default False
-        Leave out the intervals of measures that are the same in all runs.
+        Leave out the intervals of measures that are equal in all runs.
     """
     parameters = list(summary.columns[1 : list(summary.columns).index("setting")])
     measures = [name for name in MEASURES if summary[name].notna().any()]
@@ -154,7 +154,7 @@ def _number(value: float, name: str) -> str:
 
 
 def _spread(row: Sequence[str], column: int) -> bool:
-    """Whether the interval in a column says more than the value before it."""
+    """Whether an interval has a width, so that it adds to the value before it."""
     return row[column] not in ("-", f"{row[column - 1]} .. {row[column - 1]}")
 
 

@@ -1,4 +1,4 @@
-"""A search for good parameters, and a report on seeds and scans that were held out of the search."""
+"""A search for good parameters, with a report on seeds and scans that were held out."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
 
 TARGETS = ("gap", "time")
 PENALTY = 10.0
-"""A run that missed the optimum counts as so many times the cutoff in "time" (PAR10)."""
+"""Factor of the cutoff that a run without optimum counts in "time" (PAR10)."""
 
 _WIDTH = 4.0
-# more of these is never worse for the gap: they are a budget, not something to tune
+# a larger value of these never worsens the gap: they are a budget, not something to tune
 _BUDGETS = ("iterations", "patience", "nodes", "workers")
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Report:
     trials : int
     tuned, default : Setting
     training : tuple of float
-        Target of default and tuned where the search looked.
+        Target of default and tuned setting on the training runs.
     table : DataFrame
-        Both on what was held out: one row each with means and intervals.
+        Default and tuned setting on the held-out runs: one row each with means and intervals.
     difference : tuple of float
         Tuned less default in the target, held out: mean, low and high end of the 95 % interval over pairs.
     held_out : str
-        What was held out, in words.
+        Description of the held-out runs.
     """
 
     solver: str
@@ -92,7 +92,7 @@ def tune(
 ) -> Report:
     """Search the parameters of a solver with optuna's tree-structured Parzen estimator.
 
-    All runs are kept in the folder like those of a study; the same call again goes on where it was stopped.
+    All runs are saved in the folder as those of a study; the same call again continues where it was stopped.
 
     Parameters
     ----------
@@ -100,16 +100,16 @@ def tune(
     sources : Scene, AssignmentProblem, or sequence of them
     solver : str
     space : mapping, optional
-        Values or range of each parameter; without it the solver's numbers from a quarter of their default to
-        four times it, as far as the solver takes them.
+        Values or range of each parameter; by default the solver's numbers from a quarter of their default to
+        four times it, within the solver's limits.
     trials : int, default 100
-        Settings to try, the default one first if the space has it.
+        Number of settings to try; the first is the default if the space contains it.
     target : str, default "gap"
-        "gap": mean gap. "time": mean time, where a run without certified optimum counts ten times the cutoff,
-        which is the time limit, or without one the longest training run of the defaults.
+        "gap": mean gap. "time": mean time, where a run without certified optimum counts ten times the cutoff:
+        the time limit, or by default the longest training run of the default setting.
     repeats : int, default 3
-        Seeds a setting is trained with; as many others are held out. With four scans or more, the scans that
-        training sees (the even ones) are held out too.
+        Seeds for the training of a setting; as many others are held out. With four scans or more, training uses only
+        the even ones, and the others are held out too.
     seed, time_limit, gating, scans, jobs, scheduler, progress
         As in `Study`.
 
@@ -121,7 +121,7 @@ def tune(
     Raises
     ------
     InvalidInputError
-        Nothing to tune, optuna is missing, or what `Study` refuses.
+        There is nothing to tune, optuna is missing, or as for `Study`.
     """
     if target not in TARGETS:
         raise InvalidInputError(f"target: expected gap or time, got {target!r}")
@@ -130,16 +130,22 @@ def tune(
             raise InvalidInputError(f"{name}: expected a whole number >= 1, got {count!r}")
     optuna = _optuna()
     ranges = dict(space) if space else default_space(solver)
-    if not any(isinstance(one, Range) or len(one.values) > 1 for one in ranges.values()):
+    if not any(isinstance(choice, Range) or len(choice.values) > 1 for choice in ranges.values()):
         raise InvalidInputError(f"--tune: solver {solver!r} has nothing to tune here; give ranges in --grid")
     sources = study_sources(sources)
-    every = [list(one) for one in scans] if scans is not None else [list(range(one.num_scans)) for one in sources]
+    every = (
+        [list(range(source.num_scans)) for source in sources] if scans is None else [list(numbers) for numbers in scans]
+    )
     training, test, words = _split(every, repeats)
 
     def study(settings: Sequence[Setting], scans: Sequence[Sequence[int]], repeats: range) -> Study:
         return Study(sources, settings, repeats, seed, time_limit, gating or {}, scans)
 
-    fixed = {name: one.values[0] for name, one in ranges.items() if isinstance(one, Values) and len(one.values) == 1}
+    fixed = {
+        name: choice.values[0]
+        for name, choice in ranges.items()
+        if isinstance(choice, Values) and len(choice.values) == 1
+    }
     default = Setting(solver, fixed)
     with Store(folder, study([default], training, range(repeats)).manifest) as store:
         total = Counts(0, 0)
@@ -170,12 +176,12 @@ def tune(
         values: dict[Setting, float] = {}
         for _ in range(trials):
             trial = search.ask()
-            setting = Setting(solver, {name: _suggest(trial, name, one) for name, one in ranges.items()})
+            setting = Setting(solver, {name: _suggest(trial, name, choice) for name, choice in ranges.items()})
             if setting not in values:
                 runs = memory.of(evaluate([setting], training, range(repeats)))
                 values[setting] = float(scores(*runs, target, cutoff).mean())
             search.tell(trial, values[setting])
-        tuned = min(values, key=lambda one: values[one])
+        tuned = min(values, key=lambda setting: values[setting])
         held = _frame(folder, evaluate([default, tuned], test, range(repeats, 2 * repeats)))
     report = _report(solver, target, trials, tuned, default, (untuned, values[tuned]), held, cutoff, words)
     _save(Path(folder) / REPORT, report)
@@ -195,32 +201,35 @@ def _optuna() -> Any:
 
 def _split(scans: list[list[int]], repeats: int) -> tuple[list[list[int]], list[list[int]], str]:
     """Scans for training and for the report."""
-    if sum(map(len, scans)) < 4 or all(len(one) < 2 for one in scans):
+    if sum(map(len, scans)) < 4 or all(len(numbers) < 2 for numbers in scans):
         return scans, scans, f"seeds {repeats} to {2 * repeats - 1} on the same problems"
-    parts = [one if len(one) < 2 else one[::2] for one in scans], [one if len(one) < 2 else one[1::2] for one in scans]
+    parts = (
+        [numbers if len(numbers) < 2 else numbers[::2] for numbers in scans],
+        [numbers if len(numbers) < 2 else numbers[1::2] for numbers in scans],
+    )
     return (*parts, f"scans that training did not see, with seeds {repeats} to {2 * repeats - 1}")
 
 
 def default_space(solver: str) -> dict[str, Space]:
-    """Ranges around the defaults of a solver's numbers, as far as the solver takes them."""
+    """Ranges around the defaults of a solver's numbers, within the solver's limits."""
     found: dict[str, Space] = {}
     kind: Any = registry.parameters(solver)
-    for one in fields(kind):
-        value: Any = one.default
-        if one.name in _BUDGETS or type(value) not in (int, float) or value <= 0:
+    for item in fields(kind):
+        value: Any = item.default
+        if item.name in _BUDGETS or type(value) not in (int, float) or value <= 0:
             continue
-        option = parameter(solver, one.name)
-        low = _furthest(solver, one.name, value, value / _WIDTH)
-        high = _furthest(solver, one.name, value, value * _WIDTH)
+        option = parameter(solver, item.name)
+        low = _furthest(solver, item.name, value, value / _WIDTH)
+        high = _furthest(solver, item.name, value, value * _WIDTH)
         if option.kind is int:
             low, high = max(1, round(low)), round(high)
         if low < high:
-            found[one.name] = Range(low, high, logarithmic=True, whole=option.kind is int)
+            found[item.name] = Range(low, high, logarithmic=True, whole=option.kind is int)
     return found
 
 
 def _furthest(solver: str, name: str, good: float, wanted: float) -> float:
-    """The value nearest to the wanted one that the solver takes."""
+    """The value nearest to ``wanted`` that the solver accepts."""
     whole = isinstance(good, int)
 
     def taken(value: float) -> bool:
@@ -236,7 +245,7 @@ def _furthest(solver: str, name: str, good: float, wanted: float) -> float:
     for _ in range(20):
         middle = (good + bad) / 2
         good, bad = (middle, bad) if taken(middle) else (good, middle)
-    # four digits are enough, and not beyond the limit
+    # four digits, and not beyond the limit
     rounded = float(f"{good:.4g}")
     return rounded if taken(rounded) else good
 
@@ -250,20 +259,20 @@ def _suggest(trial: Any, name: str, space: Space) -> Any:
 
 
 def _point(default: Setting, space: Mapping[str, Space]) -> dict[str, Any]:
-    """The defaults as the first trial, as far as the space holds them."""
+    """The default values as the first trial, as far as the space contains them."""
     point = {}
-    for name, one in space.items():
+    for name, choice in space.items():
         value = default.parameters[name]
-        if isinstance(one, Range):
-            if one.low <= value <= one.high:
+        if isinstance(choice, Range):
+            if choice.low <= value <= choice.high:
                 point[name] = value
-        elif len(one.values) > 1 and value in one.values:
+        elif len(choice.values) > 1 and value in choice.values:
             point[name] = value
     return point
 
 
 class _Memory:
-    """Cost, bound and time of all runs in the folder, kept as they come."""
+    """Cost, bound and time of all runs in the folder, updated with each result."""
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self._runs: dict[RunKey, tuple[float | None, float | None, float | None]] = {}
@@ -280,7 +289,7 @@ class _Memory:
             self._runs.setdefault(key, value)
 
     def of(self, study: Study) -> tuple[Floats, Floats, Floats]:
-        """Costs, bounds and times of the runs of a study, NaN where there is none."""
+        """Costs, bounds and times of the runs of a study, NaN where there are none."""
         found = [self._runs[key] for key in study.keys()]
         cost, bound, time = np.array(found, dtype=float).T
         return cost, bound, time
@@ -289,7 +298,7 @@ class _Memory:
 def _frame(folder: str | os.PathLike[str], study: Study) -> pd.DataFrame:
     """The runs of a study as a table."""
     frame = load(folder)
-    # the folder may know a scene under an earlier name of its file
+    # the folder may hold a scene under an earlier file name
     names = read_manifest(folder).sources
     keys = {(key[0], names[key[1]], *key[2:]) for key in study.keys()}
     columns = (frame[name] for name in ("setting", "scene", "repeat", "scan"))
@@ -297,7 +306,7 @@ def _frame(folder: str | os.PathLike[str], study: Study) -> pd.DataFrame:
 
 
 def scores(cost: Floats, bound: Floats, time: Floats, target: str, cutoff: float) -> Floats:
-    """Target of each run; less is better. A run without a solution counts as a very bad one."""
+    """Target of each run; lower is better. A run without a solution counts as a very bad one."""
     gap = cost - bound
     if target == "gap":
         return np.where(np.isfinite(gap), gap, 1e6)
@@ -320,14 +329,14 @@ def _report(
 
     cost, bound, time = (held[name].to_numpy(dtype=float) for name in ("cost", "lower_bound", "time"))
     held = held.assign(score=scores(cost, bound, time, target, cutoff))
-    held_by = {one: held[held["setting"] == one.key] for one in (default, tuned)}
-    tables = {one: by_problem(runs, runs["score"].to_numpy(dtype=float)) for one, runs in held_by.items()}
+    held_by = {setting: held[held["setting"] == setting.key] for setting in (default, tuned)}
+    tables = {setting: by_problem(runs, runs["score"].to_numpy(dtype=float)) for setting, runs in held_by.items()}
     pairs = tables[tuned] - tables[default]
     low, high = mean_interval(pairs)
     summary = summarize(held).set_index("setting")
     rows = summary.loc[[default.key, tuned.key]].reset_index()
     rows.insert(0, "parameters", ["default", "tuned"])
-    rows["score"] = [float(np.nanmean(tables[one])) for one in (default, tuned)]
+    rows["score"] = [float(np.nanmean(tables[setting])) for setting in (default, tuned)]
     difference = float(np.nanmean(pairs)), low, high
     return Report(solver, target, trials, tuned, default, training, rows, difference, words)
 

@@ -1,4 +1,4 @@
-"""What a worker does: a batch of runs, each with its own seed, on scenes that it gets once."""
+"""A worker's task: a batch of runs, each with its own seed; scenes are sent to it once."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Batch:
     Attributes
     ----------
     settings : tuple of Setting
-        Those that the runs refer to.
+        The settings of the runs.
     runs : list of (setting, source, repeat, scan)
-        Setting and source as numbers, within the batch and within the job.
+        Setting and source as numbers, indices into the batch's settings and the job's sources.
     """
 
     settings: tuple[Setting, ...]
@@ -48,7 +48,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Result:
-    """The results of a batch: the columns of `store.COLUMNS`, and the seconds of the whole batch."""
+    """The results of a batch: the columns of `store.COLUMNS`, and the seconds that the batch took."""
 
     batch: Batch
     columns: dict[str, list[Any]]
@@ -57,21 +57,21 @@ class Result:
 
 @dataclass(frozen=True)
 class Job:
-    """What all runs share; a worker gets it once.
+    """Data that all runs share; a worker gets it once.
 
     Parameters
     ----------
     sources : tuple of StudySource
     seed : int
-        Of the study.
+        Seed of the study.
     time_limit : float or None
         Seconds for each run.
     gating : mapping
         Options of ``assoc.build_problem``.
     package : str
-        Version of assoc, which the worker's must be.
+        Version of assoc; the worker's must be the same.
     code : str
-        Digest of its solvers, which the worker's must have, too.
+        Digest of the solvers' code; the worker's must be the same.
     """
 
     sources: tuple[StudySource, ...]
@@ -88,11 +88,11 @@ class Job:
     _busy: Any = field(default_factory=threading.Lock, compare=False)
 
     def __reduce__(self) -> Any:
-        # a worker's cache is not sent to others
+        # without the cache of this process
         return Job, (self.sources, self.seed, self.time_limit, dict(self.gating), self.package, self.code)
 
     def problem(self, source: int, scan: int) -> tuple[AssignmentProblem, Tuples | None]:
-        """Return a problem and its true tuples (None where they are not known); recent ones are kept."""
+        """Return a problem and its true tuples (None if they are unknown); recent ones are cached."""
         key = (source, scan)
         with self._busy:
             if key in self._problems:
@@ -118,7 +118,7 @@ class Job:
             return content, None
         measured = content.scan(scan)
         problem, truth = build_problem(content, measured, **self.gating), measured.true_tuples()
-        # runs share the problem: its preparation must not count in the time of the first
+        # runs share the problem: its preparation must not count as time of the first run
         prepare(problem)
         return problem, None if truth is None else {*map(tuple, truth.tolist())}
 
@@ -129,7 +129,7 @@ class Job:
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def warm_up(self, setting: Setting, problem: AssignmentProblem) -> None:
-        """Let a family of settings load most of its code on its first problem, for at most a second."""
+        """Load most of the code that a family of settings needs, on its first problem, for at most a second."""
         from assoc.solvers.assign import assign
 
         if setting.family in self._warm:
@@ -142,10 +142,10 @@ class Job:
         self._warm.add(setting.family)
 
     def solve(self, setting: Setting, problem: AssignmentProblem, seed: int) -> Solution:
-        """Solve a problem so that the time is the solver's alone.
+        """Solve a problem, with the solver's time alone.
 
-        A run during which code was compiled or loaded, or a module imported, is done again: no choice of problems
-        to warm up on is sure to need all of the code that a later one needs.
+        A run during which code was compiled or loaded, or a module imported, is repeated: warming up on some
+        problems may miss code that a later one needs.
         """
         from assoc.solvers.assign import assign
 
@@ -160,12 +160,12 @@ class Job:
 
 
 def run_batch(job: Job, batch: Batch) -> Result:
-    """Do the runs of a batch, one after the other.
+    """Do the runs of a batch one after the other.
 
     Raises
     ------
     InvalidInputError
-        The worker's version of assoc is another one, or a solver refuses a setting on these costs.
+        The worker has another version of assoc, or a solver refuses a setting for these costs.
     """
     import time
 
@@ -208,7 +208,7 @@ def _row(job: Job, setting: Setting, source: int, repeat: int, scan: int) -> Seq
 
 
 def _thinned(solution: Solution) -> list[tuple[int, float, float]]:
-    """Iteration, seconds and cost at some improvements; the first and the last are among them."""
+    """Iteration, seconds and cost at some improvements, among them the first and the last."""
     points: list[tuple[int, float, float]] = []
     for point in solution.trace:
         if np.isfinite(point.cost) and (not points or point.cost < points[-1][2]):

@@ -1,1 +1,1 @@
-"""Where the runs of a study are computed: in processes or on a cluster."""
+"""Backends that compute the runs of a study: processes or a cluster."""

@@ -1,4 +1,4 @@
-"""Runs grouped into batches that take about the same time, however long a run takes."""
+"""Runs grouped into batches that take about the same time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from assoc.sweeps.setting import Setting
 from assoc.sweeps.worker import Batch, Result
 
 RunNumbers = tuple[int, int, int, int]
-"""Setting, source, repeat, scan; the first two as numbers."""
+"""Setting, source, repeat, scan; the first two as indices."""
 
 MOST_RUNS = 2000
 
@@ -16,14 +16,14 @@ MOST_RUNS = 2000
 class Batches:
     """An iterator of batches; it learns from results how long runs take.
 
-    How runs are put together changes nothing in their results.
+    The grouping does not affect results.
 
     Parameters
     ----------
     settings : sequence of Setting
     runs : iterator of (setting, source, repeat, scan)
     seconds : float
-        What a batch should take.
+        Target time of a batch.
     """
 
     def __init__(self, settings: Sequence[Setting], runs: Iterator[RunNumbers], seconds: float) -> None:
@@ -61,7 +61,7 @@ class Batches:
         return self._of_setting.get(setting.key, unknown)
 
     def learn(self, result: Result) -> None:
-        """Take in how long a batch took; what is not the solvers' is shared among its runs."""
+        """Learn from the time of a batch; time outside the solvers is shared among its runs."""
         columns = result.columns
         times = [time or 0.0 for time in columns["time"]]
         beside = max(0.0, result.seconds - sum(times)) / len(times)

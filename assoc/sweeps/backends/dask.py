@@ -1,4 +1,4 @@
-"""Batches done by the workers of a dask.distributed scheduler."""
+"""Batches run by the workers of a dask.distributed scheduler."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _BATCHES_PER_THREAD = 3
 
 
 def connect(address: str, timeout: float = 10.0) -> Any:
-    """Connect to a scheduler, within so many seconds.
+    """Connect to a scheduler.
 
     Raises
     ------
     InvalidInputError
-        dask is not installed, or nobody answers there.
+        dask is not installed, or nothing answers at the address within ``timeout`` seconds.
     """
     try:
         from distributed import Client
@@ -41,7 +41,7 @@ def connect(address: str, timeout: float = 10.0) -> Any:
 
 
 def _quiet() -> None:
-    """Keep distributed from logging lost connections to stderr: our message is one line."""
+    """Keep distributed from logging lost connections to stderr: the package prints one line instead."""
     import logging
 
     for name in ("distributed", "distributed.client", "distributed.comm", "distributed.core", "tornado"):
@@ -51,8 +51,8 @@ def _quiet() -> None:
 class DaskWorkers:
     """The workers of a scheduler, for one job.
 
-    What all runs share is sent to every worker once. Workers may come and go: what a lost one had in hand
-    is done again by another, with the same result, because seeds belong to runs.
+    The data that all runs share are sent to every worker once. Workers may come and go: the batches of a lost worker
+    are repeated by another, with the same results, because seeds belong to runs.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ class DaskWorkers:
         self._running: dict[Any, tuple[Batch, int]] = {}
 
     def run(self, batches: Iterator[Batch]) -> Iterator[Result]:
-        """Do batches and yield results as they come.
+        """Run batches and yield results as they arrive.
 
         Raises
         ------
         InvalidInputError
-            The scheduler is lost, or a batch took several workers down with it.
+            The connection is lost, or workers were lost in several attempts at a batch.
         """
         self._wait_for_workers()
         self._share()
@@ -125,7 +125,7 @@ class DaskWorkers:
                 self._share()
             self._submit(batch, attempt + 1)
         except Exception as error:
-            # a worker that cannot even import this package, say
+            # for example a worker that cannot import this package
             self._check_scheduler()
             raise InvalidInputError(
                 f"--scheduler: a worker failed: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
@@ -146,7 +146,7 @@ class DaskWorkers:
 
 
 def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator[Result]:
-    """Do batches on the workers of the scheduler at ``address``.
+    """Run batches on the workers of the scheduler at ``address``.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def run_with_dask(job: Job, batches: Iterator[Batch], address: str) -> Generator
     client = connect(address)
     try:
         yield from DaskWorkers(client, job).run(batches)
-    except OSError:  # timeouts and closed connections among them
+    except OSError:  # includes timeouts and closed connections
         raise InvalidInputError(_LOST) from None
     finally:
         client.close(timeout=2)

@@ -1,4 +1,4 @@
-"""Batches done on this machine: in this process, or by joblib in several."""
+"""Batches run on this machine: in this process, or by joblib in several."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ _JOB = ".job-"
 
 
 def run_here(job: Job, batches: Iterable[Batch]) -> Generator[Result]:
-    """Do batches one after the other in this process."""
+    """Run batches one after the other in this process."""
     for batch in batches:
         yield run_batch(job, batch)
 
 
 def run_with_joblib(job: Job, batches: Iterable[Batch], jobs: int, folder: Path) -> Generator[Result]:
-    """Do batches in processes, and yield results as they come.
+    """Run batches in processes, and yield results as they arrive.
 
-    What all runs share goes through a file in the study's folder that each process reads once; a task carries
-    its batch alone.
+    Data that all runs share are in a file in the study's folder, which each process reads once; a task holds only
+    its batch.
 
     Raises
     ------
     InvalidInputError
-        A process was killed (by a lack of memory, say), or it raised this itself.
+        A process was killed (by a lack of memory, for example), or a run raised this itself.
     """
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
-    # joblib starts a process anew where one was idle for long
+    # joblib starts a new process where one was idle for long
     with _shared(job, folder) as (path, digest), safe_path():
         require_processes(jobs)
         parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=2 * jobs)
         try:
             with signals_as_they_are(), _interrupts_ignored():
-                # the call starts the processes, and they inherit that; Ctrl-C reaches the whole group
+                # this call starts the processes, which inherit it; Ctrl-C reaches the whole group
                 results = parallel(delayed(run_in_process)(str(path), digest, os.getpid(), batch) for batch in batches)
             yield from results
         except BrokenProcessPool:
@@ -101,7 +101,7 @@ def _interrupts_ignored() -> Iterator[None]:
 
 
 def stop_workers() -> None:
-    """End the worker processes now, whatever they are doing."""
+    """End the worker processes now."""
     from joblib.externals.loky import reusable_executor
 
     executor = reusable_executor._executor
@@ -113,14 +113,14 @@ _job: tuple[str, Job] | None = None
 
 
 def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
-    """Do a batch in a worker process, of the job in the file ``path``, which the process reads once."""
+    """Run a batch in a worker process; it reads the job from the file ``path`` once."""
     global _job
     if _job is None or _job[0] != path:
         forget_safe_path()
         end_with_parent(parent, path)
         with open_regular(path) as file:
             content = file.read()
-        # other users may be able to write to the study's folder, and a pickle can run any code
+        # other users may have write access to the study's folder, and a pickle can run any code
         if content_digest(content) != digest:
             raise InvalidInputError(f"{path}: was changed by someone else")
         _job = path, pickle.loads(content)
@@ -128,5 +128,5 @@ def run_in_process(path: str, digest: str, parent: int, batch: Batch) -> Result:
 
 
 def content_digest(content: bytes) -> str:
-    """Return the digest by which a worker knows the job file of its own sweep."""
+    """Return the digest by which a worker recognises the job file of its sweep."""
     return hashlib.sha256(content).hexdigest()
