@@ -1,6 +1,6 @@
 """Which measurements, from several sensors, came from the same target, and which are false alarms?
 
-The public names below are loaded on first use, so that ``import assoc`` stays quick.
+The public names below are loaded on first use, so that ``import assoc`` is quick.
 """
 
 from assoc._system import first_import as _first_import  # noqa: F401

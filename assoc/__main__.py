@@ -21,7 +21,7 @@ PROGRAMS = {
     "register": ("find biases of sensors", "scene.npz -o registered.npz"),
     "sweep": ("compare parameters", "scene.npz --solver aco --grid alpha=1,2,3 -o study/"),
 }
-"""Name of each: a module ``assoc.NAME`` with a function ``start``; what it does, and an example."""
+"""For each program, a module ``assoc.NAME`` with a function ``start``: what it does, and an example."""
 
 _OTHERS = {
     "check": ("check a proof, or a solution, in exact arithmetic", "problem.txt proof.json"),
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         forwarded.append(words.pop(0))
     name, *rest = words or ["--help"]
     if name == "check":
-        # a file that stands alone: it shares nothing with the other programs
+        # check.py stands alone: it shares nothing with the other programs
         prepare_streams()
         return import_module("assoc.check").main(rest)
     if name in PROGRAMS:

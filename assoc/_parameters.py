@@ -1,4 +1,4 @@
-"""Parameter dataclasses: one way to check them, and one way to read them from text."""
+"""Parameter dataclasses: how they are checked, and how they are read from text."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hin
 
 from assoc.errors import InvalidInputError
 
-# seconds, thirty years
+# seconds, about thirty years
 _FOREVER = 1e9
 
 
 class Parameter:
-    """One parameter, given by text on a command line or by a value in a configuration file.
+    """A parameter, given as text on a command line or as a value in a configuration file.
 
     Parameters
     ----------
     owner : type
         A parameter dataclass; its fields may carry metadata "help".
     field : dataclasses.Field
-        The field of it.
+        The field of this dataclass.
     """
 
     def __init__(self, owner: type, field: Field[Any]) -> None:
@@ -38,7 +38,7 @@ class Parameter:
         if get_origin(self.kind) in (Union, types.UnionType):
             self.optional = type(None) in get_args(self.kind)
             kinds = [kind for kind in get_args(self.kind) if kind is not type(None)]
-            # "int | float" reads as a float; other unions are no option
+            # "int | float" reads as a float; other unions are not options
             self.kind = kinds[0] if len(kinds) == 1 else float if {*kinds} == {int, float} else object
         if get_origin(self.kind) is Literal:
             self.choices = get_args(self.kind)
@@ -50,7 +50,7 @@ class Parameter:
         return self.kind in (int, float, str, bool)
 
     def parse(self, text: str, label: str) -> Any:
-        """Turn text from a command line into the value."""
+        """Convert text of a command line to the value."""
         try:
             value = self.kind(text)
         except ValueError:
@@ -59,7 +59,7 @@ class Parameter:
         return self.check(value, label)
 
     def check(self, value: Any, label: str) -> Any:
-        """Check the type of a value from a configuration file; whole numbers will do for numbers."""
+        """Check the type of a value from a configuration file; whole numbers are accepted as floats."""
         if value is None and self.optional:
             return None
         if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
@@ -81,14 +81,14 @@ def parameters_of(owner: type) -> list[Parameter]:
 
 
 def is_whole(value: object, least: float = -math.inf, most: float = math.inf) -> bool:
-    """Whether a value is a whole number in this range; true and false are none."""
-    if type(value) is int:  # asking whether it is any whole number takes ten times as long
+    """Whether a value is a whole number in this range; True and False are not."""
+    if type(value) is int:  # ten times quicker than the check for any whole number
         return least <= value <= most
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
 def is_number(value: object, least: float = -math.inf, most: float = math.inf) -> bool:
-    """Whether a value is a finite number in this range; true and false are none."""
+    """Whether a value is a finite number in this range; True and False are not."""
     if type(value) is float:
         return math.isfinite(value) and least <= value <= most
     if not isinstance(value, Real) or isinstance(value, bool):
@@ -108,7 +108,7 @@ def positive(value: object, what: str, *, zero: bool = False) -> float:
 
 
 def whole_seed(seed: object) -> int:
-    """Return a seed as an int; None draws one, so that every call is another.
+    """Return a seed as an int; for None a random one.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def whole_seed(seed: object) -> int:
 
 
 def checked_time_limit(time_limit: object) -> float | None:
-    """Return a time limit as a float, or None; refuse what is no number of seconds above 0."""
+    """Return a time limit as a float, or None; refuse anything but seconds above 0."""
     if time_limit is None:
         return None
     limit: Any = time_limit
@@ -134,22 +134,22 @@ def checked_time_limit(time_limit: object) -> float | None:
 
 
 class Parameters:
-    """Base of the parameter dataclasses; gives them one way to check and to complain."""
+    """Base of the parameter dataclasses, with their checks."""
 
     __slots__ = ()
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """Estimate the memory that a solver takes with these parameters, beside the problem itself.
+        """Estimate the memory that a solver takes with these parameters, in addition to the problem.
 
         Parameters
         ----------
         num_columns, num_rows : int
-            Of the packing: candidate tuples and measurements.
+            Size of the packing: candidate tuples and measurements.
 
         Returns
         -------
         (float, str, str) or None
-            Bytes, what would take them, and how to take fewer; None: next to nothing.
+            Bytes, what takes them, and how to take fewer; None: next to nothing.
         """
         return None
 
@@ -158,7 +158,7 @@ class Parameters:
             raise InvalidInputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
 
     def _whole(self, *names: str, least: int = 1, most: int | None = None) -> None:
-        """Refuse fields that are not whole numbers of at least so much, or from least to most."""
+        """Refuse fields that are not whole numbers of at least ``least``, or from least to most."""
         limit = math.inf if most is None else most
         for name in names:
             if not is_whole(getattr(self, name), least, limit):

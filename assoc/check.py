@@ -3,18 +3,19 @@
     python -m assoc.check PROBLEM SOLUTION        is it feasible, and what does it cost?
     python -m assoc.check PROBLEM PROOF           the same, and the lower bound that the proof gives
 
-Needs nothing but Python: copy it anywhere. It shares no code with the solvers. Numbers are whole multiples of 1e-60:
-nothing is ever rounded. Exit code 0: what the file claims holds; 1: it does not; 2: a file cannot be read.
+Needs only Python: copy it anywhere. It shares no code with the solvers. Numbers are whole multiples of 1e-60:
+nothing is ever rounded. Exit code 0: the claims of the file hold; 1: they do not; 2: a file cannot be read.
 
 Why a proof holds. Every measurement (row) must be in exactly one chosen tuple. For any multipliers u of the rows, a
-solution costs at least sum(u) if no tuple costs less than the u of its measurements together; where one does, the u of
-its first row is lowered by what is lacking. What a tuple costs above its u any solution with it costs above sum(u):
-where that is beyond the target, the cost of the solution at hand, the tuple is left out; so are tuples that cost no
-less than their measurements alone. Rows that share no tuple, directly or through others, are bounded apart. In a tree,
-a node asks whether rows a and b are in one tuple: either only tuples remain that have both or neither, or none with
-both remains; its bound is the least of its leaves'. A cut is an odd number n of rows: at most (n - 1) / 2 pairs of
-them are in chosen tuples (half the sum of the rows, rounded down); it is one more row, with a multiplier of at most 0.
-Costs are multiples of a unit, and so is a solution's: bounds are raised to the next multiple.
+solution costs at least sum(u) if no tuple costs less than the sum of its measurements' u; where one does, the u of
+its first row is lowered by the difference. A solution with a tuple exceeds sum(u) at least by the tuple's cost above
+its u: a tuple for which that is beyond the target, the cost of the given solution, is left out; so are tuples that
+cost no less than their measurements alone. Rows that share no tuple, directly or through others, are bounded
+separately. In a tree, a node branches on whether rows a and b are in one tuple: in one child only tuples with both or
+neither remain, in the other those without both; its bound is the least of its leaves'. A cut is an odd number n of
+rows: chosen tuples contain at most (n - 1) / 2 pairs of them (half the sum of the rows, rounded down); it is an
+additional row with a multiplier of at most 0.
+Costs are multiples of a unit, and so are a solution's: bounds are rounded up to the next multiple.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from collections import Counter
 DECIMALS = 60
 NUMBER = re.compile(r"[+-]?[0-9]{1,400}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
 MOST_ROWS, MOST_BYTES, DEEPEST = 1_000_000, 200_000_000, 1_000
-UNPACKED, TIMES = 4_000_000, 30  # bytes that a packed file may hold, or so many times its own
+UNPACKED, TIMES = 4_000_000, 30  # bytes that a compressed file may hold, or so many times its own size
 Row = tuple[int, int]  # sensor, index from 1; cuts are (-1, number)
 Column = tuple[int, tuple[Row, ...]]  # cost, rows
 
@@ -91,12 +92,12 @@ class Problem:
         alone = {own[0]: cost for cost, own in every if len(own) == 1}
         if dummies and len(alone) < len(self.rows):
             raise ValueError("with dummies, each measurement must be listed as a tuple of its own")
-        # tuples that can be of use
+        # tuples that can be part of an optimum
         self.columns = [(c, own) for c, own in every if len(own) == 1 or not dummies or c < sum(alone[r] for r in own)]
 
 
 def read_text(path: str) -> str:
-    """Return what a file, or one packed by xz, holds."""
+    """Return the content of a file, which may be compressed by xz."""
     most = min(MOST_BYTES, max(UNPACKED, TIMES * os.path.getsize(path))) if path.endswith(".xz") else MOST_BYTES
     with lzma.open(path) if path.endswith(".xz") else open(path, "rb") as file:
         content = file.read(most + 1)
@@ -127,7 +128,7 @@ def read_problem(path: str) -> Problem:
 
 
 def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = None) -> int:
-    """Return what a choice of tuples costs; refuse it where it is no solution, or does not cost what is claimed."""
+    """Return the cost of a choice of tuples; refuse it if it is no solution, or if its cost is not as claimed."""
     used: set[Row] = set()
     for one in chosen:
         if one not in problem.costs:
@@ -145,7 +146,7 @@ def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = Non
 
 
 def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row], list[Column]]]:
-    """Return rows that belong together, with their tuples."""
+    """Return rows that are connected, with their tuples."""
     group = {row: [row] for row in every}
     for _, own in columns:
         for row in own[1:]:
@@ -160,23 +161,23 @@ def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row],
 
 
 def bounded(columns: list[Column], needed: set[Row], u: dict[Row, int], sides: dict[Row, int]) -> int | None:
-    """Return the bound of multipliers, after lowering them; None where a row that is needed has no tuple."""
+    """Return the bound of multipliers, after lowering them; None where a needed row has no tuple."""
     if not needed <= {row for _, own in columns for row in own}:
         return None
     for row in u.keys() - needed:
-        u[row] = min(u[row], 0)  # what may stay uncovered must not earn by it
+        u[row] = min(u[row], 0)  # a row that may stay uncovered must not raise the bound
     for cost, own in columns:
         u[own[0]] += min(cost - sum(u[row] for row in own), 0)
     return sum(value * sides.get(row, 1) for row, value in u.items())
 
 
 def cheap(columns: list[Column], u: dict[Row, int], most: int) -> list[Column]:
-    """Return the tuples that cost at most so much above their multipliers."""
+    """Return the tuples that cost at most ``most`` above their multipliers."""
     return [one for one in columns if one[0] - sum(u[row] for row in one[1]) <= most]
 
 
 def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list[Column], dict[Row, int]]:
-    """Return the columns with the cuts as rows, once for each pair of a cut's rows that they have; the cuts' sides."""
+    """Return the columns with the cuts as rows, once for each pair of a cut's rows in them; and the cuts' sides."""
     cuts_of, sides = {row: list[Row]() for row in rows}, dict[Row, int]()
     for place, cut in enumerate(_listed(cuts)):
         inside = [_as_row(one) for one in _listed(cut)]
@@ -229,14 +230,14 @@ def tree_bound(tree: dict[str, object], columns: list[Column], rows: list[Row], 
 
 
 def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
-    """Return the lower bound that a proof gives; it is at most the target, the cost of a solution."""
+    """Return the lower bound that a proof gives, at most the target (the cost of a solution)."""
     if proof.get("problem") != problem.digest:
         raise RefusedError("the proof is for another problem")
     columns, bound, u = problem.columns, None, dict.fromkeys(problem.rows, 0)
     for stage in _listed(proof.get("multipliers")) or [None]:
         by_sensor = zip(_listed(stage, len(problem.sizes)), problem.sizes, strict=True)
         values = [number(value) for own, size in by_sensor for value in _listed(own, size)]
-        if bound is not None:  # no solution below the target has what the stage before found to be too dear
+        if bound is not None:  # no solution below the target has the tuples that the stage before left out
             columns = cheap(columns, u, target - bound)
         u = dict(zip(problem.rows, values, strict=True))
         bound = bounded(columns, problem.needed, u, {})
@@ -259,7 +260,7 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
 
 
 def check(problem: Problem, text: str) -> list[str]:
-    """Return what holds, in lines; raise `RefusedError` where a claim does not."""
+    """Return lines that say what holds; raise `RefusedError` where a claim does not."""
     if not text.lstrip().startswith("{"):
         lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
         if not lines or lines[0] != ["assoc-solution", "1"]:
@@ -282,7 +283,7 @@ def check(problem: Problem, text: str) -> list[str]:
 
 
 def main(words: list[str]) -> int:
-    """Run the program; its exit code."""
+    """Run the program; returns its exit code."""
     if len(words) != 2 or words[0].startswith("-"):
         print(__doc__)
         return 0 if words[:1] in (["-h"], ["--help"]) else 2

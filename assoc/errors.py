@@ -1,4 +1,4 @@
-"""The errors that the package raises on purpose, all ValueErrors with one clear line; and its warnings."""
+"""Errors that the package raises on purpose, all ValueErrors with a one-line message; and its warnings."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ class AssocError(ValueError):
 
 
 class InvalidInputError(AssocError):
-    """A file, field or argument is not what it should be; the message names it and what was expected."""
+    """A file, field or argument is wrong; the message names it and what was expected."""
 
 
 class InfeasibleError(AssocError):
-    """The problem has no solution at all (possible only without dummies), or no solution was found."""
+    """The problem has no solution (possible only without dummies), or none was found."""
 
 
 class LimitExceededError(AssocError):
-    """The work asked for exceeds a stated limit; the message gives the number and what to change."""
+    """The work exceeds a limit; the message gives the number and what to change."""
 
 
 class MissingExtraError(AssocError, ImportError):
@@ -27,12 +27,12 @@ class MissingExtraError(AssocError, ImportError):
 
 
 class AssocWarning(UserWarning):
-    """What is legal and almost surely a mistake, as degrees where radians are meant; one clear line."""
+    """Legal input that is probably a mistake, such as degrees instead of radians; one line."""
 
 
 def warn(message: str) -> None:
     """Issue an `AssocWarning` at the line of the user's code that called the package."""
-    level = 2  # where `frame` stands, seen from `warnings.warn`
+    level = 2  # stack level of `frame`, seen from `warnings.warn`
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "assoc":
         frame, level = frame.f_back, level + 1

@@ -1,4 +1,4 @@
-"""``python -m assoc.live``: tracks of plots as they come, until they end or a signal ends the program.
+"""``python -m assoc.live``: tracks plots as they come, until they end or a signal ends the program.
 
 This is a program: the package must not import it. Imports inside functions keep --help quick.
 """
@@ -73,7 +73,7 @@ def _tracker(scene: Scene, given: Given, settings: dict[str, Any]) -> LiveTracke
 
     given["filter"] = given["filter"] or "imm-cv"
     name, turns = given["tracker"] or "multi-sensor", given["turns"]
-    # a turn of an antenna is what an instant is in a scene: for that long a target is not detected
+    # a turn of an antenna corresponds to an instant of a scene: meanwhile a target is not detected again
     pace = pace_of(scene.times) if turns is None else min(turns)
 
     def make() -> Tracker:
@@ -97,7 +97,7 @@ def _page(scene: Scene, given: Given) -> LivePage | None:
 def _take_plots(
     lines: Lines | None, scene: Scene, tracker: LiveTracker, given: Given, show: Callable[[list[Picture]], None]
 ) -> None:
-    """Give the tracker the plots of the lines, or of the scene if there are none, and show what it makes of them."""
+    """Pass the plots of the lines (of the scene if there are none) to the tracker, and show its pictures."""
     from assoc._cli.track.plot_lines import parse_line, replayed
 
     if lines is None:
@@ -115,7 +115,7 @@ def _take_plots(
 
 
 class _Outputs:
-    """Where pictures go: lines to a file or stdout, and to the page if there is one."""
+    """Outputs of pictures: lines to a file or stdout, and the page if there is one."""
 
     def __init__(self, path: str | None, page: LivePage | None, positions: Sequence[int]) -> None:
         from assoc._cli.track.plot_lines import TrackWriter
@@ -129,14 +129,14 @@ class _Outputs:
             self._writer = TrackWriter(self._stream, positions)
 
     def show(self, picture: Picture) -> None:
-        """Write what has changed."""
+        """Write the changes."""
         with self._writing():
             self._writer.write(picture)
         if self._page is not None:
             self._page.show(picture)
 
     def close(self) -> None:
-        """Close what was opened."""
+        """Close the outputs."""
         if self._page is not None:
             self._page.close()
         if self._stream is not sys.stdout:
@@ -148,7 +148,7 @@ class _Outputs:
         try:
             yield
         except BrokenPipeError:
-            raise  # the reader of our output has seen enough
+            raise  # the reader of stdout closed it
         except OSError as error:
             with suppress(OSError):
                 if self._stream is not sys.stdout:

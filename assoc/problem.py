@@ -1,4 +1,4 @@
-"""The sparse multidimensional (S-D) assignment problem that every solver takes."""
+"""The sparse multidimensional (S-D) assignment problem that all solvers take."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ VERSION = 1
 _MAX_DENSE_ELEMENTS = 200_000_000
 # a measurement needs a singleton of S indices, a cost and a name: half a gigabyte in all
 _MAX_SINGLETON_NUMBERS = 64_000_000
-# sums of costs beyond this could overflow on the way through a solver
+# larger sums of costs could overflow in a solver
 _MAX_TOTAL_COST = 1e300
 
 
@@ -40,8 +40,8 @@ class AssignmentProblem:
         Number of measurements n_s of each sensor.
     dummy : bool, default True
         With dummies a missing singleton (a false alarm) is added at cost 0, so that a solution always
-        exists. Without, the problem is the axial one: every index of the smallest dimension exactly
-        once, those of larger dimensions at most once, and no tuple may contain a 0.
+        exists. Without dummies the problem is the axial one: a solution uses every index of the smallest dimension
+        exactly once, those of larger dimensions at most once, and no tuple may contain a 0.
 
     Attributes
     ----------
@@ -54,11 +54,11 @@ class AssignmentProblem:
         Wrong shape, an index out of range, the all-dummy tuple, a cost that is NaN or -inf, or a `dummy` that is
         neither True nor False.
     LimitExceededError
-        More measurements (ten million of four sensors, say) or tuples than memory allows.
+        More measurements (ten million of four sensors, for example) or tuples than memory allows.
 
     Notes
     -----
-    With dummies this is eq. 6 of the ant colony paper, written over the listed tuples alone. A tuple
+    With dummies this is eq. 6 of the ant colony paper, restricted to the listed tuples. A tuple
     listed twice counts with its smaller cost.
     """
 
@@ -94,7 +94,7 @@ class AssignmentProblem:
             raise InvalidInputError(f"tuples: expected shape (M, {sizes_.size}) to match sizes, got {tuples_.shape}")
         if costs_.shape != (tuples_.shape[0],):
             raise InvalidInputError(f"costs: expected shape ({tuples_.shape[0]},), got {costs_.shape}")
-        # columns for the check, and what is kept, without and with singletons
+        # columns for the check, and the stored tuples, without and with singletons
         memory.require(
             tuples_.size * (tuples_.itemsize + 1 + 2 * 4.0) + 40.0 * costs_.size,
             f"tuples: {tuples_.shape[0]} of {sizes_.size} sensors",
@@ -149,7 +149,7 @@ class AssignmentProblem:
         tensor : array_like of float
             With ``dummy``: shape (n_1 + 1, ..., n_S + 1), index 0 is the dummy and the all-dummy entry
             is ignored. Without: shape (n_1, ..., n_S), the classical axial problem, also rectangular.
-            ``inf`` is forbidden, and so is what a masked array masks; a singleton that is ``inf`` costs 0, as if it
+            ``inf`` and masked entries are forbidden tuples; a forbidden singleton costs 0, as if it
             were not listed.
         dummy : bool, default True
             Whether index 0 is the dummy.
@@ -159,12 +159,12 @@ class AssignmentProblem:
         InvalidInputError
             The tensor has no dimension, an empty dummy dimension, NaN or -inf.
         LimitExceededError
-            The problem would take more memory than there is.
+            The problem would take more memory than is available.
 
         Warns
         -----
         AssocWarning
-            With ``dummy`` the all-dummy entry is a finite cost other than 0: the tensor may be an axial one.
+            With ``dummy`` the all-dummy entry is finite and not 0: the tensor may be an axial one.
         """
         dense = _numbers(tensor, "tensor")
         if dense.ndim == 0:
@@ -178,7 +178,7 @@ class AssignmentProblem:
             keep[(0,) * dense.ndim] = False
             _doubt(float(dense[(0,) * dense.ndim]), "tensor")
         count = np.count_nonzero(keep)
-        # numpy's list of indices and the stacked one, then the problem
+        # numpy's list of indices and the stacked array, then the problem
         memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
         index = np.stack(np.nonzero(keep), axis=1)
         offset = 0 if dummy else 1
@@ -191,8 +191,8 @@ class AssignmentProblem:
 
         Parameters
         ----------
-        array : scipy sparse array, or any with ``coords``, ``data`` and ``shape``
-            Of one dimension for each sensor, as in `from_dense`; scipy has arrays of more than two as ``coo_array``.
+        array : scipy sparse array, or any object with ``coords``, ``data`` and ``shape``
+            One dimension for each sensor, as in `from_dense`; with more than two only scipy's ``coo_array``.
             Entries stored more than once are summed.
         dummy : bool, default True
             Whether index 0 is the dummy.
@@ -200,7 +200,7 @@ class AssignmentProblem:
         Raises
         ------
         InvalidInputError
-            The array is of another kind, or holds NaN or -inf.
+            The array has another type, or holds NaN or -inf.
 
         Warns
         -----
@@ -232,8 +232,8 @@ class AssignmentProblem:
         Parameters
         ----------
         frame : pandas.DataFrame
-            One row for each tuple: a column ``cost``, every other column a sensor with the number of its measurement,
-            from 1; 0 or nothing: it missed the target.
+            One row for each tuple: a column ``cost``, and for each sensor a column with the number of its measurement,
+            from 1; 0 or empty: the sensor missed the target.
         sizes : array_like of int, shape (S,), optional
             Measurements of each sensor; by default the largest number in its column.
         cost : str, default "cost"
@@ -244,7 +244,7 @@ class AssignmentProblem:
         Raises
         ------
         InvalidInputError
-            The frame is not a table, has no such column, or a value is not a number.
+            The frame is not a table, lacks the column of costs, or a value is not a number.
         """
         if not hasattr(frame, "columns") or not hasattr(frame, "drop"):
             raise InvalidInputError(f"frame: expected a pandas DataFrame, got {type(frame).__name__}")
@@ -262,7 +262,7 @@ class AssignmentProblem:
             except (TypeError, ValueError):
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers") from None
             numbers = np.where(np.isnan(numbers), 0.0, numbers)
-            # the range before the cast
+            # check the range before the cast
             if (np.abs(numbers) > np.iinfo(np.int32).max).any() or (numbers != np.round(numbers)).any():
                 raise InvalidInputError(f"frame: column {name!r}: expected whole numbers")
             columns.append(numbers.astype(np.int64))
@@ -278,7 +278,7 @@ class AssignmentProblem:
         Raises
         ------
         LimitExceededError
-            The tensor would have more than 2e8 elements, or take more memory than there is.
+            The tensor would have more than 2e8 elements, or take more memory than is available.
         """
         shape = tuple(int(n) + (1 if self.dummy else 0) for n in self.sizes)
         elements = float(np.prod(np.array(shape, dtype=float)))
@@ -286,7 +286,7 @@ class AssignmentProblem:
             raise LimitExceededError(
                 f"a dense tensor of {elements:.3g} elements exceeds {_MAX_DENSE_ELEMENTS:.0e}: use .tuples, .costs"
             )
-        # the tensor, and indices that numpy widens
+        # the tensor, and indices that numpy converts
         needed = 8.0 * elements + 32.0 * self.tuples.size
         memory.require(needed, f"a dense tensor of {elements:.3g} elements", "use .tuples, .costs")
         dense = np.full(shape, np.inf)
@@ -344,7 +344,7 @@ class AssignmentProblem:
         Raises
         ------
         InvalidInputError
-            The file is missing, damaged, of another format or a future version, or its content is wrong.
+            The file is missing, damaged, of another format or a later version, or its content is wrong.
         """
         try:
             data = cls._read(path)
@@ -395,22 +395,22 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     if array.dtype.kind not in "fiu" and array.size:
         raise InvalidInputError(f"{name}: expected real numbers, got {array.dtype}")
     numbers = array.astype(np.float64, copy=False)
-    # what is masked is forbidden
+    # masked entries are forbidden
     return np.where(np.ma.getmaskarray(np.ma.asarray(values)), np.inf, numbers) if np.ma.is_masked(values) else numbers
 
 
 def _doubt(cost: float, name: str) -> None:
-    """Warn of an all-dummy entry that is ignored though it looks like a cost."""
+    """Warn of an all-dummy entry that is ignored although it looks like a cost."""
     if cost != 0.0 and np.isfinite(cost):
         at = "at index 0 of every dimension, which is the dummy"
         warn(f"{name}: ignores the cost {cost:g} {at}; without dummies, pass dummy=False")
 
 
 def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: bool) -> NDArray[np.bool_]:
-    """Refuse indices out of range and the all-dummy tuple; returns which tuples are singletons."""
+    """Refuse indices out of range and the all-dummy tuple; return which tuples are singletons."""
     if tuples.shape[0] == 0:
         return np.zeros(0, dtype=np.bool_)
-    # sensor by sensor in memory: numpy is slow along the short axis of a long array
+    # a contiguous array for each sensor: numpy is slow along the short axis of a long array
     columns = np.ascontiguousarray(tuples.T)
     low, high = columns.min(axis=1), columns.max(axis=1)
     least = 0 if dummy else 1
@@ -431,13 +431,13 @@ def _check_indices(tuples: NDArray[np.int64], sizes: NDArray[np.int64], dummy: b
 
 
 def _finite(costs: NDArray[np.float64]) -> bool:
-    """Whether all costs are numbers and their sums stay in range."""
+    """Whether all costs are finite and their sums stay in range."""
     with np.errstate(over="ignore"):
         return not costs.size or float(np.abs(costs).sum()) <= _MAX_TOTAL_COST
 
 
 def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which tuples are not forbidden (inf); refuses NaN and -inf."""
+    """Which tuples are allowed (not inf); refuses NaN and -inf."""
     bad = np.isnan(costs) | np.isneginf(costs)
     if bad.any():
         row = int(np.argmax(bad))
@@ -451,7 +451,7 @@ def _allowed(costs: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _with_singletons(
     tuples: NDArray[np.int64], costs: NDArray[np.float64], sizes: NDArray[np.int64], alone: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Append the singletons that are not listed, at cost 0; ``alone`` marks tuples that are singletons."""
+    """Append the singletons that are not listed, at cost 0; ``alone`` marks the tuples that are singletons."""
     offsets = np.cumsum(sizes) - sizes
     present = np.zeros(int(sizes.sum()), dtype=np.bool_)
     listed = tuples[alone]

@@ -1,4 +1,4 @@
-"""``python -m assoc.register``: biases of a scene's sensors, and the scene without them.
+"""``python -m assoc.register``: estimates biases of a scene's sensors, and writes the scene without them.
 
 This is a program: the package must not import it. Imports inside functions keep --help quick.
 """

@@ -30,7 +30,7 @@ _PURPOSE = {
 }
 
 _PLOTS = ("rotating-radar",)
-"""Scenarios that write plots, not a scene."""
+"""Scenarios that write plots instead of a scene."""
 
 _TRUTH = Option(
     "truth",
@@ -48,7 +48,7 @@ def _simulate(words: list[str]) -> None:
         near = did_you_mean(scenario, _PURPOSE)
         if near and not scenario.startswith("-"):
             raise InvalidInputError(f"unknown scenario {scenario!r}; {near}")
-        # neither a scenario nor --help: let the parser of scenarios say so
+        # neither a scenario nor --help: the parser of scenarios reports it
         _list_parser().parse_args(words[:1])
         return
     from assoc import simulation

@@ -1,4 +1,4 @@
-"""The answer of a solver: chosen tuples, cost, and certificate."""
+"""A solver's answer: chosen tuples, cost, and certificate."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _SHOWN = 10
 
 
 class TracePoint(NamedTuple):
-    """One line of a solver's history."""
+    """A point in a solver's history."""
 
     iteration: int
-    """Iterations done so far; for their meaning see each solver's documentation."""
+    """Number of iterations so far; each solver's documentation defines them."""
     seconds: float
-    """Seconds since the solver started, without compiling."""
+    """Seconds since the solver started, without compile time."""
     cost: float
     """Cost of the best solution known."""
     lower_bound: float
@@ -36,14 +36,14 @@ class Solution:
 
     Attributes
     ----------
-    tuples : int32 array, shape (K, S)
+        The chosen tuples in lexicographic order, including false alarms (singletons).
         The chosen tuples in lexicographic order; false alarms (singletons) are among them.
-    indices : int array, shape (K,)
+        The same tuples as rows of ``problem.tuples``.
         The same as rows of ``problem.tuples``.
     cost : float
         Total cost.
     lower_bound : float
-        No solution of the problem can cost less.
+        No solution of the problem costs less.
     status : str
         "optimal" when the gap is closed to 1e-6 * max(1, abs(cost)), else "feasible".
     solver : str
@@ -51,19 +51,19 @@ class Solution:
     iterations : int
         Iterations used.
     runtime : float
-        Seconds from the problem to this solution, without compiling.
+        Seconds from the problem to this solution, without compile time.
     stopped_by : str
         Why the solver stopped: "gap", "iterations", "converged", "time_limit", "callback", "interrupted"
-        (a program that was asked to end), or "memory_limit".
+        (a program was asked to end), or "memory_limit".
     duals : tuple of float arrays
-        One multiplier per measurement of each sensor, from which the bound can be checked: with them
+        One multiplier per measurement of each sensor, which prove the bound: with them
         every tuple's reduced cost is >= 0 up to rounding. Empty where the proof was by enumeration.
     trace : tuple of TracePoint
         History of cost and bound, thinned out beyond 100,000 points.
     parameters : mapping
         The solver's parameters.
     compile_time : float
-        Seconds in which kernels were compiled (once after installation) or loaded (once in a process); they count in a
+        Seconds spent on compiling kernels (once after installation) or loading them (once in a process); they count in
         time limit, not in ``runtime``.
     """
 
@@ -82,7 +82,7 @@ class Solution:
 
     @property
     def gap(self) -> float:
-        """Bound of the cost above the optimum: ``cost - lower_bound`` >= 0."""
+        """Upper bound on the distance to the optimal cost: ``cost - lower_bound`` >= 0."""
         return self.cost - self.lower_bound
 
     @property

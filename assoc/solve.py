@@ -1,4 +1,4 @@
-"""``python -m assoc.solve``: associate the measurements of scenes, or solve assignment problems, from files.
+"""``python -m assoc.solve``: associates the measurements of scenes, or solves assignment problems, from files.
 
 This is a program: the package must not import it, or ``python -m assoc.solve`` would warn and
 ``assoc.solve`` would change its meaning with the order of imports. Imports inside functions keep --help quick.
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from assoc.association.source import Source
 
 _EARLY_END = EarlyEnd("assoc.solve")
-# seconds that the scan under way gets when the program is asked to end
+# seconds that the current scan gets when the program is asked to end
 _LAST_SCAN = 3.0
 DEFAULT_SOLVER = "exact"
 _SHOWN = 20
@@ -111,12 +111,12 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
     if given["verbose"]:
         print_lines(", ".join(f"{name} {value}" for name, value in {"solver": solver, **plan.all_parameters}.items()))
     names = [files[number] for number, _ in items]
-    # a pipe gets all scans and columns when all are there: programs read it
+    # output to a pipe comes at the end, with all scans and columns: programs read it
     table = _ScanTable(sources, names, len(names) if given["all"] else _SHOWN) if sys.stdout.isatty() else None
     progress = with_progress(plan.run(items, jobs), len(items), bar)
-    # with -v the log has a line for each scan already
+    # with -v the log already has a line for each scan
     watched = progress if table is None or given["verbose"] else table.watch(progress)
-    # other processes do not hear that they should end: their scans are given up
+    # other processes do not receive the request to end: their scans are abandoned
     with _EARLY_END.work(0.0 if jobs > 1 else _LAST_SCAN):
         scans = _collected(watched, log)
     elapsed = time.perf_counter() - started
@@ -135,7 +135,7 @@ def _associate(solver: str, given: Given, parameters: dict[str, Any]) -> None:
 
 
 def _collected(scans: Iterable[ScanAssociation], log: SolverLog) -> list[ScanAssociation]:
-    """All scans, or those that are finished when a signal ends the work."""
+    """All scans, or those finished when a signal ends the work."""
     found = []
     try:
         for scan in scans:
@@ -180,11 +180,11 @@ def _other_solvers() -> str:
 
 
 def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) -> dict[str, Any]:
-    """Parameters of the solver from the configuration file."""
+    """Parameters of the solver in the configuration file."""
     table, by_name = tables.get(solver, {}), {one.name: one for one in known}
     if not isinstance(table, dict):
         raise InvalidInputError(f"[{solver}]: expected one table, got {len(table)}")
-    # the registry knows what to say about unknown names
+    # the registry reports unknown names
     return {
         name: by_name[name].check(value, f"[{solver}] {key}") if name in by_name else value
         for key, value in table.items()
@@ -208,7 +208,7 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
 
 
 def _items(plan: Plan, given: Given) -> list[tuple[int, int]]:
-    """The scans of each file that are asked for."""
+    """The selected scans of each file."""
     items, files, text = plan.items(), given["files"], given["scans"]
     if text is None:
         return items
@@ -248,12 +248,12 @@ def _write_proof(path: str, plan: Plan, found: Association, items: Sequence[tupl
 
 
 def _problem_beside(proof: str) -> str:
-    """Name of the file with the problem of a proof."""
+    """File name for the problem of a proof."""
     return f"{proof.removesuffix('.json')}.txt"
 
 
 class _ScanTable:
-    """The table on a terminal: a row as soon as its scan is done, where the terminal is wide enough."""
+    """The table on a terminal: each row is printed as soon as its scan is done, if the terminal is wide enough."""
 
     def __init__(self, sources: Sequence[Source], names: list[str], most: int) -> None:
         self._names = names
@@ -262,7 +262,7 @@ class _ScanTable:
         self._growing: GrowingTable | None = None
 
     def watch(self, scans: Iterable[ScanAssociation]) -> Iterator[ScanAssociation]:
-        """Yield the scans, each after its row was printed."""
+        """Yield each scan after printing its row."""
         from assoc.association.table import LEFT_ALIGNED, WIDTHS, rows
 
         for number, scan in enumerate(scans):
@@ -273,7 +273,7 @@ class _ScanTable:
             yield scan
 
     def finish(self, association: Association) -> None:
-        """Print what has not been printed yet."""
+        """Print the remaining rows."""
         if self._growing is None or not self._growing.fits:
             _print_table(association.scans[: self._most], self._names, brief=True)
         if len(association.scans) > self._most:

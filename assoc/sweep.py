@@ -1,4 +1,4 @@
-"""``python -m assoc.sweep``: a study of solver parameters, on one core, on all, or on a cluster.
+"""``python -m assoc.sweep``: runs a study of solver parameters, on one core, on all, or on a cluster.
 
 This is a program: the package must not import it. Imports inside functions keep --help quick.
 """
@@ -54,7 +54,7 @@ def _run(given: Given, tables: dict[str, Any]) -> None:
 
 
 def _report(folder: str, given: Given, study: Study | None) -> None:
-    """Print the table of a folder, of the study's own settings if that is given; write what is asked for."""
+    """Print the table of a folder, only of the study's settings if one is given; write the requested outputs."""
     from assoc._cli.sweep.tables import print_study
     from assoc.sweeps.frame import load
     from assoc.sweeps.store import damaged_lines
@@ -95,7 +95,7 @@ def _tune(given: Given) -> None:
 
 @contextmanager
 def _watched(given: Given) -> Iterator[Any]:
-    """Show progress on a terminal, with -v also elsewhere, and say on Ctrl-C how to go on."""
+    """Show progress on a terminal, with -v also elsewhere, and explain after Ctrl-C how to continue."""
     next_line = 0.0 if given["verbose"] and not sys.stderr.isatty() else math.inf
 
     def message(kept: str) -> str:

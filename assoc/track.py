@@ -1,4 +1,4 @@
-"""``python -m assoc.track``: tracks from a scene, or from the radar plots of a CSV file.
+"""``python -m assoc.track``: makes tracks from a scene, or from recorded radar plots.
 
 This is a program: the package must not import it. Imports inside functions keep --help quick.
 """
@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from assoc.tracking.plots import PlotTracks
 
 _EARLY_END = EarlyEnd("assoc.track")
-# seconds that the scan under way gets when the program is asked to end: tracks are known between scans only
+# seconds that the current scan gets when the program is asked to end: tracks are complete only between scans
 _LAST_SCAN = 20.0
 
 
 def start(arguments: Sequence[str] | None = None) -> int:
-    """Run the program as a process of its own."""
+    """Run the program as the whole process."""
     prepare_streams()
     program, words = _program(arguments)
     return program.start(words)
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _program(arguments: Sequence[str] | None) -> tuple[Program, list[str]]:
-    """Return which program is called, and its words: with ``--live``, its old spelling, `assoc.live`."""
+    """Return the called program and its words: `assoc.live` for ``--live``, its former name."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if "--live" not in words:
         return Program("assoc.track", _track, _EARLY_END.on_signals), words
@@ -82,7 +82,7 @@ def _track(words: list[str]) -> None:
 
 
 class _Tracked(NamedTuple):
-    """What was made of a scene, as far as it was tracked, or of plots; of how many of all scans."""
+    """Tracks of a scene or of plots, and how many of all scans were tracked."""
 
     tracker: Tracker
     table: TrackTable
@@ -113,9 +113,9 @@ def _make_tracks(given: Given, settings: dict[str, Any]) -> None:
 
 
 def _is_npz(file: str) -> bool:
-    """Whether a file is meant as a scene: by its first bytes, or by its name where it cannot be read."""
+    """Whether a file is meant as a scene: by its first bytes, or by its name if it cannot be read."""
     if is_stream(file):
-        # what is read of a pipe is gone, and a scene cannot come by one
+        # bytes read from a pipe are gone, and a scene cannot be read from one
         return False
     try:
         with open(file, "rb") as stream:
@@ -203,7 +203,7 @@ def _of_plots(file: str, given: Given, settings: dict[str, Any]) -> _Tracked:
     )
     done.table.origin = given["origin"]
     if given["identity"] == "ignore":
-        # nothing is judged by what was left out
+        # do not judge by plots that were left out
         done = done._replace(rates=None, kept=None)
     return _Tracked(tracker, done.table, None, done, len(done.windows), len(windows))
 
@@ -238,7 +238,7 @@ def _watched(
     describe: Callable[[Any], tuple[float, Sequence[int]]],
     track: Callable[[Iterator[Any]], Any],
 ) -> tuple[Any, int]:
-    """Track the scans, and show how far it is; what was made, and of how many of them."""
+    """Track the scans and show progress; returns the result, and how many of them were tracked."""
     bar = ProgressBar("tracking", "scans", shown=not given["quiet"])
     with _EARLY_END.work(_LAST_SCAN):
         found = track(with_scan_table(with_progress(scans, len(scans), bar), tracker, describe))
@@ -297,7 +297,7 @@ def _write_rates(path: str, plots: PlotTracks) -> None:
 def _print_rates(plots: PlotTracks, identity: str | None) -> None:
     if plots.kept is not None:
         kept, judged = plots.kept
-        # what was used says nothing of how good the result is
+        # identities that made the tracks are no evidence of their quality
         own = " (identities were used to make them)" if identity == "use" and plots.recording.sources is None else ""
         print_lines(f"{kept} of {judged} tracks with an identity kept one{own}")
     if plots.rates is None:
@@ -316,7 +316,7 @@ def _print_counts(output: str, found: _Tracked, elapsed: float, compiling: float
     name = "stdout" if output == STDOUT else printable(output)
     print_lines(f"{name}: {len(set(ids.tolist()))} confirmed tracks, {len(rows)} rows, {found.num_tracked} scans")
     each = 1e3 * elapsed / max(found.num_tracked, 1)
-    # several trackers never need one, or only for what their own search leaves open
+    # several trackers never need the solver, or only for the rest of their own search
     used = tracker.settings.solver if tracker.solver_calls else "no solver used"
     spent = f"{elapsed:.2f} s, {each:.3g} ms a scan; {compiling:.2f} s more compiling"
     print_lines(f"{tracker.name}, {used}: {spent}")

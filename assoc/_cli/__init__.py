@@ -1,1 +1,1 @@
-"""What the command lines share: options, tables, progress, signals, exit codes."""
+"""Shared parts of the programs: options, tables, progress, signals, exit codes."""

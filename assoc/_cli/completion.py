@@ -1,4 +1,4 @@
-"""What shells need to complete the names of programs, their options and the values of these."""
+"""Shell completion: scripts for names of programs, their options and the options' values."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from assoc.errors import InvalidInputError
 from assoc.solvers import registry
 
 SHELLS = ("bash", "zsh", "fish")
-# what stands for the value of options that take names of files
+# completion of options whose values are file names
 _FILES = ("FILE", "FOLDER", "SCENE.npz")
 
 Parsers = Mapping[str, "argparse.ArgumentParser | Parsers"]
-"""Parsers by the words that choose them."""
+"""Parsers by the words that select them."""
 
 
 def script(shell: str, programs: Parsers) -> str:
@@ -26,7 +26,7 @@ def script(shell: str, programs: Parsers) -> str:
     Raises
     ------
     InvalidInputError
-        The shell is not known.
+        The shell is unknown.
     """
     if shell not in SHELLS:
         raise InvalidInputError(f"completion: expected one of {', '.join(SHELLS)}, got {shell!r}")
@@ -38,7 +38,7 @@ def script(shell: str, programs: Parsers) -> str:
 def _add(parser: argparse.ArgumentParser, parsers: Parsers) -> None:
     subparsers = parser.add_subparsers()
     for name, one in parsers.items():
-        # shtab leaves out what has no help
+        # shtab leaves out options without help
         if isinstance(one, Mapping):
             _add(subparsers.add_parser(name, help=name), one)
             continue

@@ -1,4 +1,4 @@
-"""What programs read before their options: TOML files, and modules of the user's own."""
+"""Input that programs read before their options: TOML files, and users' modules."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def read_toml(path: str) -> dict[str, Any]:
     Raises
     ------
     InvalidInputError
-        It cannot be read, or is no TOML.
+        It cannot be read, or is not TOML.
     """
     import tomllib  # only with --config
 
@@ -34,17 +34,17 @@ def read_toml(path: str) -> dict[str, Any]:
 
 
 def import_modules(names: str | None) -> None:
-    """Import modules by their names, joined by commas; those in the current folder are found.
+    """Import modules by their names, separated by commas; modules in the current folder are found.
 
     Raises
     ------
     InvalidInputError
-        There is no such module, or it cannot be imported.
+        A module is missing or cannot be imported.
     """
     if names is None:
         return
     folder = os.getcwd()
-    # behind all others: no other import finds what lies here; worker processes get the same path
+    # last in the search path: no other import finds files here; worker processes get the same path
     if folder not in sys.path and "" not in sys.path:
         sys.path.append(folder)
     for name in names.split(","):
@@ -56,5 +56,5 @@ def import_modules(names: str | None) -> None:
             if error.name is not None and (name == error.name or name.startswith(error.name + ".")):
                 raise InvalidInputError(f"--import: no module {name!r} is here or among what is installed") from None
             raise InvalidInputError(f"--import: {name} cannot be imported ({error})") from None
-        except Exception as error:  # whatever a module of the user's does
+        except Exception as error:  # a user's module may raise anything
             raise InvalidInputError(f"--import: {name} cannot be imported ({type(error).__name__}: {error})") from None

@@ -9,18 +9,18 @@ import sys
 import textwrap
 
 _FIRST_COLUMN = re.compile(r"usage: |\s*\S.{0,24}?\s{2,}|\s*")
-"""What lines below a broken one leave free: a first column, or the blanks before the first word."""
+"""Indentation of continuation lines: a first column, or the blanks before the first word."""
 _IN_BRACKETS = re.compile(r"\[[^][]*\]")
 _JOIN = "\N{NO-BREAK SPACE}"
 
 
 def print_lines(text: str) -> None:
-    """Print lines to stdout; on a terminal those that are too long for it are broken between words."""
+    """Print lines to stdout; on a terminal long ones are broken between words."""
     print(fitted(text, shutil.get_terminal_size().columns) if sys.stdout.isatty() else text)
 
 
 def fitted(text: str, width: int) -> str:
-    """Break lines between words, but not in brackets, into lines of at most ``width``, if their words are."""
+    """Break lines between words, but not in brackets, into lines of at most ``width`` (a longer word stays whole)."""
     return "\n".join(_fitted(line, width) for line in text.split("\n"))
 
 
@@ -37,7 +37,7 @@ def _fitted(line: str, width: int) -> str:
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
-    """Descriptions and epilogs as they are written, in lines that fit."""
+    """Prints descriptions and epilogs as written, in lines that fit."""
 
     def format_help(self) -> str:
         """Return the help."""

@@ -1,4 +1,4 @@
-"""What a program prints beside its data: never between data on stdout, nothing with ``-q``, a warning as a line."""
+"""Messages of a program beside its data: never between data on stdout, none with ``-q``, warnings as lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assoc.errors import AssocWarning
 
 @contextlib.contextmanager
 def messages(given: Given) -> Iterator[None]:
-    """Send what is printed nowhere with ``--quiet``, and to stderr where an output is stdout."""
+    """Discard printed text with ``--quiet``, and send it to stderr where an output is stdout."""
     with contextlib.ExitStack() as stack:
         if given["quiet"]:
             nowhere = stack.enter_context(open(os.devnull, "w"))
@@ -29,7 +29,7 @@ def messages(given: Given) -> Iterator[None]:
 
 @contextlib.contextmanager
 def warnings_as_lines(name: str) -> Iterator[None]:
-    """Print each `AssocWarning` once, as a line of the program `name`; other warnings stay what they are."""
+    """Print each `AssocWarning` once, as a line of the program `name`; other warnings are unchanged."""
     printed: set[str] = set()
     with warnings.catch_warnings():
         usual = warnings.showwarning

@@ -1,4 +1,4 @@
-"""Options, declared once: flag, kind, help and what they are for; reading, checking and refusing follow from that."""
+"""Options, declared once with flag, kind, help and scope; parsing, checks and errors follow from that."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ class Option:
     Attributes
     ----------
     name : str
-        With underscores for the dashes of its flag.
+        Name with underscores for the dashes of its flag.
     metavar : str
-        What stands for its value in the help; empty for one without a value.
+        Placeholder for its value in the help; empty for an option without a value.
     help : str
     kind : callable
-        Reads its value; see `assoc._cli.values`.
+        Converts its value; see `assoc._cli.values`.
     only : mapping
-        By the name of another option, or of something else that was chosen: what it is only for.
+        Scope: by the name of another option or choice, the value that this option is for.
     rest : mapping
         Further arguments for argparse.
     short : str
         Short flag.
     positional : bool
-        Whether it goes by its position, without a flag.
+        Whether it is positional, without a flag.
     """
 
     name: str
@@ -69,13 +69,13 @@ class Option:
         parser.add_argument(*flags, help=self.help.replace("%", "%%"), **rest)
 
     def read(self, value: Any, label: str) -> Any:
-        """Turn the text of a command line, or the list of texts, into the value."""
+        """Convert the text of a command line, or the list of texts, to the value."""
         if isinstance(value, list):
             return [self.kind(one, label) for one in value]
         return self.kind(value, label) if isinstance(value, str) else value
 
     def read_toml(self, value: Any, label: str) -> Any:
-        """Turn a value of a TOML file into the option's."""
+        """Convert a value of a TOML file to the option's."""
         many = "nargs" in self.rest
         values = value if many and isinstance(value, list) else [value]
         if self.kind is text and not all(isinstance(one, str) for one in values):
@@ -85,16 +85,16 @@ class Option:
 
 
 class Given(dict[str, Any]):
-    """Values of options by their names, None where there is none.
+    """Values of options by name, None if not given.
 
     Attributes
     ----------
     words : list of str
         The command line.
     outputs : dict of Output
-        The options that name files which are written.
+        The options that name output files.
     file : str
-        The TOML file that values were read from.
+        The TOML file from which values were read.
     """
 
     def __init__(self, values: Mapping[str, Any], words: Sequence[str]) -> None:
@@ -108,15 +108,15 @@ class Given(dict[str, Any]):
         return {name: self[name] for name in names if self.get(name) is not None}
 
     def label(self, name: str) -> str:
-        """What messages call an option: its flag, or its key in the file."""
+        """Name of an option in messages: its flag, or its key in the file."""
         return f"{self.file}: {name}" if name in self._of_file else flag_of(name)
 
     def of_line(self, name: str) -> bool:
-        """Whether the command line gives an option."""
+        """Whether the option is on the command line."""
         return self[name] not in (None, []) and name not in self._of_file
 
     def fill(self, file: str, values: Mapping[str, Any]) -> None:
-        """Take from a file what the command line does not give."""
+        """Take values from a file where the command line has none."""
         self.file = file
         missing = [name for name in values if self.get(name) in (None, [])]
         self._of_file.update(missing)
@@ -130,18 +130,18 @@ class Given(dict[str, Any]):
         reserved: Iterable[str] = (),
         new_folder: str | None = None,
     ) -> None:
-        """Refuse before the work outputs that could not be written after it.
+        """Refuse, before the work, outputs that cannot be written.
 
         Parameters
         ----------
         inputs : iterable of str
-            Files that are read.
+            Files to read.
         also : iterable of str
-            Further files that are written.
+            Further files to write.
         reserved : iterable of str
             Other files that must not be overwritten.
         new_folder : str, optional
-            A folder that the program will make.
+            A folder that the program will create.
         """
         taken = {_real_path(path) for path in (*inputs, *reserved) if path}
         outputs = [*self.some(self.outputs).values(), *also]
@@ -157,12 +157,12 @@ class Given(dict[str, Any]):
             self.outputs[name](value, flag_of(name))
 
     def check_use(self, options: Iterable[Option], **chosen: str) -> None:
-        """Refuse options of the command line that are not for what was chosen.
+        """Refuse options of the command line that do not apply to what was chosen.
 
         Raises
         ------
         InvalidInputError
-            There is one.
+            An option does not apply.
         """
         for option in options:
             for what, allowed in option.only.items():
@@ -179,10 +179,10 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=HelpFormatter, allow_abbrev=False, **rest)
         self.declared: dict[str, Option] = {}
         self.elsewhere: Callable[[], Mapping[str, str]] = dict
-        """Returns flags that this program does not take here, each with what it belongs to."""
+        """Returns flags that do not apply to this program here, each with what it belongs to."""
 
     def declare(self, *options: Option, group: str = "") -> None:
-        """Add options, to a group of the help if that has a name."""
+        """Add options, to a group of the help if ``group`` is given."""
         into = self.add_argument_group(group) if group else self
         for option in options:
             option.add_to(into)
@@ -194,7 +194,7 @@ class Parser(argparse.ArgumentParser):
         Raises
         ------
         InvalidInputError
-            A value is not what its option takes.
+            A value is invalid for its option.
         """
         parsed = vars(self.parse_args(words))
         given = Given({}, words)
@@ -207,7 +207,7 @@ class Parser(argparse.ArgumentParser):
         return given
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse; a flag that is not known is named with those that are near."""
+        """Parse; the error for an unknown flag suggests similar ones."""
         parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}{self._hint(unknown[0])}")
@@ -224,21 +224,21 @@ class Parser(argparse.ArgumentParser):
         return f"; {near}" if near else ""
 
     def error(self, message: str) -> NoReturn:
-        """Print one line to stderr and leave with exit code 2."""
+        """Print one line to stderr and exit with code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {one_line(message)} (see --help)\n")
 
 
 def _real_path(path: str) -> str:
     try:
         return os.path.realpath(path)
-    except ValueError:  # a NUL, which TOML can hold: reading or writing will say so
+    except ValueError:  # a NUL, which TOML can hold: reading or writing reports it
         return path
 
 
 def read_config(
     path: str | None, options: Iterable[Option], solvers: Sequence[str]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read options, and tables of solvers' parameters, from a TOML file if there is one.
+    """Read options, and tables of solvers' parameters, from a TOML file if one is given.
 
     Raises
     ------
@@ -277,7 +277,7 @@ def parameter_options(owner: type) -> list[Option]:
 
 
 def flags_of_solvers(but: str) -> dict[str, str]:
-    """Flags of the parameters of all solvers but one, with whose they are."""
+    """Flags of the parameters of all solvers except ``but``, with the solvers that have them."""
     from assoc.solvers import registry
 
     found: dict[str, list[str]] = {}
@@ -292,14 +292,14 @@ def flags_of_solvers(but: str) -> dict[str, str]:
 
 
 def read_first(words: Sequence[str], *names: str) -> dict[str, str | None]:
-    """Read some options before all others: those that decide which others there are."""
+    """Read some options before all others: those that decide which other options exist."""
     parser = Parser(add_help=False)
     parser.declare(*(Option(name, "NAME", "") for name in names))
     return vars(parser.parse_known_args(words)[0])
 
 
 def verbosity(more: str) -> tuple[Option, Option]:
-    """Return ``-q`` and ``-v``, which says ``more``."""
+    """Return ``-q`` and ``-v``; ``more`` is what ``-v`` prints."""
     return (
         Option("quiet", "", "say nothing but errors and warnings", short="-q"),
         Option("verbose", "", f"say more: {more}", short="-v"),
@@ -321,4 +321,4 @@ COMMON = {one.name: one for one in (
     Option("import", "MODULE", "import modules of your own first, which register solvers (docs/own_solver.md)"),
     Option("config", "FILE", "read these options from a TOML file; solver parameters in a table [solver]"),
 )}  # fmt: skip
-"""Options that several programs have."""
+"""Options shared by several programs."""

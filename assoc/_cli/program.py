@@ -1,4 +1,4 @@
-"""How the programs start and end: their streams and signals, one-line errors, exit codes."""
+"""Start and end of the programs: streams and signals, one-line errors, exit codes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from assoc._text.plain import one_line
 from assoc.errors import AssocError, InfeasibleError, InvalidInputError, LimitExceededError
 
 DONE, NOTHING_FEASIBLE, INTERRUPTED = 0, 3, 130
-"""Exit codes; the last one is the shell's own for Ctrl-C."""
+"""Exit codes; the last one is that of shells for Ctrl-C."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class Program:
     Attributes
     ----------
     name : str
-        What its messages begin with.
+        Prefix of its messages.
     run : callable
-        Does the work that the command line asks for.
+        Does the work of a command line.
     listen : callable
-        Says what signals do, in a process of its own.
+        Sets what signals do, if the program is the whole process.
     interruption : Interruption, optional
-        Knows which signal ended it.
+        Records which signal ended it.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Program:
     interruption: Interruption | None = None
 
     def start(self, arguments: Sequence[str] | None = None) -> int:
-        """Run the program as a process of its own; returns its exit code."""
+        """Run the program as the whole process; returns its exit code."""
         prepare_streams()
         self.listen()
         return self.main(arguments)
@@ -52,13 +52,13 @@ class Program:
 
 
 def command(name: str) -> str:
-    """How a user calls a program: as it was called now."""
+    """Return the command of a program, in the form of the present call."""
     called = os.path.basename(sys.argv[0]).removesuffix(".exe") if sys.argv else ""
     return f"assoc {name}" if called == "assoc" else f"python -m assoc.{name}"
 
 
 def run_program(program: Callable[[], None], name: str, interruption: Interruption | None = None) -> int:
-    """Run a program and turn what it raises into one line on stderr and an exit code; which signal, knows the last."""
+    """Run a program; errors become one line on stderr and an exit code, signals those of ``interruption``."""
     try:
         with warnings_as_lines(name):
             program()
@@ -77,32 +77,32 @@ def run_program(program: Callable[[], None], name: str, interruption: Interrupti
         print(interruption.line() if interruption and signalled else f"{name}: interrupted", file=sys.stderr)
         return signalled or INTERRUPTED
     except BrokenPipeError:
-        # the reader of our output (head, less) has seen enough; keep Python from flushing into it again
+        # the reader of stdout (head, less) closed it; keep Python from flushing to it again
         sys.stdout = None
         return DONE
     except OSError as error:
-        # not handled elsewhere: a full disk behind stdout, for example
+        # not handled elsewhere, for example a full disk behind stdout
         print(f"{name}: error: {one_line(error.strerror or error)}", file=sys.stderr)
         sys.stdout = None
         return BAD_INPUT
     finally:
-        # where an interrupt has passed through an exec, Python ends with its own code for that, until the next one
+        # Python otherwise ends with its own exit code after an interrupt has passed through an exec
         exec("")
     return DONE
 
 
 def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
-    """Write those outputs that are asked for, the others also if one cannot be written: no result is lost with it.
+    """Write the requested outputs; if one fails the others are written all the same, so that no result is lost.
 
     Parameters
     ----------
     *outputs : (object, callable)
-        The name of the file or another value, None if it is not asked for; what writes it.
+        The file name or another value, None if it is not requested; the function that writes it.
 
     Raises
     ------
     InvalidInputError
-        The first that was raised.
+        The first error of an output.
     """
     errors = []
     for asked, write in outputs:
@@ -116,12 +116,12 @@ def write_all(*outputs: tuple[object, Callable[[], object]]) -> None:
 
 
 def prepare_streams() -> None:
-    """Open the standard streams where they are closed, and let stdout and stderr print any name of a file."""
+    """Open closed standard streams, and let stdout and stderr print any file name."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
         except OSError:
-            # takes the lowest number that is free: no file of ours must get it, and be printed into
+            # open takes the lowest free number: otherwise a file of the program could become stdout
             os.open(os.devnull, os.O_RDWR)
     if sys.stdin is None:
         sys.stdin = open(0, closefd=False)

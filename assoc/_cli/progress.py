@@ -1,4 +1,4 @@
-"""The progress bar of the programs, with the rate and the time left; on a terminal only."""
+"""The progress bar of the programs, with rate and remaining time; on a terminal only."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-# seconds of compiling that need no words
+# seconds of compiling without a message
 _SOON = 0.5
 
 
 class ProgressBar:
-    """Shows on stderr how much is done; nothing if that is not a terminal.
+    """Shows progress on stderr, if that is a terminal.
 
     Parameters
     ----------
     label : str
         What the program is doing.
     unit : str
-        What it counts, in the plural.
+        Name of the counted items, in the plural.
     shown : bool, default True
-        Show nothing at all otherwise.
+        Whether to show anything.
     """
 
     def __init__(self, label: str, unit: str, shown: bool = True) -> None:
         self._unit = unit
         self.note = ""
-        """What is shown below the bar."""
+        """Text below the bar."""
         self.done = 0
-        """What came to its end."""
+        """Number of items that are done."""
         self._progress: Any = None
         self._started = time.perf_counter()
         if shown and sys.stderr.isatty():
-            # needed on a terminal alone, and slow to load
+            # imported here: slow, and only needed on a terminal
             from rich.console import Console
             from rich.progress import (
                 BarColumn,
@@ -55,7 +55,7 @@ class ProgressBar:
             bar = self
 
             class WithNote(Progress):
-                """Shows below the bar the note, or why the first scans take so long, while they do."""
+                """Shows the note below the bar, or why the first scans take so long."""
 
                 def get_renderables(self) -> Any:
                     yield self.make_tasks_table(self.tasks)
@@ -84,7 +84,7 @@ class ProgressBar:
         self._progress.update(self._task, total=total, completed=done, rate=text)
 
     def __call__(self, counts: Counts) -> None:
-        """Show where a study is."""
+        """Show the progress of a study."""
         self.show(counts.done, counts.total, counts.new)
 
     def say(self, line: str) -> None:
@@ -95,7 +95,7 @@ class ProgressBar:
             self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._progress is not None:
             self._progress.stop()
 
@@ -110,7 +110,7 @@ class ProgressBar:
 
 
 def with_progress(items: Iterable[Item], total: int, bar: ProgressBar) -> Iterator[Item]:
-    """Yield the items, scans or what makes them, until it is asked to end, and show how many are done."""
+    """Yield the items until the program is asked to end, and show how many are done."""
     with bar:
         bar.show(0, total, 0)
         for done, item in enumerate(items):

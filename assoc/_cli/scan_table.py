@@ -1,4 +1,4 @@
-"""What a tracker has after each of the first scans, as a table that grows; on a terminal only."""
+"""A tracker's state after each of the first scans, as a table that grows; on a terminal only."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _WIDTHS = {"time": 8, "ms": 8}
 def with_scan_table(
     scans: Iterable[Item], tracker: Tracker, describe: Callable[[Item], tuple[float, Sequence[int]]]
 ) -> Iterator[Item]:
-    """Yield the scans, and print a row for each of the first when the tracker has taken it in.
+    """Yield the scans, and print a row for each of the first when the tracker has processed it.
 
     Parameters
     ----------
     scans : iterable
-        What the tracker takes in, one after the other.
+        Input of the tracker, one after the other.
     tracker : Tracker
     describe : callable
-        Gives the time of a scan, in seconds, and its number of measurements of each sensor.
+        Returns the time of a scan, in seconds, and its number of measurements for each sensor.
     """
     if not sys.stdout.isatty():
         yield from scans

@@ -1,11 +1,11 @@
 """How programs end on Ctrl-C, a termination signal or a lost terminal.
 
-`Interruption`: the work is interrupted, and what has been done is kept. `EarlyEnd`: at once, but loops over scans end
-early, and what is finished is written.
+`Interruption`: the work is interrupted, and finished results are kept. `EarlyEnd`: loops over scans end
+early, and finished results are written; other work ends at once.
 
-In both ways the signals are blocked and a thread waits for them. A Python handler would run only when a library
-that solves returns, which can take minutes, and some MIP solvers put a handler of their own in its place. The
-exit code is the shell's own: 128 and the number of the signal.
+In both cases the signals are blocked and a thread waits for them. A Python handler would run only when a solver's
+library returns, which can take minutes, and some MIP solvers install a handler of their own. The
+exit code is that of shells: 128 plus the number of the signal.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from assoc._system.in_time import threads_left
 from assoc._system.interrupts import ask_to_end
 
 _CLEAN_UP_SECONDS = 5.0
-# a solver that is loading or compiling a kernel for so long is not at the end of its work
+# a solver that has been loading or compiling a kernel for so long will not end soon
 _LOADING_SECONDS = 0.2
 _AGAIN_SECONDS = 1.0
 
 
 def ending_signals() -> dict[int, str]:
-    """Signals that end a program, with what is said of them; not those that it was started to ignore (nohup)."""
+    """Signals that end a program, with their names in messages; without those that are ignored at the start (nohup)."""
     words = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
     if not hasattr(signal, "pthread_sigmask"):
         return {}
@@ -41,21 +41,21 @@ def ending_signals() -> dict[int, str]:
 
 
 class Interruption:
-    """Whether and how a signal ended a program, and what the program then says.
+    """Whether and how a signal ended a program, and the program's last line.
 
     Parameters
     ----------
     name : str
-        Of the program.
+        Name of the program.
 
     Attributes
     ----------
     message : str
-        What the user should know: what is kept, how to go on.
+        What the user should know: what is kept, and how to continue.
     word : str
-        What is said of the signal.
+        Name of the signal in messages.
     code : int
-        Exit code; 0 before there was a signal.
+        Exit code; 0 before a signal.
     """
 
     def __init__(self, name: str) -> None:
@@ -69,9 +69,9 @@ class Interruption:
         return "; ".join(filter(None, [f"{self.name}: {self.word}", self.message]))
 
     def interrupt_on_signals(self) -> None:
-        """Turn signals into one KeyboardInterrupt, also while a library solves without Python.
+        """Turn signals into one KeyboardInterrupt, even while a library works without Python.
 
-        Worker processes do not see them. A program that is not done with cleaning up after five seconds is ended.
+        Worker processes do not receive them. A program that takes more than five seconds to clean up is ended.
         """
         ending = ending_signals()
         if not ending:
@@ -79,13 +79,13 @@ class Interruption:
 
         def interrupt(number: int, frame: object) -> None:
             if not self.code:
-                # a library let the signal through to this thread
+                # a library unblocked the signal for this thread
                 self.word, self.code = ending[number], 128 + number
                 _end_at_the_latest(self.code, f"{self.line()}\n")
             raise KeyboardInterrupt
 
         def unraisable(problem: Any) -> None:
-            # compilers call Python in places that swallow what it raises
+            # compilers call Python from places that discard exceptions
             if self.code and problem.exc_type is KeyboardInterrupt:
                 _thread.interrupt_main()
             else:
@@ -98,7 +98,7 @@ class Interruption:
             temporary.end_process(self.code, f"{self.line()}\n")
 
         sys.unraisablehook = unraisable
-        # the waiter takes one signal: a second one would come in the middle of cleaning up
+        # the thread takes one signal: a second one must not interrupt cleaning up
         _wait_for_signals(ending, handler=interrupt, waiter=end)
 
     @contextmanager
@@ -113,7 +113,7 @@ class Interruption:
         try:
             yield
         except BaseException as error:
-            # a library may meet the interrupt with an error of its own
+            # a library may answer the interrupt with another error
             if not (isinstance(error, KeyboardInterrupt) or self.code):
                 raise
             clean_up()
@@ -121,19 +121,19 @@ class Interruption:
 
 
 class EarlyEnd:
-    """Lets a signal end a program's work early, so that what is finished is written; a second one ends it at once.
+    """Lets a signal end a program's work early, so that finished results are written; a second signal ends it at once.
 
     Outside `work` a signal ends the program at once.
 
     Parameters
     ----------
     name : str
-        Of the program.
+        Name of the program.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
-        # the handler may come while the main thread holds it
+        # reentrant: the handler may run while the main thread holds it
         self._lock = threading.RLock()
         self._working = False
         self._insists = False
@@ -141,7 +141,7 @@ class EarlyEnd:
         self._signal = 0
 
     def on_signals(self) -> None:
-        """Begin to listen."""
+        """Start to wait for signals."""
         ending = ending_signals()
         words = {number: f"{self._name}: {word}\n" for number, word in ending.items()}
 
@@ -151,7 +151,7 @@ class EarlyEnd:
         def end(number: int, frame: object = None) -> None:
             with self._lock:
                 if self._insists:
-                    # Python calls the handler of SIGINT for an interruption of its own
+                    # Python also calls the handler of SIGINT to interrupt the main thread
                     self._insists = False
                     raise KeyboardInterrupt
                 if self._signal or not self._working:
@@ -164,7 +164,7 @@ class EarlyEnd:
             end(number)
             leave(signal.sigwait(ending))
 
-        # the handler is for signals that a library lets through
+        # the handler is for signals that a library unblocks
         _wait_for_signals(ending, handler=end, waiter=wait)
 
     def _insist(self) -> None:
@@ -176,12 +176,12 @@ class EarlyEnd:
                 if self._working:
                     self._insists = True
                     _thread.interrupt_main()
-            # Python drops what is raised in a destructor
+            # Python discards exceptions of destructors
             time.sleep(_AGAIN_SECONDS)
 
     @contextmanager
     def work(self, patience: float) -> Iterator[None]:
-        """Let a signal end this block: by `ask_to_end`, and if that is not heard in so many seconds by interruption."""
+        """Let a signal end this block by `ask_to_end`, and by an interrupt if that takes more than ``patience`` s."""
         self._patience = patience
         with self._lock:
             self._working = True
@@ -189,7 +189,7 @@ class EarlyEnd:
             try:
                 yield
             finally:
-                # the interrupt may come as late as here
+                # the interrupt may arrive as late as here
                 with self._lock:
                     self._working = False
         except KeyboardInterrupt:
@@ -202,23 +202,23 @@ class EarlyEnd:
         return self._signal != 0
 
     def say(self, kept: str) -> None:
-        """Leave with what is said of the signal, and of what is kept, if there was a signal."""
+        """If there was a signal, end the program with its name and with what was kept."""
         if self._signal:
             line = "; ".join(filter(None, [f"{self._name}: {ending_signals()[self._signal]}", kept]))
             _leave_in_order(128 + self._signal, f"{line}\n")
 
 
 def _leave(code: int, line: str) -> NoReturn:
-    """End the process with its processes: a thread that compiles may not be waited for."""
+    """End the process and its child processes; a compiling thread may not be waited for."""
     for child in multiprocessing.active_children():
         child.kill()
     temporary.end_process(code, line)
 
 
 def _leave_in_order(code: int, line: str) -> NoReturn:
-    """End the process, but wait for no thread that is compiling."""
+    """End the process normally, but wait for no thread that is compiling."""
     ask_to_end()
-    # who reads the output may have stopped to
+    # the reader of the output may have stopped
     _end_at_the_latest(code, "")
     with suppress(OSError, ValueError):
         sys.stdout.flush()
@@ -229,9 +229,9 @@ def _leave_in_order(code: int, line: str) -> NoReturn:
 
 
 def _end_at_the_latest(code: int, text: str) -> None:
-    """End the process if it is not done with cleaning up in five seconds.
+    """End the process if it takes more than five seconds to clean up.
 
-    An interrupt may leave a lock of a pool of processes locked for ever, and Python waits for its threads at the end.
+    An interrupt may leave a lock of a process pool locked for ever, and Python waits for its threads at the end.
     """
     timer = threading.Timer(_CLEAN_UP_SECONDS, temporary.end_process, (code, text))
     timer.daemon = True
@@ -241,7 +241,7 @@ def _end_at_the_latest(code: int, text: str) -> None:
 def _wait_for_signals(
     ending: dict[int, str], handler: Callable[[int, object], object], waiter: Callable[[int], object]
 ) -> None:
-    """Block the signals, and let a thread call ``waiter`` with the first that comes."""
+    """Block the signals, and let a thread call ``waiter`` with the first one that arrives."""
     if not ending:
         return
     signal.pthread_sigmask(signal.SIG_BLOCK, ending)

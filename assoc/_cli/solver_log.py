@@ -1,4 +1,4 @@
-"""What a solver knows while it works on a scan: below the progress bar, and as lines with ``-v``."""
+"""A solver's progress on a scan: below the progress bar, and as lines with ``-v``."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from assoc.solution import Solution, TracePoint
 if TYPE_CHECKING:
     from assoc.association.scan import ScanAssociation
 
-# seconds between two lines, and before a scan is worth a note
+# seconds between two lines, and before the progress of a scan is shown
 _EVERY = 0.5
 _HEADERS = f"{'scan':>6} {'seconds':>9} {'iteration':>10} {'cost':>14} {'bound':>14} {'gap':>10}"
 
 
 class SolverLog:
-    """Shows cost, lower bound and gap of the scan under way.
+    """Shows cost, lower bound and gap of the current scan.
 
     Parameters
     ----------
     bar : ProgressBar
-        Shows them on its note, and prints the lines.
+        Shows them as its note, and prints the lines.
     verbose : bool
-        Print lines: the history of each scan, thinned out, and its end.
+        Print lines: the history of each scan, thinned out, and its result.
     """
 
     def __init__(self, bar: ProgressBar, verbose: bool) -> None:
@@ -33,7 +33,7 @@ class SolverLog:
         self._said = 0.0
 
     def __call__(self, scan: int, point: TracePoint) -> None:
-        """Take in what the solver of a scan tells."""
+        """Show a point in the history of a scan."""
         if point.seconds < _EVERY:
             self._said = 0.0
             return
@@ -44,7 +44,7 @@ class SolverLog:
             self._line(scan, point)
 
     def end(self, done: ScanAssociation) -> None:
-        """Take in the association of a scan, of those that are ranked the best."""
+        """Show the association of a scan, or the best one of a ranking."""
         found = done.solution
         self._bar.note, self._said = "", 0.0
         last = TracePoint(found.iterations, found.runtime, found.cost, found.lower_bound)

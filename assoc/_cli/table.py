@@ -1,4 +1,4 @@
-"""Tables of text: plain columns into a pipe; on a terminal as wide as that is, and no cell is ever cut."""
+"""Text tables: plain columns into a pipe; on a terminal fitted to its width without cutting any cell."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from assoc._text.plain import printable
 
 _BETWEEN = "  "
-# longer headers are broken between words where a table is too wide
+# headers longer than this are broken between words if a table is too wide
 _SHORT = 5
 
 
 class _Layout:
-    """Columns as wide as their cells, and at least so wide as is asked for; their numbers choose some of them."""
+    """Columns as wide as their cells, and at least as wide as requested; callers select columns by index."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class _Layout:
         for cells in zip(*([""] * (high - len(header)) + header for header in self.headers), strict=False):
             yield self.line(cells, columns)
         if ruled:
-            # rich's stand-in for stdout, while a progress bar is shown, knows no encoding
+            # rich's substitute for stdout, while a progress bar is shown, has no encoding
             stream = getattr(sys.stdout, "rich_proxied_file", sys.stdout)
             yield ("─" if (stream.encoding or "").lower().startswith("utf") else "-") * self.width(columns)
 
@@ -66,8 +66,8 @@ def print_table(
 ) -> None:
     """Print a table to stdout.
 
-    A table that is too wide for a terminal gets headers of several lines. If that is not enough its columns are
-    put below one another in several tables, or each row is printed as a list.
+    Headers of a table that is too wide for the terminal are broken into several lines. If that is not enough the table
+    is split into several, one below the other, or each row is printed as a list.
 
     Parameters
     ----------
@@ -75,11 +75,11 @@ def print_table(
     rows : sequence of sequences of str
         Control characters are printed as escapes.
     keys : int, default 1
-        Number of first columns that say which row it is; every one of several tables begins with them.
+        Number of first columns that identify a row; each part of a split table begins with them.
     left : sequence of str
-        Headers of the columns that are aligned to the left.
+        Headers of the left-aligned columns.
     joined : sequence of str
-        Headers of the columns that stay with the column before them.
+        Headers of the columns that stay beside the column before them.
     """
     if sys.stdout.isatty():
         lines = fitted_lines(headers, rows, shutil.get_terminal_size().columns, keys=keys, left=left, joined=joined)
@@ -99,7 +99,7 @@ def fitted_lines(
     left: Sequence[str] = (),
     joined: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a table that is at most ``width`` wide, if its cells are; see `print_table`."""
+    """Yield the lines of a table at most ``width`` wide, if its cells allow that; see `print_table`."""
     table = _Layout(headers, rows, left)
     if table.width(table.every) <= width:
         yield from table.lines(table.every)
@@ -110,7 +110,7 @@ def fitted_lines(
     for i in table.every[keys:]:
         if headers[i] in joined:
             continue
-        # a column with those that stay with it
+        # a column and those that stay beside it
         end = next((k for k in table.every[i + 1 :] if headers[k] not in joined), len(headers))
         unit = [*range(i, end)]
         if not blocks or table.width([*blocks[-1], *unit]) > width:
@@ -134,17 +134,17 @@ def _listed(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[s
 
 
 class GrowingTable:
-    """A table on a terminal whose rows are printed as soon as they are known; the first decides the columns' widths.
+    """A table on a terminal whose rows are printed as they come; the first row sets the widths of columns.
 
     Parameters
     ----------
     headers : sequence of str
     widths : mapping
-        By header: what later cells may need, where that is more than the first row shows.
+        By header: width that later cells may need, if larger than in the first row.
     left : sequence of str
-        Headers of the columns that are aligned to the left.
+        Headers of the left-aligned columns.
     most : int
-        Times that rows are printed; later ones are not.
+        Number of times that rows are printed; later ones are not.
     """
 
     def __init__(self, headers: Sequence[str], widths: Mapping[str, int], left: Sequence[str], most: int) -> None:
@@ -154,7 +154,7 @@ class GrowingTable:
         """Whether the terminal is wide enough; otherwise nothing is printed. Known after the first row."""
 
     def add(self, rows: Sequence[Sequence[str]]) -> None:
-        """Print rows; a cell that is wider than its column moves the rest of its row."""
+        """Print rows; a cell that is too wide shifts the rest of its row."""
         layout = self._layout or self._begin(rows)
         if self.fits and self._most > 0:
             self._most -= 1

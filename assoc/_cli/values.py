@@ -1,4 +1,4 @@
-"""Kinds of options: each reads the text of a command line or a file, and refuses it under the option's name."""
+"""Kinds of options: each converts the text of a command line or file, and refuses bad text by the option's name."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from assoc._system.extras import check_extra
 from assoc.errors import InvalidInputError
 
 Kind = Callable[[str, str], Any]
-"""Turns text into a value; the second argument is what messages call the option."""
+"""Converts text to a value; the second argument is the option's name in messages."""
 
 FORMATS = (".npz", ".json", ".csv", ".parquet", ".html", ".htm", ".toml", ".png", ".pdf", ".xlsx")
-"""Endings by which people know what is in a file."""
+"""File name endings that indicate a format."""
 
 
 def text(value: str, label: str) -> str:
-    """Take any text."""
+    """Accept any text."""
     return value
 
 
 def whole(least: int, more: str = "") -> Kind:
-    """Whole numbers of at least ``least``; messages say ``more`` of what is expected."""
+    """Whole numbers of at least ``least``; ``more`` is appended to what messages expect."""
 
     def read(value: str, label: str) -> int:
         try:
@@ -39,7 +39,7 @@ def whole(least: int, more: str = "") -> Kind:
 
 
 def real(expected: str, good: Callable[[float], bool]) -> Kind:
-    """Numbers that are good; messages say what is expected."""
+    """Numbers that satisfy ``good``; ``expected`` describes them in messages."""
 
     def read(value: str, label: str) -> float:
         try:
@@ -54,20 +54,20 @@ def real(expected: str, good: Callable[[float], bool]) -> Kind:
 
 
 def or_word(word: str, meaning: Callable[[], Any], kind: Kind) -> Kind:
-    """A word of its own meaning, or another kind."""
+    """A word with a meaning of its own, or another kind."""
     return lambda value, label: meaning() if value == word else kind(value, label)
 
 
 def listed(kind: Kind) -> Kind:
-    """Values with commas between them."""
+    """Values separated by commas."""
     return lambda value, label: tuple(kind(part.strip(), label) for part in value.split(","))
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not everywhere
+    except AttributeError:  # not on every system
         return os.cpu_count() or 1
 
 
@@ -97,7 +97,7 @@ def position_on_earth(value: str, label: str) -> tuple[float, float, float]:
 
 
 class OneOf:
-    """One of some names, which shells complete."""
+    """One of several names, which shells can complete."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self.names = tuple(names)
@@ -110,18 +110,18 @@ class OneOf:
 
 
 class Output:
-    """Files that are written, known by the endings of their names.
+    """Files to write, whose formats are known by the endings of their names.
 
     Parameters
     ----------
     *endings : str
-        What the name may end in.
+        Endings that the name may have.
     strict : bool, default False
-        Whether it must end in one of these; otherwise it must only be none of another format.
+        Whether the name must have one of them; otherwise it must only not have that of another format.
     streams : bool, default True
-        Whether stdout and pipes will do, which have the first of the endings.
+        Whether stdout and pipes are allowed, with the format of the first ending.
     extras : dict, optional
-        By ending, "" for all: the package that writes it, and the extra of assoc that brings it.
+        By ending, "" for all: the package that writes it, and the extra of assoc that installs it.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ def scan_range(value: str, count: int, name: str, label: str = "--scans") -> ran
     Raises
     ------
     InvalidInputError
-        It is not of that form, or reaches beyond.
+        The text has another form, or the range goes beyond the scans.
     """
     first, colon, last = value.partition(":")
     try:

@@ -1,1 +1,1 @@
-"""What `assoc.sweep` alone needs: its options, and the tables of a study."""
+"""Parts of `assoc.sweep`: its options, and the tables of a study."""

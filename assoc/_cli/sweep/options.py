@@ -1,4 +1,4 @@
-"""The options of ``assoc sweep``, from its command line and from a TOML file, and the study that they ask for.
+"""The options of ``assoc sweep``, from its command line and a TOML file, and the study that they describe.
 
 Imports inside functions let wrong options be refused quickly: scenes and studies need numpy and more.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 DEFAULT_SOLVER = "aco"
 SHOWN = 20
-"""Settings that a terminal gets."""
+"""Number of settings that a terminal shows."""
 
 _OF_FILE = (
     Option("files", "FILE", "scene.npz or problem.npz", positional=True, rest={"nargs": "*"}),
@@ -48,7 +48,7 @@ _OF_SUMMARY = (
     Option("plot", "", "draw heatmap.png and convergence.png into the folder"),
 )
 _EXTRAS = {"plot": ("matplotlib", "plot"), "tune": ("optuna", "tune"), "scheduler": ("distributed", "dask")}
-"""By option: the package that it needs, and the extra that brings it."""
+"""By option: the package that it needs, and the extra that installs it."""
 
 
 def parser() -> Parser:
@@ -68,12 +68,12 @@ def parser() -> Parser:
 
 
 def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
-    """Read the command line and the file that ``--config`` names; the options, and the design as tables of the file.
+    """Read the command line and the file of ``--config``; returns the options, and the design as tables of the file.
 
     Raises
     ------
     InvalidInputError
-        Anything that is not as ``--help`` says.
+        Input that does not follow ``--help``.
     """
     from assoc.solvers import registry
 
@@ -115,7 +115,7 @@ def _check_combinations(given: Given, tables: Mapping[str, Any]) -> None:
 
 
 def _check_outputs(given: Given, folder: str) -> None:
-    """Refuse before the work what could not be written after it, and what would overwrite the study or its sources."""
+    """Refuse, before the work, outputs that cannot be written or would overwrite the study or its sources."""
     from assoc.sweeps.store import LOG, MANIFEST, REPORT
 
     if os.path.exists(folder) and not os.path.isdir(folder):
@@ -142,11 +142,11 @@ def _spaces(given: Given) -> dict[str, dict[str, Space]]:
 
 
 def make_study(given: Given, tables: Mapping[str, Any]) -> Study:
-    """Return the study that is asked for."""
+    """Return the study that the options describe."""
     from assoc.sweeps.design import designed, settings_from
     from assoc.sweeps.study import Study
 
-    # a wrong design is reported before scenes are read
+    # report a wrong design before reading scenes
     if tables:
         settings = settings_from(tables, given["random"], given["seed"] or 0, f"{given.file}: ")
     else:
@@ -155,7 +155,7 @@ def make_study(given: Given, tables: Mapping[str, Any]) -> Study:
 
 
 def tune_parameters(given: Given, progress: Callable[[Any], object]) -> Report:
-    """Search good parameters."""
+    """Search for good parameters."""
     from assoc.sweeps.tuning import tune
 
     ((solver, space),) = _spaces(given).items()
@@ -173,7 +173,7 @@ def tune_parameters(given: Given, progress: Callable[[Any], object]) -> Report:
 
 
 def _scenes(given: Given) -> dict[str, Any]:
-    """The scenes and problems, which of their scans, and how these become problems."""
+    """The scenes and problems, their selected scans, and the options of gating."""
     from assoc.sweeps.sources import load_sources
 
     sources, scans = load_sources(given["files"]), None

@@ -1,4 +1,4 @@
-"""The tables of parameter studies, for people."""
+"""Printed tables of parameter studies."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 def print_study(table: pd.DataFrame, most: int) -> None:
-    """Print the summary of a study: into a pipe the whole of it.
+    """Print the summary of a study, all of it if stdout is not a terminal.
 
-    A terminal gets the first ``most`` settings, and what is the same in all settings in a line below.
+    A terminal gets the first ``most`` settings, and a line with the values that all settings share.
     """
     brief = sys.stdout.isatty()
     headers, rows = summary_rows(table, brief=brief)
@@ -39,11 +39,11 @@ def print_study(table: pd.DataFrame, most: int) -> None:
 def without_the_same(
     headers: Sequence[str], rows: Sequence[Sequence[str]], keys: int
 ) -> tuple[list[str], list[list[str]], str]:
-    """Take out the columns, after the first ``keys``, whose cells are all the same; return those as words."""
+    """Remove the columns, after the first ``keys``, whose cells are all equal; return them as words."""
     if len(rows) < 2:
         return [*headers], [[*row] for row in rows], ""
     same = [i for i in range(keys, len(headers)) if len({row[i] for row in rows}) == 1]
-    # an interval goes with its value
+    # an interval stays with its value
     same = [i for i in same if (i if headers[i] != INTERVAL else i - 1) in same]
     same = [i for i in same if headers[i + 1 : i + 2] != [INTERVAL] or i + 1 in same]
     words: list[str] = []
@@ -57,7 +57,7 @@ def without_the_same(
 
 
 def print_tuning(report: Report) -> None:
-    """Print what a search found, and how it does on what was held out."""
+    """Print the result of a search, and its quality on the held-out runs."""
     unit, factor = ("cost", 1.0) if report.target == "gap" else ("ms", 1e3)
     changed = {
         name: value for name, value in report.tuned.parameters.items() if value != report.default.parameters[name]

@@ -1,1 +1,1 @@
-"""What only ``python -m assoc.track`` uses: its options, and plots as they come."""
+"""Parts of ``python -m assoc.track`` and ``assoc.live``: their options, and plots from a stream."""

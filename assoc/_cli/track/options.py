@@ -1,4 +1,4 @@
-"""The options of ``assoc track`` and ``assoc live``, and the tracker that they ask for.
+"""The options of ``assoc track`` and ``assoc live``, and the tracker that they describe.
 
 Imports inside functions keep --help quick.
 """
@@ -60,7 +60,7 @@ TRACKING = (
     *(COMMON[name] for name in _OF_ALL),
     *_OF_TRACKERS,
 )  # fmt: skip
-"""Options of trackers, whatever they track."""
+"""Options of all trackers."""
 _COMMON = (COMMON["import"], *verbosity("the settings that were used"))
 
 IDENTITY = Option(
@@ -70,7 +70,7 @@ IDENTITY = Option(
     kinds.OneOf(("use", "score-only", "ignore")),
     {"input": ("plots",)},
 )
-# parameter of the life cycle -> what it is only for
+# parameters of the life cycle that are only for some rule
 _LIFE_CYCLE = {
     "m": {"confirmation": ("m-of-n",)},
     "n": {"confirmation": ("m-of-n",)},
@@ -120,7 +120,7 @@ OF_PLOTS = (
     Option("bearing_noise", "DEG", "standard deviation of bearing, degrees (default: likewise)", kinds.degrees, _PLOTS),
     Option("false_alarms", "X", "mean number of false plots in a rotation (default 2.5)", kinds.number, _PLOTS),
 )  # fmt: skip
-# what `assoc.recordings.radar_of` calls them
+# names of these options in `assoc.recordings.radar_of`
 RADAR = {
     "detection_probability": "detection_probability",
     "false_alarms": "false_alarm_rate",
@@ -159,7 +159,7 @@ _MORE = "\n".join(
 
 
 def track_parser() -> Parser:
-    """Return the parser of ``assoc track``, without what `read_options` adds."""
+    """Return the parser of ``assoc track``, without the options that `read_options` adds."""
     parser = Parser(
         prog="assoc.track",
         usage=f"{command('track')} FILE [--tracker NAME] [--solver NAME] [--filter NAME] -o tracks.csv [options]",
@@ -176,7 +176,7 @@ def track_parser() -> Parser:
 
 
 def live_parser() -> Parser:
-    """Return the parser of ``assoc live``, without what `read_options` adds."""
+    """Return the parser of ``assoc live``, without the options that `read_options` adds."""
     called = command("live")
     parser = Parser(
         prog="assoc.live",
@@ -193,24 +193,24 @@ def live_parser() -> Parser:
 
 
 def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any]]:
-    """Read a command line; the options, and the arguments for the tracker.
+    """Read a command line; returns the options, and the arguments for the tracker.
 
     Parameters
     ----------
     words : list of str
     parser : Parser
-        Knows the program's options but for the further ones.
+        Parser with the program's options, without the further ones.
 
     Raises
     ------
     InvalidInputError
-        An option is unknown, or has a value that it does not take.
+        An option is unknown or has an invalid value.
     """
     first = read_first(words, "solver", "import")
     import_modules(first["import"])
     solver = first["solver"] or "exact"
     if {"-h", "--help"} & {*words}:
-        # help must be quick, and the packages that know the further options are not
+        # for quick help: the packages that define the further options load slowly
         parser.parse_args(words)
     from assoc.tracking import IdentityParameters, Initiation, LifeCycle
 
@@ -251,7 +251,7 @@ def add_further(parser: Parser, solver: str) -> dict[str, list[Option]]:
 
 
 def with_further(parser: Parser) -> Parser:
-    """Return the parser with the options that `read_options` adds."""
+    """Return the parser with the options of `read_options` added."""
     add_further(parser, "exact")
     return parser
 
@@ -264,12 +264,12 @@ def make_tracker(
     region: Any,
     pace: float = 1.0,
 ) -> Tracker:
-    """Make the tracker that the options ask for.
+    """Make the tracker that the options describe.
 
     Raises
     ------
     InvalidInputError
-        An option is not for it.
+        An option does not apply to this tracker.
     """
     from assoc.tracking import TRACKERS as KINDS
     from assoc.tracking.filter_choice import make_filter

@@ -1,4 +1,4 @@
-"""Plots as lines from stdin, a UDP port on loopback or a scene, and tracks as lines while they change."""
+"""Plots as lines from stdin, a UDP port on loopback or a scene; tracks as lines whenever they change."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from assoc.tracking import Picture
 
 ADDRESSES = 2**24
-"""ICAO addresses that there are."""
+"""Number of ICAO addresses."""
 LONGEST = 10_000
-"""Characters of a line at the most."""
-# bytes that may wait: stdin is not read on while they do, datagrams are lost and counted
+"""Most characters of a line."""
+# bytes that may wait: beyond them stdin is not read on, and datagrams are lost and counted
 _WAITING = 64_000_000
-# of Linux, and where among its numbers the datagrams are for which a socket had no room
+# Linux's statistics of sockets, and the column of the datagrams dropped for lack of buffer space
 _SO_MEMINFO, _DROPS = 55, 8
 _DATAGRAM = 65_535
 _POLL = 0.2
@@ -34,30 +34,30 @@ COLUMNS = (
     "track_id", "time", "x", "y", "z", "vx", "vy", "vz", "event", "score", "hits", "started", "last_detection",
     "sigma_x", "sigma_y", "sigma_z",
 )  # fmt: skip
-"""What is written of tracks; an event is new, update or end."""
+"""Columns of the tracks; an event is new, update or end."""
 
 
 class Plot(NamedTuple):
-    """A plot as a line says it."""
+    """A plot as read from a line."""
 
     sensor: str
     time: float
     values: list[float]
     identity: tuple[int, int] = (0, 0)
-    """Mode 3/A code and ICAO address, 0 where there is none."""
+    """Mode 3/A code and ICAO address, 0 where it is missing."""
 
 
 def parse_line(line: str, scene: Scene) -> Plot | None:
     """Read a line of CSV or JSON; None for an empty line, a comment or the header.
 
-    CSV: sensor, time, the components of the measurement, then mode3 and address if it has them. JSON: an object with
-    sensor, time, and either values (an array) or the components by their names; mode3 and address if it has them.
+    CSV: sensor, time, the components of the measurement, then optionally mode3 and address. JSON: an object with
+    sensor, time, and either values (an array) or the components by name; optionally mode3 and address.
     Metres, seconds, radians; a code is a whole number, an address has hexadecimal digits (in JSON it may be a number).
 
     Raises
     ------
     InvalidInputError
-        It is neither.
+        The line has neither form.
     """
     text = line.strip()
     if not text or text.startswith("#"):
@@ -72,7 +72,7 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
         values = found.get("values")
         if values is None:
             sensor = _sensor(name, scene)
-            # of an unknown sensor nothing is read: the tracker says that it does not know it
+            # of an unknown sensor only the name is read: the tracker reports it
             values = [found[one] for one in sensor.components[: sensor.dim]] if sensor is not None else []
         identity = _identity(found.get("mode3"), found.get("address"))
         return Plot(name, time, [float(one) for one in values], identity)
@@ -83,10 +83,10 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
 
 
 def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
-    """Sensor, time, values, and what tells who it is."""
+    """Sensor, time, values, and identity."""
     name, time, *rest = (one.strip() for one in text.split(","))
     sensor = _sensor(name, scene)
-    # how many values an unknown sensor sends is not known: the tracker says that it does not know it
+    # the number of values of an unknown sensor is unknown: the tracker reports the sensor
     dim = len(rest) if sensor is None else sensor.dim
     if len(rest) > dim + 2:
         raise ValueError(f"{len(rest)} values, at most {dim}, mode3 and address")
@@ -95,17 +95,17 @@ def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
 
 
 def _sensor(name: str, scene: Scene) -> Sensor | None:
-    """The sensor of this name or number; None if there is none."""
+    """The sensor of this name or number; None if unknown."""
     return next((one for k, one in enumerate(scene.sensors, 1) if name in (one.name, str(k))), None)
 
 
 def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
-    """Mode 3/A code and address, as text or numbers; nothing is 0.
+    """Mode 3/A code and address, as text or numbers; 0 if empty.
 
     Raises
     ------
     ValueError
-        They are neither.
+        A value is out of range or not a number.
     """
     found = []
     for what, given, base, most in (("mode3", mode3, 10, 7777), ("address", address, 16, ADDRESSES - 1)):
@@ -125,7 +125,7 @@ def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
 
 
 class _Waiting(queue.Queue[bytes | None]):
-    """A queue whose size is the memory that it takes."""
+    """A queue whose size is counted in bytes."""
 
     def _init(self, maxsize: int) -> None:
         super()._init(maxsize)
@@ -150,7 +150,7 @@ class Lines:
     Parameters
     ----------
     port : int or None
-        UDP port on 127.0.0.1; None: stdin. Over UDP the line "end" ends the plots.
+        UDP port on 127.0.0.1; None: stdin. Over UDP the line "end" ends the stream.
     """
 
     def __init__(self, port: int | None) -> None:
@@ -174,7 +174,7 @@ class Lines:
 
     @property
     def lost(self) -> int:
-        """Datagrams that came quicker than they were taken, here or, as far as Linux says it, in the system."""
+        """Datagrams that were dropped, here or (counted on Linux only) in the system, because they came too quickly."""
         if self._socket is None or not sys.platform.startswith("linux"):
             return self._dropped
         numbers = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
@@ -190,7 +190,7 @@ class Lines:
             self._waiting.put(None)
 
     def _take_lines(self, stream: IO[bytes]) -> None:
-        """Lines of a stream; for one that is too long a line that says no more than that."""
+        """Read lines of a stream; one that is too long is replaced by a line that is refused for its length."""
         while line := stream.readline(LONGEST + 1):
             whole = len(line) <= LONGEST or line.endswith(b"\n")
             self._waiting.put(line if whole else b"x" * (LONGEST + 1))
@@ -198,7 +198,7 @@ class Lines:
                 line = stream.readline(LONGEST + 1)
 
     def _receive(self, port: socket.socket) -> None:
-        """Datagrams, split by who takes them: the less is done here, the fewer are lost."""
+        """Receive datagrams; the reader splits them into lines: less work here loses fewer datagrams."""
         while True:
             datagram = port.recv(_DATAGRAM)
             try:
@@ -221,7 +221,7 @@ class Lines:
 
 
 def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
-    """The plots of a scene by their times, so many times as quickly as they were made; 0: without waiting."""
+    """The plots of a scene by their times, ``speed`` times as quickly as they were made; 0: without waiting."""
     plots = []
     for k in range(scene.num_scans):
         scan = scene.scan(k)
@@ -238,7 +238,7 @@ def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
 
 
 class TrackWriter:
-    """Writes tracks as they change, one line of CSV for each that is new, was detected, or has ended."""
+    """Writes a line of CSV for each track that is new, was detected, or has ended."""
 
     def __init__(self, stream: IO[str], positions: Sequence[int]) -> None:
         self._stream, self._positions = stream, list(positions)
@@ -247,7 +247,7 @@ class TrackWriter:
         stream.flush()
 
     def write(self, picture: Picture) -> None:
-        """Write what has changed since the last picture."""
+        """Write the changes since the last picture."""
         for track in picture.tracks:
             before = self._known.get(track.track_id)
             if before is None or track.last_detection > before.last_detection:
