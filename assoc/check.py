@@ -13,9 +13,8 @@ its u: a tuple for which that is beyond the target, the cost of the given soluti
 cost no less than their measurements alone. Rows that share no tuple, directly or through others, are bounded
 separately. In a tree, a node branches on whether rows a and b are in one tuple: in one child only tuples with both or
 neither remain, in the other those without both; its bound is the least of its leaves'. A cut is an odd number n of
-rows: chosen tuples contain at most (n - 1) / 2 pairs of them (half the sum of the rows, rounded down); it is an
-additional row with a multiplier of at most 0.
-Costs are multiples of a unit, and so are a solution's: bounds are rounded up to the next multiple.
+rows: chosen tuples contain at most (n - 1) / 2 pairs of them (half the sum of the rows, rounded down); it is a further
+row with a multiplier of at most 0. Costs are multiples of a unit, and so are a solution's: bounds are rounded up to the next multiple.
 """
 
 from __future__ import annotations
@@ -82,13 +81,13 @@ class Problem:
 
     def __init__(self, sizes: list[int], dummies: bool, costs: dict[tuple[int, ...], int]) -> None:
         self.sizes, self.dummies, self.costs = sizes, dummies, costs
-        lines = sorted(f"{one} {cost}" for one, cost in costs.items())
+        lines = sorted(f"{key} {cost}" for key, cost in costs.items())
         self.digest = hashlib.sha256("\n".join([f"{sizes} {dummies}", *lines]).encode()).hexdigest()
         self.rows = [(s, i) for s, size in enumerate(sizes) for i in range(1, size + 1)]
         # without dummies only the measurements of the smallest sensors must be used
         self.needed = {row for row in self.rows if dummies or sizes[row[0]] == min(sizes)}
         self.unit = math.gcd(*costs.values()) or 1
-        every = [(cost, tuple((s, i) for s, i in enumerate(one) if i)) for one, cost in costs.items()]
+        every = [(cost, tuple((s, i) for s, i in enumerate(key) if i)) for key, cost in costs.items()]
         alone = {own[0]: cost for cost, own in every if len(own) == 1}
         if dummies and len(alone) < len(self.rows):
             raise ValueError("with dummies, each measurement must be listed as a tuple of its own")
@@ -117,10 +116,10 @@ def read_problem(path: str) -> Problem:
         raise ValueError(f"expected sizes, up to {MOST_ROWS} measurements in all, and 'dummies yes' or 'dummies no'")
     costs: dict[tuple[int, ...], int] = {}
     for words in lines:
-        one, cost = tuple(map(_whole, words[1:])), number(words[0])
-        if len(one) != len(sizes) or not (any(one) if dummies else all(one)) or any(map(int.__gt__, one, sizes)):
+        key, cost = tuple(map(_whole, words[1:])), number(words[0])
+        if len(key) != len(sizes) or not (any(key) if dummies else all(key)) or any(map(int.__gt__, key, sizes)):
             raise ValueError(f"{' '.join(words):.60}: no tuple of these sizes{'' if dummies else ', without dummies'}")
-        costs[one] = min(cost, costs.get(one, cost))
+        costs[key] = min(cost, costs.get(key, cost))
         count -= 1
     if count:
         raise ValueError("the number of tuples is not the one that is announced")
@@ -130,16 +129,16 @@ def read_problem(path: str) -> Problem:
 def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = None) -> int:
     """Return the cost of a choice of tuples; refuse it if it is no solution, or if its cost is not as claimed."""
     used: set[Row] = set()
-    for one in chosen:
-        if one not in problem.costs:
-            raise RefusedError(f"the solution has the tuple {one}, which is not in the problem")
-        for s, i in enumerate(one):
+    for each in chosen:
+        if each not in problem.costs:
+            raise RefusedError(f"the solution has the tuple {each}, which is not in the problem")
+        for s, i in enumerate(each):
             if (s, i) in used:
                 raise RefusedError(f"the solution uses measurement {i} of sensor {s + 1} twice")
-        used |= {(s, i) for s, i in enumerate(one) if i}
+        used |= {(s, i) for s, i in enumerate(each) if i}
     for s, i in sorted(problem.needed - used):
         raise RefusedError(f"the solution does not use measurement {i} of sensor {s + 1}")
-    cost = sum(problem.costs[one] for one in chosen)
+    cost = sum(problem.costs[each] for each in chosen)
     if claim is not None and number(claim) != cost:
         raise RefusedError(f"the solution costs {shown(cost)}, not {claim:.60}")
     return cost
@@ -179,13 +178,13 @@ def cheap(columns: list[Column], u: dict[Row, int], most: int) -> list[Column]:
 def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list[Column], dict[Row, int]]:
     """Return the columns with the cuts as rows, once for each pair of a cut's rows in them; and the cuts' sides."""
     cuts_of, sides = {row: list[Row]() for row in rows}, dict[Row, int]()
-    for place, cut in enumerate(_listed(cuts)):
-        inside = [_as_row(one) for one in _listed(cut)]
-        if len(inside) % 2 == 0 or len({*inside}) != len(inside) or not rows.issuperset(inside) or place >= len(rows):
-            raise RefusedError(f"cut {place} does not follow: it needs an odd number of its tree's rows, each once")
-        sides[-1, place] = len(inside) // 2
+    for index, cut in enumerate(_listed(cuts)):
+        inside = [_as_row(row) for row in _listed(cut)]
+        if len(inside) % 2 == 0 or len({*inside}) != len(inside) or not rows.issuperset(inside) or index >= len(rows):
+            raise RefusedError(f"cut {index} does not follow: it needs an odd number of its tree's rows, each once")
+        sides[-1, index] = len(inside) // 2
         for row in inside:
-            cuts_of[row].append((-1, place))
+            cuts_of[row].append((-1, index))
     longer = []
     for cost, own in columns:
         hits = [cut for row in own for cut in cuts_of[row]]
@@ -244,10 +243,10 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
         if bound is None:
             return target
     trees: dict[tuple[Row, ...], dict[str, object]] = {}
-    for one in _listed(proof.get("trees")):
-        if not isinstance(one, dict):
+    for tree in _listed(proof.get("trees")):
+        if not isinstance(tree, dict):
             raise ValueError("a tree must have rows and nodes")
-        trees[tuple(map(_as_row, _listed(one.get("rows"))))] = one
+        trees[tuple(map(_as_row, _listed(tree.get("rows"))))] = tree
     total = 0
     for rows, inside in components(problem.rows, columns):
         tree, part = trees.pop(tuple(sorted(rows)), None), sum(u[row] for row in rows)

@@ -176,7 +176,7 @@ class AssignmentProblem:
         keep = ~np.isposinf(dense)
         if dummy:
             keep[(0,) * dense.ndim] = False
-            _doubt(float(dense[(0,) * dense.ndim]), "tensor")
+            _warn_of_dummy_cost(float(dense[(0,) * dense.ndim]), "tensor")
         count = np.count_nonzero(keep)
         # numpy's list of indices and the stacked array, then the problem
         memory.require(count * (33.0 * dense.ndim + 48.0), f"tensor: {count} allowed tuples", advice)
@@ -218,7 +218,7 @@ class AssignmentProblem:
             raise InvalidInputError(f"array: each dimension needs its dummy at index 0, got {entries.shape}")
         keep = index.any(axis=1) if dummy else np.ones(costs.size, dtype=np.bool_)
         for cost in costs[~keep]:
-            _doubt(float(cost), "array")
+            _warn_of_dummy_cost(float(cost), "array")
         offset = 0 if dummy else 1
         sizes = [int(n) - (1 - offset) for n in entries.shape]
         return cls(index[keep].astype(np.int64) + offset, costs[keep], sizes, dummy=dummy)
@@ -399,7 +399,7 @@ def _numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return np.where(np.ma.getmaskarray(np.ma.asarray(values)), np.inf, numbers) if np.ma.is_masked(values) else numbers
 
 
-def _doubt(cost: float, name: str) -> None:
+def _warn_of_dummy_cost(cost: float, name: str) -> None:
     """Warn of an all-dummy entry that is ignored although it looks like a cost."""
     if cost != 0.0 and np.isfinite(cost):
         at = "at index 0 of every dimension, which is the dummy"

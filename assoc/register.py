@@ -56,7 +56,7 @@ def _register(words: list[str]) -> None:
         given["report"] = f"{output.removesuffix('.npz')}.html"
     given.check_outputs([given["file"]])
     with messages(given):
-        _write(given, given.some(one.name for one in _SETTINGS))
+        _write(given, given.some(parameter.name for parameter in _SETTINGS))
 
 
 def _write(given: Given, values: dict[str, Any]) -> None:

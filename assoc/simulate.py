@@ -56,11 +56,13 @@ def _simulate(words: list[str]) -> None:
     given = _parser(scenario).read(words[1:])
     seed = given["seed"] or 0
     parameters = parameters_of(simulation.parameters(scenario))
-    values = given.some(one.name for one in parameters)
+    values = given.some(parameter.name for parameter in parameters)
     given.check_outputs(value for value in values.values() if isinstance(value, str))
     with messages(given):
         if given["verbose"]:
-            used = {"seed": seed} | {one.name: values.get(one.name, one.default) for one in parameters}
+            used = {"seed": seed} | {
+                parameter.name: values.get(parameter.name, parameter.default) for parameter in parameters
+            }
             print_lines(f"{scenario}: " + ", ".join(f"{name} {value}" for name, value in used.items()))
         if scenario in _PLOTS:
             _write_plots(scenario, seed, given, values)

@@ -36,10 +36,10 @@ class Solution:
 
     Attributes
     ----------
+    tuples : int32 array, shape (K, S)
         The chosen tuples in lexicographic order, including false alarms (singletons).
-        The chosen tuples in lexicographic order; false alarms (singletons) are among them.
+    indices : int array, shape (K,)
         The same tuples as rows of ``problem.tuples``.
-        The same as rows of ``problem.tuples``.
     cost : float
         Total cost.
     lower_bound : float
@@ -64,7 +64,7 @@ class Solution:
         The solver's parameters.
     compile_time : float
         Seconds spent on compiling kernels (once after installation) or loading them (once in a process); they count in
-        time limit, not in ``runtime``.
+        a time limit, not in ``runtime``.
     """
 
     tuples: NDArray[np.int32]

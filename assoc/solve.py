@@ -81,7 +81,7 @@ def _solve(words: list[str]) -> None:
     given = _parser(solver, explicit=named is not None).read(words)
     given.fill(first["config"] or "", config)
     known = parameters_of(registry.parameters(solver))
-    parameters = _section(tables, solver, known) | given.some(one.name for one in known)
+    parameters = _section(tables, solver, known) | given.some(parameter.name for parameter in known)
     registry.make_parameters(solver, parameters)
     if given["kbest"] is not None and (named or parameters):
         label = given.label("kbest")
@@ -151,7 +151,9 @@ def parser() -> Parser:
     """Return the parser with the options of all solvers."""
     made = _parser(DEFAULT_SOLVER, explicit=True)
     for name in registry.names():
-        made.declare(*(one for one in parameter_options(registry.parameters(name)) if one.name not in made.declared))
+        made.declare(
+            *(option for option in parameter_options(registry.parameters(name)) if option.name not in made.declared)
+        )
     return made
 
 
@@ -174,14 +176,14 @@ def _parser(solver: str, explicit: bool) -> Parser:
 def _other_solvers() -> str:
     lines = ["solvers and their parameters (described by --solver NAME --help):"]
     for name in registry.names():
-        flags = " ".join(flag_of(one.name) for one in parameters_of(registry.parameters(name)))
+        flags = " ".join(flag_of(parameter.name) for parameter in parameters_of(registry.parameters(name)))
         lines.append(f"  {name:<12} {flags or '(none)'}")
     return "\n".join(lines)
 
 
 def _section(tables: dict[str, Any], solver: str, known: Sequence[Parameter]) -> dict[str, Any]:
     """Parameters of the solver in the configuration file."""
-    table, by_name = tables.get(solver, {}), {one.name: one for one in known}
+    table, by_name = tables.get(solver, {}), {parameter.name: parameter for parameter in known}
     if not isinstance(table, dict):
         raise InvalidInputError(f"[{solver}]: expected one table, got {len(table)}")
     # the registry reports unknown names
@@ -199,7 +201,7 @@ def _plan(sources: list[Source], solver: str, parameters: dict[str, Any], given:
         tuple(sources),
         solver,
         parameters=parameters,
-        gating=given.some(one.name for one in _GATING),
+        gating=given.some(parameter.name for parameter in _GATING),
         pheromone=given["report"] is not None,
         gate_loss=bool(given["gate_loss"]),
         watch=log,

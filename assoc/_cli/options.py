@@ -71,16 +71,16 @@ class Option:
     def read(self, value: Any, label: str) -> Any:
         """Convert the text of a command line, or the list of texts, to the value."""
         if isinstance(value, list):
-            return [self.kind(one, label) for one in value]
+            return [self.kind(item, label) for item in value]
         return self.kind(value, label) if isinstance(value, str) else value
 
     def read_toml(self, value: Any, label: str) -> Any:
         """Convert a value of a TOML file to the option's."""
         many = "nargs" in self.rest
         values = value if many and isinstance(value, list) else [value]
-        if self.kind is text and not all(isinstance(one, str) for one in values):
+        if self.kind is text and not all(isinstance(item, str) for item in values):
             raise InvalidInputError(f"{label}: expected text{' or a list of texts' if many else ''}, got {value!r}")
-        found = [self.kind(str(one), label) for one in values]
+        found = [self.kind(str(item), label) for item in values]
         return found if many else found[0]
 
 
@@ -263,16 +263,18 @@ def read_config(
 def parameter_options(owner: type) -> list[Option]:
     """Options for the fields of a parameter dataclass that text can give."""
     found = []
-    for one in parameters_of(owner):
+    for parameter in parameters_of(owner):
         more: dict[str, Any] = {}
-        metavar = one.name.upper() if one.positional else {int: "N", float: "X"}.get(one.kind, "TEXT")
-        if one.choices:
-            metavar = "{" + ",".join(map(str, one.choices)) + "}"
-        if one.kind is bool:
+        metavar = parameter.name.upper() if parameter.positional else {int: "N", float: "X"}.get(parameter.kind, "TEXT")
+        if parameter.choices:
+            metavar = "{" + ",".join(map(str, parameter.choices)) + "}"
+        if parameter.kind is bool:
             metavar, more = "", {"action": argparse.BooleanOptionalAction}
-        default = "" if one.default in (MISSING, None) else f" (default {one.default})"
-        described = (one.help + default).strip()
-        found.append(Option(one.name, metavar, described, one.parse, rest=more, positional=one.positional))
+        default = "" if parameter.default in (MISSING, None) else f" (default {parameter.default})"
+        described = (parameter.help + default).strip()
+        found.append(
+            Option(parameter.name, metavar, described, parameter.parse, rest=more, positional=parameter.positional)
+        )
     return found
 
 
@@ -282,8 +284,8 @@ def flags_of_solvers(but: str) -> dict[str, str]:
 
     found: dict[str, list[str]] = {}
     for name in registry.names():
-        for one in parameters_of(registry.parameters(name)):
-            found.setdefault(flag_of(one.name), []).append(name)
+        for parameter in parameters_of(registry.parameters(name)):
+            found.setdefault(flag_of(parameter.name), []).append(name)
     return {
         flag: f"{' and '.join(owners)} (--solver {owners[0]}), not to {but}"
         for flag, owners in found.items()
@@ -308,7 +310,7 @@ def verbosity(more: str) -> tuple[Option, Option]:
 
 VERBOSITY_FLAGS = ("-q", "--quiet", "-v", "--verbose")
 
-COMMON = {one.name: one for one in (
+COMMON = {option.name: option for option in (
     Option("seed", "N", "seed of the random numbers (default 0)", whole(0)),
     Option("time_limit", "S",
            "seconds for the solver on each scan; it then returns the best solution found (default: none)", seconds),

@@ -25,7 +25,7 @@ class _Layout:
         broken: bool = False,
         least: Mapping[str, int] | None = None,
     ) -> None:
-        self.headers = [one.split(" ") if broken and len(one) > _SHORT else [one] for one in headers]
+        self.headers = [header.split(" ") if broken and len(header) > _SHORT else [header] for header in headers]
         self.rows = [[printable(cell) for cell in row] for row in rows]
         self.left = [header in left for header in headers]
         self.widths = [

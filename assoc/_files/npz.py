@@ -151,7 +151,7 @@ def _read(
             raise InvalidInputError(f"{file}: the field {name!r} is missing")
     arrays: dict[str, Array] = {}
     for name, spec in wanted.items():
-        arrays[name] = _member(file, archive, members[name], spec, sum(one.nbytes for one in arrays.values()))
+        arrays[name] = _member(file, archive, members[name], spec, sum(array.nbytes for array in arrays.values()))
     return arrays
 
 

@@ -71,9 +71,9 @@ def _wrong_argument(function: Callable[..., Any], args: Sequence[Any], keywords:
         kind = kinds.get(name, Any)
         if parameter.kind is parameter.VAR_KEYWORD:
             continue
-        for one in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
-            if not fits(one, kind):
-                return f"{name}: expected {described(kind)}, got {_found(one, kind)}"
+        for argument in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
+            if not fits(argument, kind):
+                return f"{name}: expected {described(kind)}, got {_found(argument, kind)}"
     return None
 
 
@@ -120,9 +120,9 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is None or kind is type(None):
         return value is None
     if origin in (Union, types.UnionType):
-        return any(fits(value, one) for one in inner)
+        return any(fits(value, item) for item in inner)
     if origin is Literal:
-        return any(type(value) is type(one) and value == one for one in inner)
+        return any(type(value) is type(item) and value == item for item in inner)
     if origin is np.ndarray or kind is np.ndarray:
         return _makes_array(value)
     if origin is Callable or kind is Callable:
@@ -131,7 +131,7 @@ def fits(value: Any, kind: Any) -> bool:
         if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
             return False
         element = inner[0] if inner and not (origin is tuple and len(inner) > 1 and inner[1] is not ...) else Any
-        return not isinstance(value, Sequence) or all(fits(one, element) for one in value[:_SOME])
+        return not isinstance(value, Sequence) or all(fits(item, element) for item in value[:_SOME])
     kind = origin or kind
     if kind is float:
         return isinstance(value, Real) and not isinstance(value, bool)
@@ -140,7 +140,7 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is bool:
         return isinstance(value, (bool, np.bool_))
     if isinstance(kind, _Unloaded):
-        return kind.__name__ in [one.__name__ for one in type(value).__mro__]
+        return kind.__name__ in [item.__name__ for item in type(value).__mro__]
     if getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
         return True
     return isinstance(value, kind)
@@ -160,7 +160,7 @@ def described(kind: Any, several: bool = False) -> str:
         kind = np.ndarray
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(described(one, several) for one in inner))
+        return " or ".join(dict.fromkeys(described(part, several) for part in inner))
     if kind is None or kind is type(None):
         return "None"
     if origin is Literal:
@@ -187,12 +187,12 @@ def described(kind: Any, several: bool = False) -> str:
 def _found(value: Any, kind: Any) -> str:
     """Describe a value: short ones literally, lists by the first element that does not fit."""
     if isinstance(value, (list, tuple)):
-        kinds = [one for one in (typing.get_args(kind) or [kind]) if typing.get_origin(one) in _LISTS] or [kind]
+        kinds = [part for part in (typing.get_args(kind) or [kind]) if typing.get_origin(part) in _LISTS] or [kind]
         inner = typing.get_args(kinds[0])
         if inner and typing.get_origin(kinds[0]) in _LISTS:
-            for number, one in enumerate(value[:_SOME]):
-                if not fits(one, inner[0]):
-                    return f"{_found(one, inner[0])} as element {number}"
+            for number, element in enumerate(value[:_SOME]):
+                if not fits(element, inner[0]):
+                    return f"{_found(element, inner[0])} as element {number}"
         return f"a {type(value).__name__}"
     if value is None or isinstance(value, (bool, Real, str)):
         return repr(value) if len(repr(value)) <= 80 else f"{repr(value)[:77]}..."

@@ -92,8 +92,8 @@ class _Reached:
             self._add_class(name, value, names)
         elif isinstance(value, tuple):
             self._lines.append(f"{name} {type(value).__qualname__} {len(value)}")
-            for place, one in enumerate(value):
-                self._add(f"{name}.{place}", one, names)
+            for index, item in enumerate(value):
+                self._add(f"{name}.{index}", item, names)
         elif isinstance(value, (BuiltinFunctionType, np.ufunc)) or _is_foreign(value):
             self._lines.append(f"{name} {getattr(value, '__module__', '')} {_called(value)}")
         elif isinstance(getattr(value, "py_func", None), FunctionType):
@@ -106,8 +106,8 @@ class _Reached:
             used = frozenset(names & vars(value).keys())
             if (id(value), used) not in self._seen:
                 self._seen.add((id(value), used))
-                for one in sorted(used):
-                    self._add(f"{value.__name__}.{one}", vars(value)[one], names)
+                for item in sorted(used):
+                    self._add(f"{value.__name__}.{item}", vars(value)[item], names)
         else:
             # numba's declaration of a system function is complete in itself
             symbol, declared = getattr(value, "symbol", None), getattr(value, "sig", None)
@@ -133,7 +133,7 @@ def _code(code: CodeType, docstring: str | None, names: set[str]) -> str:
     constants = list(code.co_consts)
     if docstring is not None and constants and constants[0] == docstring:
         constants[0] = None
-    described = [_constant(one, names) for one in constants]
+    described = [_constant(constant, names) for constant in constants]
     arguments = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
     steps = f"{code.co_code.hex()} {code.co_exceptiontable.hex()}"
     return f"{arguments} {code.co_varnames} {code.co_names} {described} {steps}"
@@ -143,7 +143,7 @@ def _constant(value: Any, names: set[str]) -> str:
     if isinstance(value, CodeType):
         return _code(value, None, names)
     if isinstance(value, tuple):
-        return "(" + ", ".join(_constant(one, names) for one in value) + ")"
+        return "(" + ", ".join(_constant(item, names) for item in value) + ")"
     if isinstance(value, frozenset):
         return f"set {sorted(map(repr, value))}"
     return f"{type(value).__name__} {value!r}"

@@ -144,7 +144,8 @@ class _KernelCache(_CACHING.FunctionCache):  # type: ignore[misc]
         reorder arithmetic (no ``fastmath``), so results are the same bytes.
         """
         system, _, features = target_context.codegen().magic_tuple()
-        if not _usual_settings() or not NEEDED <= {one[1:] for one in features.split(",") if one.startswith("+")}:
+        available = {feature[1:] for feature in features.split(",") if feature.startswith("+")}
+        if not _usual_settings() or not available >= NEEDED:
             return None
         folder = SHIPPED / Path(self._py_func.__code__.co_filename).resolve().parent.relative_to(PACKAGE)
         files = _CACHING.IndexDataCacheFile(
@@ -175,8 +176,8 @@ class _Place:
 
     def from_function(self, function: Any, file: str) -> Any:
         usual = [] if _FOLDER in os.environ else _CACHING.CacheImpl._locator_classes
-        found = (one.from_function(function, file) for one in usual)
-        locator = next((one for one in found if one is not None), None) or _temporary_place(function, file)
+        found = (locator.from_function(function, file) for locator in usual)
+        locator = next((locator for locator in found if locator is not None), None) or _temporary_place(function, file)
         # without line number and file time: a copied or checked-out tree keeps its compiled kernels
         locator.get_source_stamp = lambda: KernelStamp(function, self._options)
         locator.get_disambiguator = lambda: self._kind

@@ -12,8 +12,8 @@ _MUCH = 0.15
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return a question that suggests similar names; empty if there are none."""
     # the dashes of options would make any two similar
-    bare, plain = str(name).lstrip("-"), {one.lstrip("-"): one for one in known}
+    bare, plain = str(name).lstrip("-"), {word.lstrip("-"): word for word in known}
     close = difflib.get_close_matches(bare, [*plain], n=3)
-    likeness = [difflib.SequenceMatcher(None, one, bare).ratio() for one in close]
-    close = [one for one, ratio in zip(close, likeness, strict=True) if ratio > likeness[0] - _MUCH]
-    return "did you mean " + " or ".join(plain[one] for one in close) + "?" if close else ""
+    likeness = [difflib.SequenceMatcher(None, word, bare).ratio() for word in close]
+    close = [word for word, ratio in zip(close, likeness, strict=True) if ratio > likeness[0] - _MUCH]
+    return "did you mean " + " or ".join(plain[word] for word in close) + "?" if close else ""

@@ -10,7 +10,7 @@ def one_line(message: object) -> str:
 
 def printable(text: str) -> str:
     """Return text with control characters escaped; file names may contain any."""
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
 def spreadsheet_text(text: str) -> str:

@@ -82,7 +82,7 @@ def read_options(words: Sequence[str]) -> tuple[Given, dict[str, Any]]:
         if given[name] is not None:
             check_extra(package, extra)
     if given["summary"] is not None:
-        others = [one.name for one in (*_OF_FILE, COMMON["config"]) if given.of_line(one.name)]
+        others = [option.name for option in (*_OF_FILE, COMMON["config"]) if given.of_line(option.name)]
         if others:
             raise InvalidInputError(
                 "--summary: runs nothing and can be combined only with --all, --plot, --csv and --report, "

@@ -171,7 +171,7 @@ def track_parser() -> Parser:
     parser.declare(*TRACKING, group="options of trackers")
     parser.declare(*OF_SCENES, group="options for scenes")
     parser.declare(*OF_PLOTS, group="options for plots")
-    parser.elsewhere = lambda: {flag_of(one.name): "assoc live" for one in LIVE[1:]}
+    parser.elsewhere = lambda: {flag_of(option.name): "assoc live" for option in LIVE[1:]}
     return parser
 
 
@@ -188,7 +188,7 @@ def live_parser() -> Parser:
     )
     parser.declare(*LIVE, *_COMMON)
     parser.declare(*TRACKING, group="options of trackers")
-    parser.elsewhere = lambda: {flag_of(one.name): "assoc track" for one in (*TRACK[1:], *OF_SCENES, *OF_PLOTS)}
+    parser.elsewhere = lambda: {flag_of(option.name): "assoc track" for option in (*TRACK[1:], *OF_SCENES, *OF_PLOTS)}
     return parser
 
 
@@ -218,7 +218,7 @@ def read_options(words: list[str], parser: Parser) -> tuple[Given, dict[str, Any
     elsewhere = parser.elsewhere
     parser.elsewhere = lambda: {**flags_of_solvers(solver), **elsewhere()}
     given = parser.read(words)
-    values = {name: given.some(one.name for one in options) for name, options in further.items()}
+    values = {name: given.some(option.name for option in options) for name, options in further.items()}
     life_cycle = LifeCycle(**values["life_cycle"])
     given.check_use(further["life_cycle"], confirmation=life_cycle.confirmation, deletion=life_cycle.deletion)
     given.check_use(further["identity"], identity=given["identity"] or "score-only")
@@ -241,9 +241,11 @@ def add_further(parser: Parser, solver: str) -> dict[str, list[Option]]:
 
     further = {
         "solver": parameter_options(registry.parameters(solver)),
-        "life_cycle": [replace(one, only=_LIFE_CYCLE.get(one.name, {})) for one in parameter_options(LifeCycle)],
+        "life_cycle": [
+            replace(option, only=_LIFE_CYCLE.get(option.name, {})) for option in parameter_options(LifeCycle)
+        ],
         "initiation": [Option("speed", "X", "usual speed along an axis", kinds.number), *parameter_options(Initiation)],
-        "identity": [replace(one, only={"identity": ("use",)}) for one in parameter_options(IdentityParameters)],
+        "identity": [replace(option, only={"identity": ("use",)}) for option in parameter_options(IdentityParameters)],
     }
     for options in further.values():
         parser.declare(*options)
@@ -276,5 +278,5 @@ def make_tracker(
 
     parsed.check_use(_OF_TRACKERS, tracker=name)
     made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace)
-    own = parsed.some(one.name for one in _OF_TRACKERS)
+    own = parsed.some(option.name for option in _OF_TRACKERS)
     return KINDS[name](sensors, made, region=region, **settings, **own)

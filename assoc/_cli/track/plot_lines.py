@@ -73,9 +73,9 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
         if values is None:
             sensor = _sensor(name, scene)
             # of an unknown sensor only the name is read: the tracker reports it
-            values = [found[one] for one in sensor.components[: sensor.dim]] if sensor is not None else []
+            values = [found[part] for part in sensor.components[: sensor.dim]] if sensor is not None else []
         identity = _identity(found.get("mode3"), found.get("address"))
-        return Plot(name, time, [float(one) for one in values], identity)
+        return Plot(name, time, [float(value) for value in values], identity)
     except (ValueError, TypeError, LookupError, RecursionError, AttributeError, OverflowError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)
         expected = "expected sensor, time and values, as CSV or a JSON object"
@@ -84,7 +84,7 @@ def parse_line(line: str, scene: Scene) -> Plot | None:
 
 def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
     """Sensor, time, values, and identity."""
-    name, time, *rest = (one.strip() for one in text.split(","))
+    name, time, *rest = (part.strip() for part in text.split(","))
     sensor = _sensor(name, scene)
     # the number of values of an unknown sensor is unknown: the tracker reports the sensor
     dim = len(rest) if sensor is None else sensor.dim
@@ -96,7 +96,7 @@ def _from_csv(text: str, scene: Scene) -> dict[str, Any]:
 
 def _sensor(name: str, scene: Scene) -> Sensor | None:
     """The sensor of this name or number; None if unknown."""
-    return next((one for k, one in enumerate(scene.sensors, 1) if name in (one.name, str(k))), None)
+    return next((sensor for k, sensor in enumerate(scene.sensors, 1) if name in (sensor.name, str(k))), None)
 
 
 def _identity(mode3: object = None, address: object = None) -> tuple[int, int]:
@@ -228,7 +228,7 @@ def replayed(scene: Scene, speed: float) -> Iterator[Plot]:
         for s, (z, times) in enumerate(zip(scan.measurements, scan.own_times(), strict=True)):
             rows = zip(times.tolist(), z.tolist(), strict=True)
             plots += [Plot(str(s + 1), when, values) for when, values in rows]
-    plots.sort(key=lambda one: one.time)
+    plots.sort(key=lambda plot: plot.time)
     begin, first = time.monotonic(), plots[0].time if plots else 0.0
     for plot in plots:
         ahead = begin + (plot.time - first) / speed - time.monotonic() if speed > 0 else 0.0
@@ -265,5 +265,5 @@ class TrackWriter:
             sigma[axis] = math.sqrt(max(float(track.covariance[k, k]), 0.0))
         numbers = [when, *track.position.tolist(), *track.velocity.tolist()]
         rest = [track.score, track.hits, track.started, track.last_detection, *sigma]
-        row = [track.track_id, *(f"{one:.10g}" for one in numbers), event, *(f"{one:.10g}" for one in rest)]
+        row = [track.track_id, *(f"{number:.10g}" for number in numbers), event, *(f"{number:.10g}" for number in rest)]
         self._stream.write(",".join(map(str, row)) + "\n")

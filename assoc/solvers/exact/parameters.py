@@ -22,7 +22,7 @@ class ExactParameters(Parameters):
         alone for a hundred turns.
     """
 
-    nodes: int = field(default=100_000_000, metadata={"help": "nodes of branch and bound at the most"})
+    nodes: int = field(default=100_000_000, metadata={"help": "largest number of nodes of branch and bound"})
     patience: int = field(
         default=1, metadata={"help": "iterations of tabu search without improvement before branching starts"}
     )

@@ -24,7 +24,7 @@ class GeneticParameters(SearchParameters):
 
     population: int = field(default=20, metadata={"help": "solutions that live at a time"})
     offspring: int = field(default=5, metadata={"help": "children in a generation"})
-    tournament: int = field(default=2, metadata={"help": "a parent is the best of so many"})
+    tournament: int = field(default=2, metadata={"help": "size of the tournaments whose winners are parents"})
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -136,12 +136,12 @@ class DaskWorkers:
             raise InvalidInputError(_LOST)
 
     def _wait_for_workers(self) -> None:
-        told = False
+        announced = False
         while not self._client.nthreads():
             self._check_scheduler()
-            if not told:
+            if not announced:
                 print("assoc.sweep: the scheduler has no workers yet; waiting for one", file=sys.stderr)
-                told = True
+                announced = True
             time.sleep(0.2)
 
 
