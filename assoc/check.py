@@ -14,7 +14,8 @@ cost no less than their measurements alone. Rows that share no tuple, directly o
 separately. In a tree, a node branches on whether rows a and b are in one tuple: in one child only tuples with both or
 neither remain, in the other those without both; its bound is the least of its leaves'. A cut is an odd number n of
 rows: chosen tuples contain at most (n - 1) / 2 pairs of them (half the sum of the rows, rounded down); it is a further
-row with a multiplier of at most 0. Costs are multiples of a unit, and so are a solution's: bounds are rounded up to the next multiple.
+row with a multiplier of at most 0. Costs are multiples of a unit, and so is the cost of a solution: bounds are rounded
+up to the next multiple.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def _register(words: list[str]) -> None:
     output = given["output"]
     if given["report"] == "":
         if output == STDOUT or is_stream(output):
-            raise InvalidInputError(f"--report: expected a name, for there is none in --output {output}")
+            raise InvalidInputError(f"--report: expected a file name, because --output {output} has none")
         given["report"] = f"{output.removesuffix('.npz')}.html"
     given.check_outputs([given["file"]])
     with messages(given):

@@ -54,7 +54,7 @@ def import_modules(names: str | None) -> None:
             import_module(name)
         except ModuleNotFoundError as error:
             if error.name is not None and (name == error.name or name.startswith(error.name + ".")):
-                raise InvalidInputError(f"--import: no module {name!r} is here or among what is installed") from None
+                raise InvalidInputError(f"--import: no module {name!r} in the current folder or installed") from None
             raise InvalidInputError(f"--import: {name} cannot be imported ({error})") from None
         except Exception as error:  # a user's module may raise anything
             raise InvalidInputError(f"--import: {name} cannot be imported ({type(error).__name__}: {error})") from None

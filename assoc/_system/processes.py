@@ -36,8 +36,8 @@ def require_processes(jobs: int) -> None:
 def not_sent(reason: object) -> InvalidInputError:
     """Return the error for a task that cannot be sent to other processes, with the reason."""
     return InvalidInputError(
-        "jobs: other processes take only what is at the top level of a module that they can import; define your own "
-        f"solver or function there ({reason})"
+        "jobs: other processes can only use functions and classes at the top level of a module that they can import; "
+        f"define your solver or function there ({reason})"
     )
 
 

@@ -26,5 +26,5 @@ def cost_warnings(problem: AssignmentProblem) -> tuple[str, ...]:
         return ()
     return (
         f"none of the {np.count_nonzero(several)} tuples costs less than its measurements as false alarms, so that "
-        "no target can be found: expected negative log likelihood ratios, below 0 for what is likely one target",
+        "no target can be found: expected negative log likelihood ratios, below 0 for likely targets",
     )

@@ -48,7 +48,7 @@ def test_options(biased, tmp_path, capsys):
         (["--range-spread", "wide"], "--range-spread: expected a number, got 'wide'"),
         (["--range-spread", "-1"], "range_spread: expected a number above 0"),
         (["--max-tuples", "0"], "--max-tuples: expected a whole number >= 1"),
-        (["-o", "-", "--report"], "--report: expected a name, for there is none in --output -"),
+        (["-o", "-", "--report"], "--report: expected a file name, because --output - has none"),
     ],
 )
 def test_bad_options(biased, tmp_path, capsys, words, said):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,9 @@ def _prefix(cols: NDArray[np.int32], j: int, stop: int, of_row: NDArray[np.int64
 
 
 @inner_njit
-def _keep_cheapest(indptr: Any, indices: Any, column: Any, costs: Floats, num_right: int) -> None:
+def _keep_cheapest(
+    indptr: NDArray[np.int64], indices: NDArray[np.int64], column: NDArray[np.int64], costs: Floats, num_right: int
+) -> None:
     """Keep only the cheapest edge between two nodes: dense problems have one for each row of a sensor."""
     place = np.full(num_right, -1, np.int64)
     end = first = 0
@@ -164,7 +166,14 @@ def _recover(arranged: Arranged, duals: Floats, owner: NDArray[np.int32]) -> boo
 
 
 @inner_njit
-def _grow(arranged: Arranged, partial: _Partial, partner: Any, column: Any, right: Any, level: int) -> int:
+def _grow(
+    arranged: Arranged,
+    partial: _Partial,
+    partner: NDArray[np.int64],
+    column: NDArray[np.int64],
+    right: NDArray[np.int64],
+    level: int,
+) -> int:
     """Join partial tuples to their partners of the next sensor; returns the number of partial tuples.
 
     A partial tuple without partner that is no column itself (``column`` is -1) is broken up into its rows.
