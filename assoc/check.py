@@ -244,10 +244,10 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
         if bound is None:
             return target
     trees: dict[tuple[Row, ...], dict[str, object]] = {}
-    for tree in _listed(proof.get("trees")):
-        if not isinstance(tree, dict):
+    for given in _listed(proof.get("trees")):
+        if not isinstance(given, dict):
             raise ValueError("a tree must have rows and nodes")
-        trees[tuple(map(_as_row, _listed(tree.get("rows"))))] = tree
+        trees[tuple(map(_as_row, _listed(given.get("rows"))))] = given
     total = 0
     for rows, inside in components(problem.rows, columns):
         tree, part = trees.pop(tuple(sorted(rows)), None), sum(u[row] for row in rows)

@@ -40,7 +40,7 @@ def arrange(packing: Packing) -> Arranged:
 
 
 @njit
-def _arrange(cols: NDArray[np.int32], slack: NDArray[np.bool_]) -> Any:
+def _arrange(cols: Any, slack: NDArray[np.bool_]) -> Any:
     """Return the columns with sensors in order of relaxation, the sensor of each row, and the columns by pair.
 
     The columns of each group share their rows of the first two sensors; groups come in order of the first row.

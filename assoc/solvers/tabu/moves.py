@@ -7,7 +7,7 @@ leads to a solution better than the best (aspiration). Rows that a move leaves o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +126,7 @@ def _moves(
     best: NDArray[np.int32],
     until: NDArray[np.int64],
     rules: _Rules,
-    rng: np.random.Generator,
+    rng: Any,
     deadline: float,
 ) -> int:
     """Do moves: ``owner`` becomes the last solution, ``best`` the best one; returns the number of moves done so far.
