@@ -89,11 +89,15 @@ class Problem:
         self.needed = {row for row in self.rows if dummies or sizes[row[0]] == min(sizes)}
         self.unit = math.gcd(*costs.values()) or 1
         every = [(cost, tuple((s, i) for s, i in enumerate(key) if i)) for key, cost in costs.items()]
-        alone = {own[0]: cost for cost, own in every if len(own) == 1}
+        alone = {members[0]: cost for cost, members in every if len(members) == 1}
         if dummies and len(alone) < len(self.rows):
             raise ValueError("with dummies, each measurement must be listed as a tuple of its own")
         # tuples that can be part of an optimum
-        self.columns = [(c, own) for c, own in every if len(own) == 1 or not dummies or c < sum(alone[r] for r in own)]
+        self.columns = [
+            (c, members)
+            for c, members in every
+            if len(members) == 1 or not dummies or c < sum(alone[r] for r in members)
+        ]
 
 
 def read_text(path: str) -> str:
@@ -148,9 +152,9 @@ def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = Non
 def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row], list[Column]]]:
     """Return rows that are connected, with their tuples."""
     group = {row: [row] for row in every}
-    for _, own in columns:
-        for row in own[1:]:
-            small, large = sorted((group[own[0]], group[row]), key=len)
+    for _, members in columns:
+        for row in members[1:]:
+            small, large = sorted((group[members[0]], group[row]), key=len)
             if small is not large:
                 large += small
                 group.update(dict.fromkeys(small, large))
@@ -162,18 +166,18 @@ def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row],
 
 def bounded(columns: list[Column], needed: set[Row], u: dict[Row, int], sides: dict[Row, int]) -> int | None:
     """Return the bound of multipliers, after lowering them; None where a needed row has no tuple."""
-    if not needed <= {row for _, own in columns for row in own}:
+    if not needed <= {row for _, members in columns for row in members}:
         return None
     for row in u.keys() - needed:
         u[row] = min(u[row], 0)  # a row that may stay uncovered must not raise the bound
-    for cost, own in columns:
-        u[own[0]] += min(cost - sum(u[row] for row in own), 0)
+    for cost, members in columns:
+        u[members[0]] += min(cost - sum(u[row] for row in members), 0)
     return sum(value * sides.get(row, 1) for row, value in u.items())
 
 
 def cheap(columns: list[Column], u: dict[Row, int], most: int) -> list[Column]:
     """Return the tuples that cost at most ``most`` above their multipliers."""
-    return [one for one in columns if one[0] - sum(u[row] for row in one[1]) <= most]
+    return [column for column in columns if column[0] - sum(u[row] for row in column[1]) <= most]
 
 
 def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list[Column], dict[Row, int]]:
@@ -187,10 +191,10 @@ def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list
         for row in inside:
             cuts_of[row].append((-1, index))
     longer = []
-    for cost, own in columns:
-        hits = [cut for row in own for cut in cuts_of[row]]
+    for cost, members in columns:
+        hits = [cut for row in members for cut in cuts_of[row]]
         pairs = [cut for cut, count in Counter(hits).items() for _ in range(count // 2)]
-        longer.append((cost, (*own, *pairs)))
+        longer.append((cost, (*members, *pairs)))
     return longer, sides
 
 
@@ -223,8 +227,8 @@ def tree_bound(tree: dict[str, object], columns: list[Column], rows: list[Row], 
         if a == b or not {a, b} <= inside or not new:
             raise ValueError(f"node {at} of a tree must name two rows of it, and two children of its own after it")
         seen.update(children)
-        states[children[0]] = [one for one in columns if (a in one[1]) == (b in one[1])], needed | {a, b}
-        states[children[1]] = [one for one in columns if not (a in one[1] and b in one[1])], needed
+        states[children[0]] = [column for column in columns if (a in column[1]) == (b in column[1])], needed | {a, b}
+        states[children[1]] = [column for column in columns if not (a in column[1] and b in column[1])], needed
         todo += children
     return least
 
@@ -236,7 +240,7 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
     columns, bound, u = problem.columns, None, dict.fromkeys(problem.rows, 0)
     for stage in _listed(proof.get("multipliers")) or [None]:
         by_sensor = zip(_listed(stage, len(problem.sizes)), problem.sizes, strict=True)
-        values = [number(value) for own, size in by_sensor for value in _listed(own, size)]
+        values = [number(value) for of_sensor, size in by_sensor for value in _listed(of_sensor, size)]
         if bound is not None:  # no solution below the target has the tuples that the stage before left out
             columns = cheap(columns, u, target - bound)
         u = dict(zip(problem.rows, values, strict=True))
@@ -273,7 +277,7 @@ def check(problem: Problem, text: str) -> list[str]:
     proof = json.loads(text, parse_float=str, parse_int=str)
     if proof.get("format") != "assoc-proof" or proof.get("version") != "1":
         raise ValueError("expected the format 'assoc-proof', version 1")
-    chosen = [tuple(map(_whole, _listed(one))) for one in _listed(proof.get("tuples"))]
+    chosen = [tuple(map(_whole, _listed(words))) for words in _listed(proof.get("tuples"))]
     cost = cost_of(problem, chosen, proof.get("cost"))
     bound = proved(problem, proof, cost)
     if "bound" in proof and bound < number(proof["bound"]):

@@ -298,8 +298,8 @@ def _print_rates(plots: PlotTracks, identity: str | None) -> None:
     if plots.kept is not None:
         kept, judged = plots.kept
         # identities that made the tracks are no evidence of their quality
-        own = " (identities were used to make them)" if identity == "use" and plots.recording.sources is None else ""
-        print_lines(f"{kept} of {judged} tracks with an identity kept one{own}")
+        note = " (identities were used to make them)" if identity == "use" and plots.recording.sources is None else ""
+        print_lines(f"{kept} of {judged} tracks with an identity kept one{note}")
     if plots.rates is None:
         return
     rates, known = plots.rates, "aircraft" if plots.recording.sources is not None else "Mode 3"

@@ -37,13 +37,13 @@ def script(shell: str, programs: Parsers) -> str:
 
 def _add(parser: argparse.ArgumentParser, parsers: Parsers) -> None:
     subparsers = parser.add_subparsers()
-    for name, one in parsers.items():
+    for name, entry in parsers.items():
         # shtab leaves out options without help
-        if isinstance(one, Mapping):
-            _add(subparsers.add_parser(name, help=name), one)
+        if isinstance(entry, Mapping):
+            _add(subparsers.add_parser(name, help=name), entry)
             continue
-        declared = one.declared if isinstance(one, Parser) else {}
-        for action in one._actions:
+        declared = entry.declared if isinstance(entry, Parser) else {}
+        for action in entry._actions:
             kind = declared[action.dest].kind if action.dest in declared else None
             if isinstance(kind, OneOf):
                 action.choices = kind.names
@@ -51,4 +51,4 @@ def _add(parser: argparse.ArgumentParser, parsers: Parsers) -> None:
                 action.choices = registry.names()
             elif action.metavar in _FILES:
                 action.complete = shtab.FILE  # type: ignore[attr-defined]
-        subparsers.add_parser(name, help=name, parents=[one], add_help=False)
+        subparsers.add_parser(name, help=name, parents=[entry], add_help=False)

@@ -38,7 +38,7 @@ def write_problem_text(
     """
     lines = [FIRST_LINE, "sizes " + " ".join(map(str, sizes.tolist())), f"dummies {'yes' if dummy else 'no'}"]
     lines.append(f"tuples {len(costs)}")
-    lines += [f"{cost!r} {' '.join(map(str, one))}" for cost, one in zip(costs.tolist(), tuples.tolist(), strict=True)]
+    lines += [f"{cost!r} {' '.join(map(str, row))}" for cost, row in zip(costs.tolist(), tuples.tolist(), strict=True)]
     content = ("\n".join(lines) + "\n").encode()
     if os.fspath(path).endswith(".xz"):
         content = lzma.compress(content, preset=9)

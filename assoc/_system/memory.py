@@ -34,7 +34,7 @@ def require(needed: float, what: str, advice: str, *, own: bool = True) -> None:
     advice : str
         What to change.
     own : bool
-        Whether this process takes the memory, so that the limit of its address space counts.
+        Whether this process takes the memory, so that the limit of its address space applies.
 
     Raises
     ------

@@ -278,5 +278,5 @@ def make_tracker(
 
     parsed.check_use(_OF_TRACKERS, tracker=name)
     made = make_filter(parsed["filter"], sensors, parsed["process_noise"], settings.get("seed", 0), pace)
-    own = parsed.some(option.name for option in _OF_TRACKERS)
-    return KINDS[name](sensors, made, region=region, **settings, **own)
+    of_tracker = parsed.some(option.name for option in _OF_TRACKERS)
+    return KINDS[name](sensors, made, region=region, **settings, **of_tracker)
