@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,7 +24,7 @@ from assoc.packing.run import Callback, Outcome, Run, SolveFunction
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 from assoc.solvers import registry
-from assoc.solvers.certificate import certify, cost_of
+from assoc.solvers.certificate import certify, costs_of
 from assoc.solvers.greedy.fallback import better_of, prepare_fallback
 from assoc.solvers.plausibility import cost_warnings
 from assoc.solvers.start import start_columns
@@ -185,7 +186,9 @@ def _cheaper(
     problem: AssignmentProblem, prepared: Prepared, outcome: Outcome, other: NDArray[np.integer], run: Run
 ) -> Outcome:
     """Take the other choice if it costs less than the solver's: by costs, as sums of weights lose the last digits."""
-    if cost_of(problem, prepared, other) >= cost_of(problem, prepared, outcome.columns):
+    found, its = costs_of(problem, prepared, outcome.columns), costs_of(problem, prepared, other)
+    # a sum that is rounded only once has the sign of the exact one
+    if found is None or its is None or math.fsum([*its, *-found]) >= 0.0:
         return outcome
     weight = float(prepared.packing.weights[other].sum())
     run.record(outcome.iterations, weight, min(outcome.lower_bound, weight))

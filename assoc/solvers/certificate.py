@@ -72,11 +72,11 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
-def cost_of(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.integer]) -> float:
-    """Cost of a choice of columns, rounded only once; -inf for a choice that `certify` refuses."""
+def costs_of(problem: AssignmentProblem, prepared: Prepared, columns: NDArray[np.integer]) -> Floats | None:
+    """Costs of the tuples of a choice of columns; None for a choice that `certify` refuses."""
     chosen = np.asarray(columns, dtype=np.int64)
     exact, _, _, costs, _ = as_tuples(problem.tuples, problem.costs, problem.sizes, prepared.arrays, chosen)
-    return math.fsum(costs) if exact else -math.inf
+    return costs if exact else None
 
 
 @njit

@@ -156,3 +156,20 @@ def test_costs_are_compared_to_the_last_digit(solver, seed):
     start = assoc.assign(given, advise=False)
     parameters = {} if solver == "greedy" else {"iterations": 2}
     assert assoc.assign(given, solver, start=start, advise=False, **parameters).cost <= start.cost
+
+
+def test_costs_that_differ_by_less_than_a_rounding_are_told_apart():
+    """Both sums are -1 as floats."""
+    costs = [-1.0, -(2.0**-54), -1.0, -(2.0**-55)]
+    problem = assoc.AssignmentProblem([[1, 1], [2, 2], [1, 2], [2, 1]], costs, [2, 2])
+    best = replace(assoc.assign(problem), tuples=np.array([[1, 1], [2, 2]]))
+
+    def dearer(packing, parameters, run):
+        return Outcome(np.flatnonzero(packing.origin >= 2), 1)
+
+    registry.register("dearer", registry.parameters("greedy"), dearer)
+    try:
+        assert assoc.assign(problem, "dearer").tuples.tolist() == [[1, 2], [2, 1]]
+        assert assoc.assign(problem, "dearer", start=best).tuples.tolist() == [[1, 1], [2, 2]]
+    finally:
+        registry._REGISTERED.pop("dearer")
