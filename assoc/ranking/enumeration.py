@@ -1,14 +1,13 @@
-"""All solutions of a small packing below a limit, the k lightest kept: depth first over rows.
+"""Depth-first enumeration of the k lightest solutions of a small packing below a limit.
 
 With feasible multipliers u (packing/bounds) a solution x weighs
 
     w(x) = sum(u) + sum of the reduced costs of its columns + sum of -u_r over its uncovered rows with slack,
 
-all terms but the first >= 0. (Rows of cuts and counts have such terms, too. For the solutions of a node that weigh less
-than the limit they are >= 0, and are left out; other solutions may be passed over, as they belong to other nodes.) The
-search decides row by row (always the row with the fewest choices left)
-and gives up where the terms so far exceed what the limit allows. The limit falls to the weight of the k-th
-lightest solution known, so that only ties and better ones are looked for.
+all terms but the first >= 0. (Rows of cuts and counts have such terms, too. For the solutions of a node below the limit
+they are >= 0, and are left out; other solutions may be missed, as they belong to other nodes.) The search decides row
+by row, always the row with the fewest choices left, and backtracks where the terms so far exceed the limit. The limit
+falls to the weight of the k-th lightest solution known, so that only ties and better ones are searched for.
 """
 
 from __future__ import annotations
@@ -27,16 +26,16 @@ from assoc.packing.kernels.sorting import order_of
 
 NOT_COMPLETE = -1
 _ALONE = -1
-# columns of a row that insertion would take too long to sort; decisions between two looks at the clock
+# columns of a row above which insertion sort is too slow; decisions between two checks of the clock
 _LONG = 40
 _LOOK = 8
 
 
 class Wanted(NamedTuple):
-    """Which solutions are looked for, and how long.
+    """Which solutions to search for, and for how long.
 
     The ``k`` lightest that weigh less than ``limit``; weights that differ by ``tolerance`` are ties. ``budget`` is the
-    number of decisions at the most, ``deadline`` when time is over (clock.py).
+    largest number of decisions, ``deadline`` the time limit (clock.py).
     """
 
     k: int
@@ -47,24 +46,24 @@ class Wanted(NamedTuple):
 
 
 class PricedColumns(NamedTuple):
-    """Columns over rows with feasible multipliers, as the enumeration takes them.
+    """Columns over rows with feasible multipliers, the input of the enumeration.
 
     Attributes
     ----------
     cols : int32 array, shape (N, S)
         Rows of each column.
     names : int32 array, shape (N,)
-        What the store calls the columns.
+        Numbers of the columns in the store.
     weights : float array
-        Weights of the columns, by these names.
+        Weights of the columns, indexed by these numbers.
     reduced : float array, shape (N,)
-        Reduced costs (what rounding left below 0 counts as 0).
+        Reduced costs (negative ones, due to rounding, count as 0).
     slack, duals : arrays
         Whether a row may stay uncovered, and the multipliers; rows of cuts and counts come last, and are not used.
     row_ptr, row_cols : int arrays
-        Columns of each row; each row's part of ``row_cols`` is put in order of reduced cost.
+        Columns of each row; the enumeration sorts them by reduced cost.
     blocked : int32 array, shape (N,)
-        Room for work: how many of a column's rows are decided.
+        Buffer: how many of a column's rows are decided.
     """
 
     cols: NDArray[np.int32]
@@ -79,7 +78,7 @@ class PricedColumns(NamedTuple):
 
 
 class Store(NamedTuple):
-    """Solutions kept: a heap of (-weight, slot), for each slot its mark and its columns (-1 ends them); how many."""
+    """Solutions kept: a heap of (-weight, slot), the hash and the columns of each slot (-1 ends them), the count."""
 
     key: NDArray[np.float64]
     slot: NDArray[np.int64]
@@ -89,7 +88,7 @@ class Store(NamedTuple):
 
 
 def new_store(num_rows: int) -> Store:
-    """Room for solutions of so many rows, made where no Ctrl-C can spoil a kernel's result."""
+    """Allocate a store for solutions of ``num_rows`` rows; in Python, so that Ctrl-C cannot spoil a kernel's result."""
     capacity = 4
     return Store(
         np.empty(capacity),
@@ -105,7 +104,7 @@ new_store_inside = inner_njit(new_store)
 
 @njit
 def cut_of(store: Store, wanted: Wanted) -> float:
-    """Only solutions that weigh less than this are still of interest."""
+    """The weight below which solutions are still wanted."""
     if store.num[0] >= wanted.k:
         return min(wanted.limit, -store.key[0] - wanted.tolerance)
     return wanted.limit
@@ -113,7 +112,7 @@ def cut_of(store: Store, wanted: Wanted) -> float:
 
 @inner_njit
 def _mark(column: int) -> np.uint64:
-    """Well mixed bits for a column number (splitmix64), so that their xor identifies a set."""
+    """Hash of a column number (splitmix64); the xor of hashes identifies a set."""
     z = np.uint64(column + 1) * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -122,7 +121,7 @@ def _mark(column: int) -> np.uint64:
 
 @inner_njit
 def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: bool) -> Store:
-    """Add a solution, in the place of the heaviest if there are k; with ``check`` only if it is new."""
+    """Add a solution; if there are k, it replaces the heaviest. With ``check`` only if it is new."""
     mark = np.uint64(0)
     for t in range(count):
         mark ^= _mark(columns[t])
@@ -161,22 +160,22 @@ def _keep(store: Store, k: int, weight: float, columns: Any, count: int, check: 
 def enumerate_solutions(
     priced: PricedColumns, top: int, end: int, base: float, wanted: Wanted, check: bool, store: Store
 ) -> Any:
-    """Search rows ``top:end`` for solutions that are wanted.
+    """Search rows ``top:end`` for the wanted solutions.
 
     Parameters
     ----------
     priced : PricedColumns
         The columns; ``row_cols`` and ``blocked`` are changed.
     top, end : int
-        The rows to cover; no column of theirs uses others.
+        The rows to cover; their columns use no other rows.
     base : float
-        What is wanted weighs at least this and what its columns and uncovered rows cost by the multipliers.
+        A solution weighs at least this plus the reduced costs of its columns and uncovered rows.
     wanted : Wanted
-        How many, how light, and how long to search.
+        Number and limit of the solutions, budget and deadline.
     check : bool
-        Whether solutions may have been found before.
+        Whether the store may already have some of the solutions.
     store : Store
-        What is found is added.
+        Solutions found are added.
 
     Returns
     -------
@@ -201,7 +200,7 @@ def enumerate_solutions(
                 y -= 1
             row_cols[y] = a
     done = np.zeros(num_rows, np.bool_)
-    # how many of a column's rows are decided: it can be taken while there are none
+    # how many of a column's rows are decided: it can be taken while this is 0
     for x in range(row_ptr[top], row_ptr[end]):
         blocked[row_cols[x]] = 0
     row_at = np.empty(num_rows, np.int64)
@@ -268,7 +267,7 @@ def enumerate_solutions(
 
 @inner_njit
 def _sort_row(reduced: Floats, own: Any) -> None:
-    """Put columns in order of reduced cost, in place; ties stay in their order."""
+    """Sort columns by reduced cost, in place; stable."""
     ordered = True
     for x in range(1, own.size):
         if reduced[own[x - 1]] > reduced[own[x]]:
@@ -280,7 +279,7 @@ def _sort_row(reduced: Floats, own: Any) -> None:
 
 @inner_njit
 def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float) -> Any:
-    """Return the row with the fewest choices left (-1: all are decided), and how many these are."""
+    """Return the row with the fewest choices left (-1: all are decided), and their number."""
     _, _, _, reduced, slack, duals, row_ptr, row_cols, blocked = priced
     row, least = -1, 1 << 60
     for r in range(top, end):
@@ -302,7 +301,7 @@ def _next_row(priced: PricedColumns, top: int, end: int, done: Any, room: float)
 
 @inner_njit
 def _decide(priced: PricedColumns, top: int, row: int, taken: int, done: Any, do: bool) -> int:
-    """Take a column, or leave a row alone, or take that back; the number of columns this concerns."""
+    """Take a column or leave a row uncovered, or undo that; the number of columns changed."""
     cols, row_ptr, row_cols, blocked = priced.cols, priced.row_ptr, priced.row_cols, priced.blocked
     step = 1 if do else -1
     if taken == _ALONE:

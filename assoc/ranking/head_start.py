@@ -1,8 +1,8 @@
 """A good solution before the ranking begins: where enumeration is not enough.
 
-A ranking meets its first solution late, when the excess that it allows has grown to that of the optimum. The exact
-solver is there in a fraction of that time. What it finds is returned when nothing better is proved, and its excess is
-where the ranking goes on: all that is less is contained in it.
+A ranking finds its first solution late, when the allowed excess has grown to that of the optimum. The exact solver
+finds one in a fraction of that time. It is returned when nothing better is proved, and the ranking continues with its
+excess.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from assoc.packing.run import Run
 from assoc.solvers.exact.search import search_to_the_end
 from assoc.solvers.greedy.fallback import better_of
 
-# share of the time that is left, where it is limited
+# share of the remaining time, where it is limited
 _SHARE = 0.3
 # nodes and patience of the exact solver
 _NODES, _PATIENCE = 100_000_000, 10
 
 
 class HeadStart:
-    """What the exact solver knows of a packing, after a share of a run's time at the most.
+    """The exact solver's solution and bound of a packing, found in a share of a run's time.
 
     Attributes
     ----------
     weight : float
-        Weight of the best solution known; it is kept as the run's fallback.
+        Weight of the best known solution; the solution is kept as the run's fallback.
     bound : float
-        No solution weighs less.
+        Lower bound on all solutions' weights.
     taken : bool
-        Whether that has been done.
+        Whether `take` was called.
     """
 
     def __init__(self, packing: Packing, run: Run) -> None:
@@ -42,7 +42,7 @@ class HeadStart:
         self.taken = False
 
     def take(self) -> None:
-        """Solve the packing, or spend a share of the time that is left; once."""
+        """Solve the packing within a share of the remaining time; only the first call does."""
         self.taken = True
         run, packing = self._run, self._packing
         if run.should_stop() or packing.num_columns == 0:
@@ -53,7 +53,7 @@ class HeadStart:
         try:
             outcome = search_to_the_end(packing, _NODES, _PATIENCE, ahead)
         except InfeasibleError:
-            # none found in the share; whether there is none the ranking finds out
+            # no solution found in this time; the ranking decides whether there is one
             return
         run.fallback = better_of(packing, outcome.columns, ahead)
         self.weight = float(packing.weights[run.fallback].sum())

@@ -27,7 +27,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
     total : float array, shape (m,), m <= k
         Their weights, ascending.
     choice : int32 array, shape (m, C)
-        For each component, which of its list.
+        Index into each component's list.
     """
     num_lists = start.size - 1
     total = np.zeros(1)
@@ -35,7 +35,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
     for c in range(num_lists):
         if start[c + 1] - start[c] > 1:
             steps += 1
-    # one level for each list with a choice: which combination of the lists before, which of this one
+    # one level for each list of two or more: the combination of the lists before, and the index in this one
     before = np.empty((steps, 1), np.int32)
     which = np.empty((steps, 1), np.int32)
     level = 0
@@ -54,7 +54,7 @@ def merge(start: Any, weights: Floats, k: int) -> Any:
         item = np.empty(total.size, np.int64)
         place = np.zeros(total.size, np.int64)
         size = 0
-        # combination t of the lists before enters when t - 1 has been used with this list's first
+        # combination t of the lists before enters once t - 1 has been used with this list's first solution
         push(heap, item, size, total[0] + weights[first], 0)
         size += 1
         for n in range(room):

@@ -13,10 +13,10 @@ ALONE = -1
 
 
 class Graph(NamedTuple):
-    """Edges between rows and columns, and those of them that are still looked at, by row and by column.
+    """Edges between rows and columns, and the edges still in use, listed by row and by column.
 
     Edge e joins ``rows[e]`` and ``columns[e]`` at ``costs[e]``; ``row_alone`` and ``column_alone`` say which may stay
-    alone (at no cost). Row r has the edges ``row_edges[row_ptr[r]:row_ptr[r + 1]]``, and columns likewise.
+    unmatched (at no cost). Row r has the edges ``row_edges[row_ptr[r]:row_ptr[r + 1]]``, and columns likewise.
     """
 
     costs: NDArray[np.float64]
@@ -34,8 +34,8 @@ class Nodes(NamedTuple):
     """Solutions found, one a row of each array.
 
     The edge of each row, the row of each column, the multipliers u and v (the dummy's is the last of v), the order in
-    which rows are split by, how many of them are fixed, the link to the edge that the node's own row may not use
-    (parent, 2 + edge; 1: staying alone), and what the solution costs.
+    which rows are branched on, how many of them are fixed, the edge that the first free row must not use, as a list
+    through the parents (parent, 2 + edge; 1: staying unmatched), and the cost of the solution.
     """
 
     edge_of: NDArray[np.int32]
@@ -51,8 +51,8 @@ class Nodes(NamedTuple):
 class Queues(NamedTuple):
     """Open children by cost or bound, and the k least costs known.
 
-    ``counts``: solutions, open children, costs known, shortest paths so far. ``limits``: what was left out costs at
-    least the first; what costs more than the second is left out.
+    ``counts``: solutions, open children, costs known, shortest paths so far. ``limits``: a lower bound on the cost of
+    everything left out, and the cost above which children are left out.
     """
 
     key: NDArray[np.float64]
@@ -64,7 +64,7 @@ class Queues(NamedTuple):
 
 
 class Taboo(NamedTuple):
-    """What a path may not touch."""
+    """Rows, columns and edges that a path must not use."""
 
     row: NDArray[np.bool_]
     column: NDArray[np.bool_]
@@ -72,7 +72,7 @@ class Taboo(NamedTuple):
 
 
 class PathWork(NamedTuple):
-    """Room for a shortest path: through columns, the dummy, and from there to rows that are alone."""
+    """Buffers for a shortest path: through columns, the dummy, and from there to unmatched rows."""
 
     distance: NDArray[np.float64]
     previous: NDArray[np.int64]
@@ -86,7 +86,7 @@ class PathWork(NamedTuple):
 
 
 def new_nodes(capacity: int, num_rows: int, num_columns: int) -> Nodes:
-    """Room for so many solutions."""
+    """Allocate nodes for ``capacity`` solutions."""
     return Nodes(
         edge_of=np.empty((capacity, num_rows), np.int32),
         row_of=np.empty((capacity, num_columns), np.int32),
@@ -100,7 +100,7 @@ def new_nodes(capacity: int, num_rows: int, num_columns: int) -> Nodes:
 
 
 def new_queues(k: int, num_rows: int) -> Queues:
-    """Room for the first open children."""
+    """Allocate queues for the first open children."""
     return Queues(
         key=np.empty(max(64, 4 * num_rows)),
         item=np.empty(max(64, 4 * num_rows), np.int64),
@@ -147,7 +147,7 @@ def index_edges(rows: Any, columns: Any, num_rows: int, num_columns: int, keep: 
 
 @inner_njit
 def new_taboo(graph: Graph) -> Taboo:
-    """Room for what is taboo; nothing is."""
+    """Nothing is forbidden yet."""
     return Taboo(
         np.zeros(graph.row_alone.size, np.bool_),
         np.zeros(graph.column_alone.size, np.bool_),
@@ -157,10 +157,10 @@ def new_taboo(graph: Graph) -> Taboo:
 
 @inner_njit
 def new_path_work(graph: Graph) -> PathWork:
-    """Room for shortest paths."""
+    """Allocate buffers for shortest paths."""
     num_rows, num_columns = graph.row_alone.size, graph.column_alone.size
     num_items = num_columns + 1 + num_rows
-    # each edge is offered once at the most, and so is each way to and from the dummy
+    # each edge is queued at most once, and so is each step to and from the dummy
     num_offers = graph.row_edges.size + 2 * num_rows + 2 * num_columns + 2
     return PathWork(
         np.full(num_items, np.inf),

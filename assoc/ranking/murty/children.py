@@ -1,8 +1,8 @@
 """The children of a solution in Murty's ranking: their bounds, their shortest paths, their multipliers.
 
-Rows and columns that may stay alone are joined to one more node, the dummy, with potential z: a row that
-stays alone is matched to it, a column that stays alone is matched by it, and a path may lead through it. The
-dummy takes many at once, so that by complementary slackness its edges in use have reduced costs <= 0, not 0.
+Rows and columns that may stay unmatched are joined to one more node, the dummy, with potential z: unmatched rows
+and columns are matched to it, and a path may lead through it. The dummy can be matched many times, so that by
+complementary slackness its matched edges have reduced costs <= 0, not 0.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Ta
 
 @inner_njit
 def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int, on: bool) -> None:
-    """Mark (or unmark) what the child at ``place`` may not touch: its fixed rows and its forbidden edges."""
+    """Mark or unmark what the child at index ``place`` must not use: its fixed rows and its forbidden edges."""
     for t in range(place):
         r = nodes.order[parent, t]
         taboo.row[r] = on
@@ -33,7 +33,7 @@ def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int,
         forbidden = nodes.forbidden
         node = parent
         while node >= 0 and forbidden[node, 1] != -1:
-            # an entry is 2 + edge, so that 1 stands for staying alone
+            # an entry is 2 + edge, so that 1 stands for staying unmatched
             if forbidden[node, 1] >= 2:
                 taboo.edge[forbidden[node, 1] - 2] = on
             node = forbidden[node, 0]
@@ -41,7 +41,7 @@ def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int,
 
 @inner_njit
 def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
-    """Whether the child of ``row`` may leave that row alone."""
+    """Whether the child of ``row`` may leave that row unmatched."""
     order, fixed, forbidden = nodes.order, nodes.fixed, nodes.forbidden
     if not graph.row_alone[row] or nodes.edge_of[parent, row] == ALONE:
         return False
@@ -56,7 +56,7 @@ def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
 
 @inner_njit
 def _relax(work: PathWork, size: int, num_reached: int, item: int, value: float, edge: int, row: int) -> Any:
-    """Offer a way to a column (or the dummy); the sizes of the queue and of the list of what was reached."""
+    """Relax an edge to a column (or the dummy); the sizes of the queue and of the list of reached nodes."""
     distance, previous, previous_row, closed, reached, _, _, queue_key, queue_item = work
     if closed[item] or value >= distance[item]:
         return size, num_reached
@@ -85,7 +85,7 @@ def search_path(
     target = columns[own] if own >= 0 else dummy
     z = v[parent, dummy]
     size, num_reached, num_tree = 0, 0, 0
-    # a row that leaves the dummy: its edge to it may be cheaper than tight, as those of a full node may
+    # the row leaves the dummy: the reduced cost of that edge may be negative
     i, d = row, (0.0 if own >= 0 else max(0.0, u[parent, row] + z))
     while True:
         if i >= 0:

@@ -1,13 +1,13 @@
 """Murty's ranking of two-dimensional assignments, compiled.
 
-Every solution found is a node; its children split the solutions that are left of it: child i keeps the
+Every solution found is a node; its children partition the remaining solutions: child i keeps the
 choices of the rows before i and forbids that of row i. What makes it quick [2]_:
 
 - a child needs one shortest augmenting path from row i, priced by its parent's multipliers,
 - and before that only a bound: the cheapest way out of row i plus the cheapest way into its column,
 - rows of large bounds come first, so that the children that matter are the small ones,
-- a child is evaluated only when its bound comes up, and its multipliers only when it is a solution's turn,
-- only solutions up to some excess over the best are looked for, with the edges whose reduced cost (by the
+- a child is evaluated only when its bound is the least, and gets multipliers only when it becomes a solution,
+- only solutions up to some excess over the best are searched for, with the edges whose reduced cost (by the
   first multipliers) allows it; if they are fewer than k, again with a larger excess.
 
 References
@@ -54,7 +54,7 @@ class Murty:
     costs : float array, shape (E,)
         Cost of each edge.
     row_alone, column_alone : bool arrays, shapes (R,) and (C,)
-        Whether a row or column may stay alone (at no cost).
+        Whether a row or column may stay unmatched (at no cost).
     k : int
         Solutions wanted.
     """
@@ -95,7 +95,7 @@ class Murty:
 
     @property
     def rest(self) -> float:
-        """No solution that is not among those found costs less."""
+        """Lower bound on the cost of all solutions not found yet."""
         queues = self._queues
         return min(float(queues.limits[0]), float(queues.key[0]) if queues.counts[1] else np.inf)
 
@@ -115,7 +115,7 @@ class Murty:
         return own[own >= 0]
 
     def run(self, evaluations: int) -> None:
-        """Rank until done or so many more shortest paths are computed."""
+        """Rank until done, or until ``evaluations`` more shortest paths are computed."""
         target = self.evaluations + evaluations
         while not self.done and self.evaluations < target:
             if self._queues.counts[1] == 0:
@@ -137,7 +137,7 @@ class Murty:
         self._queues = queues
 
     def _begin(self) -> None:
-        """Start anew from the best solution, looking only for solutions of a limited excess over it."""
+        """Restart from the best solution, searching only for solutions of a limited excess over it."""
         self._excess = np.inf
         if self._place < self._reduced.size:
             self._excess = float(np.partition(self._reduced, self._place)[self._place])
@@ -149,7 +149,7 @@ class Murty:
         self._keep_edges()
 
     def _drop_edges(self) -> None:
-        """Leave out edges that are in none of the k best, when that is a good deal more than before."""
+        """Drop edges that none of the k best can use, if they are many more than those dropped already."""
         worst = -float(self._queues.best[0])
         if self._queues.counts[2] == self._k and worst - self._least < 0.5 * self._excess:
             self._excess = worst - self._least
@@ -190,7 +190,7 @@ def _root(graph: Graph, nodes: Nodes, queues: Queues) -> bool:
     nodes.fixed[0] = 0
     nodes.forbidden[0] = -1
     nodes.cost[0] = cost
-    # the root is an open child of nobody
+    # the root is an open child without a parent
     push(queues.key, queues.item, 0, cost, -1)
     queues.counts[1] = 1
     push(queues.best, queues.best_item, 0, -cost, 0)
@@ -213,7 +213,7 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
         key, item = heap_key[0], heap_item[0]
         worst = min(limits[1], -best[0] if counts[2] >= k else np.inf)
         if key > worst:
-            # nothing that is open is among the k best
+            # no open child is among the k best
             limits[0] = min(limits[0], key)
             counts[1] = 0
             return
@@ -244,7 +244,7 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
                     push(heap_key, heap_item, counts[1], value, item | 1)
                     counts[1] += 1
                 elif worst < np.inf:
-                    # longer than allowed, or there is none
+                    # the path is longer than allowed, or there is none
                     limits[0] = min(limits[0], worst)
             else:
                 node = counts[0]
@@ -253,6 +253,6 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
             if exact == 0:
                 continue
         counts[0] += 1
-        # also those of the k-th solution: what they cost bounds the rest
+        # also those of the k-th solution: their costs bound the rest
         worst = min(limits[1], -best[0] if counts[2] >= k else np.inf)
         open_children(graph, nodes, taboo, queues, node, worst)

@@ -1,15 +1,14 @@
-"""Probability of each pair of two lists among all joint events, as an interval that holds.
+"""Probability of each pair of two lists among all joint events, as a guaranteed interval.
 
 Clusters of pairs are summed exactly (`assoc.ranking.pairs.sweep`) as long as few of their vertices are open at a time.
-A cluster that is too wide for that is made narrower: its least likely pairs are left out, until what remains can be
-summed. What that changes is bounded. Let D be the pairs left out that touch a cluster of those that remain: in events
-without them the cluster is by itself, therefore
+Where too many would be, the least likely pairs are left out until the rest can be summed. The error is bounded. Let D
+be the left-out pairs that touch a remaining cluster. In events without pairs of D the cluster is independent, hence
 
     | P(pair) - P(pair among the pairs that remain) |  <=  P(any of D)  <=  sum over D of bounds on their probabilities,
 
-with the bounds of `assoc.ranking.pairs.messages`. The probability between the bounds is better than that of the pairs
-that remain alone: at each vertex stands for each pair left out one that ends there, weighed by belief propagation. It
-moves probabilities by as much as such pairs have probability, at most, which is added to the width of the interval.
+with the bounds of `assoc.ranking.pairs.messages`. The estimate between the bounds also accounts for the left-out pairs:
+each is replaced at its two vertices by a pair that ends there, weighted by belief propagation. This moves probabilities
+by at most the probability of the replacements, which is added to the width of the interval.
 
 References
 ----------
@@ -32,14 +31,14 @@ from assoc.ranking.pairs.messages import log_beliefs, log_bounds, log_dropped
 from assoc.ranking.pairs.sweep import new_work, planned, swept
 
 _NARROWEST = 2
-"""Open vertices that any tree of one vertex and its neighbours needs."""
+"""Open vertices needed for a star, a vertex and its neighbours."""
 _LEAST, _STEP = math.log(1e-12), math.log(4.0)
-"""Pairs left out of a cluster that is too wide: first those below this probability, then up to so many times more."""
+"""Of a cluster with too many open vertices leave out pairs below this probability; then raise it by this factor."""
 _ROUNDING = 1e-12
 
 
 class PairIntervals(NamedTuple):
-    """Of K pairs: the probability, and the interval in which it lies for certain."""
+    """Probabilities of K pairs, with guaranteed bounds."""
 
     probability: Floats
     lower: Floats
@@ -49,18 +48,18 @@ class PairIntervals(NamedTuple):
 def pair_probabilities(
     first: Array, second: Array, log_weight: Floats, sizes: tuple[int, int], states: int
 ) -> PairIntervals:
-    """Sum all joint events: sets of pairs in which no member of either list is twice.
+    """Sum over all joint events: sets of pairs that use each member of either list at most once.
 
     Parameters
     ----------
     first, second : int arrays (K,)
-        Members of the two lists, from 0, of each pair; no pair is given twice.
+        The two members of each pair, counted from 0; pairs must be distinct.
     log_weight : array (K,)
-        ln of what a pair multiplies an event's weight with; finite.
+        Logarithm of the factor that a pair contributes to an event's weight; finite.
     sizes : (int, int)
         Lengths of the lists.
     states : int
-        Partial events that are kept apart at a time, in a table; where a cluster would need more, pairs are left out.
+        Largest size of the table of partial events; where a cluster would need more, pairs are left out.
     """
     if not len(first):
         return PairIntervals(*np.zeros((3, 0)))
@@ -77,7 +76,7 @@ def pair_probabilities(
     swept(plan.steps, *_reduced(graph, weight, plan.kept, log_free, sizes[0]), probability)
     free = 1.0 - np.bincount(graph.ends.T.reshape(-1), np.tile(probability, 2), sum(sizes))
     free = np.clip(free, 0.0, 1.0)
-    # pairs left out, by what stands for them at the first list's end
+    # left-out pairs, by their replacements at the first list's end
     out = np.flatnonzero(~plan.kept)
     place = np.empty(len(first), dtype=np.int64)
     count = graph.ptr[sizes[0]]
@@ -110,7 +109,7 @@ class _Plan(NamedTuple):
 
 @njit
 def _plan(graph: PairGraph, log_weight: Floats, most: int) -> _Plan:
-    """Leave pairs out until every cluster can be summed with at most so many open vertices."""
+    """Leave pairs out until every cluster can be summed with at most ``most`` open vertices."""
     vertices, edges = graph.ptr.size - 1, log_weight.size
     kept, label = np.ones(edges, np.bool_), np.full(vertices, -1, np.int64)
     steps = np.empty((2 * vertices + edges, 4), np.int64)
@@ -160,9 +159,9 @@ def _cluster(graph: PairGraph, kept: Any, start: int, number: int, label: Any, m
 
 
 def _reduced(graph: PairGraph, log_weight: Floats, kept: Array, log_free: Floats, rows: int) -> tuple[Floats, Floats]:
-    """Weights of edges and of leaving vertices alone, relative to the best event's by its multipliers.
+    """Weights of edges and of unmatched vertices, reduced by the multipliers of the best event.
 
-    The first list are the graph's first so many `rows`.
+    The first ``rows`` vertices are those of the first list.
     """
     edge = graph.edge[: graph.ptr[rows]]
     costs = np.where(kept, -log_weight, np.inf)

@@ -10,18 +10,18 @@ from assoc._types import Array
 
 
 class PairGraph(NamedTuple):
-    """V vertices, first those of the first list, and K edges; each edge stands at two places, one for either end.
+    """V vertices, those of the first list first, and K edges, each listed twice: once for each end.
 
     Attributes
     ----------
     ends : int64 array (K, 2)
         Vertices of each edge.
     ptr : int64 array (V + 1,)
-        Vertex v has the places ``ptr[v]:ptr[v + 1]``.
+        Vertex v has the edge ends ``ptr[v]:ptr[v + 1]``.
     edge : int64 array (2 K,)
-        Edge of each place.
+        Edge of each edge end.
     mate : int64 array (2 K,)
-        The edge's place at its other end.
+        Index of the edge's other end.
     """
 
     ends: Any

@@ -1,15 +1,15 @@
-"""What a vertex says to its neighbours of how free it is: bounds on the probability of each pair, and an approximation.
+"""Messages between the vertices of a pair graph: bounds on each pair's probability, and belief propagation.
 
 With P(v; G) the probability that vertex v is in no pair of a joint event of the graph G,
 
     P(v; G) = 1 / ( 1 + sum over neighbours u of w_uv P(u; G - v) ),
 
-and a pair is in the event with probability w_uv P(u; G) P(v; G - u). A message of v to u is a value for P(v; G - u).
-From a bound on one side of all messages the equation makes one on the other side: 1 is at least any probability, so
-that the first round gives lower bounds, the second upper, the third lower. (The fourth would walk back to vertices that
-are not there any more.) Rounds without end, messages that are no bounds, are belief propagation: exact on trees.
+and a pair is in the event with probability w_uv P(u; G) P(v; G - u). A message from v to u is a value for P(v; G - u).
+The equation turns upper bounds on all messages into lower bounds, and lower into upper. Start from the upper bound 1:
+the first round gives lower bounds, the second upper, the third lower. (A fourth round would return to vertices that
+have been removed, so that it gives no bounds.) Rounds until convergence are belief propagation, exact on trees.
 
-All are logarithms.
+Messages are logarithms.
 
 References
 ----------
@@ -31,12 +31,12 @@ from assoc._types import Array, Floats
 from assoc.ranking.pairs.graph import PairGraph
 
 _ROUNDS, _SETTLED = 200, 1e-10
-"""Of belief propagation: the most rounds, and the change of messages at which it ends."""
+"""Belief propagation ends after this many rounds, or when messages change by less than this."""
 
 
 @njit
 def next_round(graph: PairGraph, log_weight: Floats, heard: Floats, said: Floats) -> None:
-    """Fill in what each vertex says at each of its places, from what all have said before."""
+    """Compute all outgoing messages from the incoming ones."""
     ptr, edge, mate = graph.ptr, graph.edge, graph.mate
     for v in range(ptr.size - 1):
         for x in range(ptr[v], ptr[v + 1]):
@@ -45,7 +45,7 @@ def next_round(graph: PairGraph, log_weight: Floats, heard: Floats, said: Floats
 
 @njit
 def _log_one_and(first: int, last: int, but: int, edge: Any, mate: Any, log_weight: Floats, heard: Floats) -> float:
-    """ln(1 + sum over a vertex' places, one left out, of weight times what is heard there)."""
+    """ln(1 + sum of weight times incoming message) over a vertex' edges except ``but``."""
     top = 0.0
     for y in range(first, last):
         if y != but:
@@ -76,7 +76,7 @@ def log_bounds(graph: PairGraph, log_weight: Floats) -> tuple[Floats, Floats]:
 
 @njit
 def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, heard_there: float, heard: Floats) -> float:
-    """Logarithm of the probability of the pair at place x of vertex v, given what is heard there and at the others."""
+    """Log probability of the pair at index x of vertex v, from its incoming message and those of v's other edges."""
     others = _log_one_and(graph.ptr[v], graph.ptr[v + 1], x, graph.edge, graph.mate, log_weight, heard)
     own = log_weight[graph.edge[x]] + heard_there
     top = max(own, others)
@@ -85,7 +85,7 @@ def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, heard_there
 
 @njit
 def log_beliefs(graph: PairGraph, log_weight: Floats) -> Floats:
-    """Messages of belief propagation, one for each place."""
+    """Messages of belief propagation, one for each end of each edge."""
     heard, said = np.zeros(graph.edge.size), np.zeros(graph.edge.size)
     for _ in range(_ROUNDS):
         next_round(graph, log_weight, heard, said)
@@ -96,14 +96,14 @@ def log_beliefs(graph: PairGraph, log_weight: Floats) -> Floats:
 
 
 def log_dropped(graph: PairGraph, log_weight: Floats, kept: Array, beliefs: Floats) -> tuple[Floats, Floats]:
-    """What stands for the edges that are not kept, at either end.
+    """Summarise the edges that are not kept, at both of their ends.
 
     Returns
     -------
     log_free : array (V,)
         ln(1 + sum of weight times belief), of each vertex over its edges that are not kept.
     log_part : array (2 K,)
-        The terms of these sums, -inf at places of edges that are kept.
+        The terms of these sums, -inf for edges that are kept.
     """
     part = np.where(kept[graph.edge], -np.inf, log_weight[graph.edge] + beliefs[graph.mate])
     free = np.zeros(graph.ptr.size - 1)

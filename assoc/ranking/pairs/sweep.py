@@ -1,14 +1,13 @@
 """The sum over all joint events of a cluster, by a sweep over its graph.
 
-A joint event is a matching. The sweep takes the edges one after the other; of the events so far it need not know more
-than which of the vertices are taken that have edges behind it and edges before it: the open ones. A table holds the
-weight of all partial events for each set of taken open vertices. A vertex that is opened doubles the table, one whose
-last edge is done halves it. A second sweep backwards gives for each set the weight of all completions, and both
-together the probability of each edge. The work grows with two to the power of the open vertices, not with the number
-of events: vertices are done in an order in which few are open.
+A joint event is a matching. The sweep processes the edges one after the other. A vertex is *open* while some of its
+edges are processed and others are not. A table holds, for each set of matched open vertices, the total weight of the
+partial events. Opening a vertex doubles the table; processing its last edge halves it. A backward sweep gives for each
+set the weight of all completions, and both sweeps together the probability of each edge. The work grows with two to
+the power of the open vertices, not with the number of events: the order of vertices keeps few open.
 
 Weights are reduced by the multipliers of the best event (`assoc.packing.kernels.matching`): it weighs 1 and each part
-of any event 1 at most, so that what underflows has no weight beside it.
+of any event at most 1, so that whatever underflows is negligible.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from assoc.packing.kernels.copying import copy_to
 from assoc.ranking.pairs.graph import PairGraph
 
 OPEN, PAIR, CLOSE = 0, 1, 2
-"""What a step of a sweep does."""
+"""Kinds of steps."""
 DONE = -1
-"""Place of a vertex that is closed."""
+"""Bit of a vertex that is closed."""
 _LARGE = 1e150
 
 
 class Work(NamedTuple):
-    """Room for planning a sweep, one number for each vertex."""
+    """Buffers for planning a sweep, one number for each vertex."""
 
     left: Any
     """Edges before the sweep."""
@@ -42,7 +41,7 @@ class Work(NamedTuple):
 
 @njit
 def new_work(vertices: int) -> Work:
-    """Room for graphs of so many vertices."""
+    """Allocate buffers for graphs of this many vertices."""
     return Work(np.zeros(vertices, np.int64), np.zeros(vertices, np.int64), np.zeros(vertices, np.int64))
 
 
@@ -94,13 +93,13 @@ def planned(graph: PairGraph, kept: Any, members: Any, most: int, steps: Any, wo
 
 @njit
 def _next_vertex(graph: PairGraph, kept: Any, members: Any, work: Work) -> int:
-    """The vertex whose edges leave the fewest open, of those near open ones if there are any; -1: all is done."""
+    """The vertex that leaves the fewest vertices open, preferably next to an open one; -1 if none is left."""
     left, place, near = work
     best, least = -1, np.iinfo(np.int64).max
     for v in members:
         if place[v] == DONE or left[v] == 0:
             continue
-        # those that are not near come last, the ones with few edges first
+        # vertices that are not next to an open one come last, those with few edges first
         cost = (np.int64(1) << 40) + left[v]
         if near[v]:
             cost = -2 if place[v] > 0 else 0
@@ -142,7 +141,7 @@ def _closed(members: Any, v: int, steps: Any, count: int, work: Work) -> int:
 
 @search_njit
 def swept(steps: Any, weights: Floats, free: Floats, probability: Floats) -> None:
-    """Do a planned sweep there and back: fill in the probabilities of its edges.
+    """Do a planned sweep forwards and backwards: fill in the probabilities of its edges.
 
     Parameters
     ----------
@@ -178,7 +177,7 @@ def swept(steps: Any, weights: Floats, free: Floats, probability: Floats) -> Non
             size //= 2
             top = 0.0
             for i in range(size):
-                # the index without the bit that goes; it is never behind the place that is written
+                # the index without the removed bit; it is never below the index that is written
                 with_it = ((i & ~(low - 1)) << 1) | (i & (low - 1))
                 table[i] = free[what] * table[with_it] + table[with_it | low]
                 top = max(top, table[i])
