@@ -1,4 +1,4 @@
-"""Independent clusters of tuples, and their tuples in order: for problems of a million."""
+"""Independent clusters of tuples, and sorting of distinct tuples: for problems of a million tuples."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from assoc.packing.kernels.sorting import ascending_whole
 from assoc.packing.packing import find
 from assoc.problem import AssignmentProblem
 
-# tuples from which numbering by marks is quicker than by sorting
+# number of tuples above which numbering by a mask is quicker than by sorting
 _MANY = 2000
 
 
 def clusters_of(problem: AssignmentProblem) -> list[NDArray[np.int64]]:
-    """Return ``problem.components()``: rows of the tuples of each cluster, ascending, by their first tuple."""
+    """Return ``problem.components()``: rows of each cluster's tuples, ascending; clusters by their first tuple."""
     sizes = problem.sizes.astype(np.int64)
     order, start = _clusters(problem.tuples, np.cumsum(sizes) - sizes, int(sizes.sum()))
     return [order[first:last] for first, last in zip(start[:-1].tolist(), start[1:].tolist(), strict=True)]
 
 
 def numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
-    """Number one sensor's measurements in a cluster from 1; 0 stays the dummy. Also how many there are."""
+    """Renumber one sensor's measurements in a cluster from 1 (0 is the dummy); return the numbers and their count."""
     if column.size < _MANY:
         used, number = np.unique(column, return_inverse=True)
         alone = used[0] != 0
@@ -36,7 +36,7 @@ def numbered(column: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
 
 
 def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Return the different tuples in lexicographic order, and the place of each tuple among them."""
+    """Return the distinct tuples in lexicographic order, and the index of each tuple among them."""
     sides = _largest(tuples) + 1
     order = np.arange(len(tuples), dtype=np.int32)
     if float(np.prod(sides, dtype=float)) < 2.0**62:
@@ -44,8 +44,8 @@ def distinct(tuples: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.i
     else:
         for column in tuples.T[::-1]:
             order = order[ascending_whole(column[order].astype(np.int64))]
-    new, place = _places(tuples, order)
-    return tuples[order[new]], place
+    new, index = _places(tuples, order)
+    return tuples[order[new]], index
 
 
 @njit
@@ -61,7 +61,7 @@ def _largest(tuples: Any) -> Any:
 
 @njit
 def _as_numbers(tuples: Any, sides: Any) -> Any:
-    """One number for each tuple, in lexicographic order."""
+    """Numbers that order the tuples lexicographically."""
     num, num_sensors = tuples.shape
     numbers = np.zeros(num, np.int64)
     for j in range(num):
@@ -72,7 +72,7 @@ def _as_numbers(tuples: Any, sides: Any) -> Any:
 
 @njit
 def _places(tuples: Any, order: Any) -> Any:
-    """Which tuples of an order differ from those before them, and each tuple's place among the different ones."""
+    """Mask of the sorted tuples that differ from the one before, and each tuple's index among the distinct ones."""
     num, num_sensors = tuples.shape
     new = np.ones(num, np.bool_)
     place = np.empty(num, np.int64)

@@ -1,7 +1,7 @@
-"""The packing in which every solution counts, not only the best.
+"""All distinct columns of a problem, as ranking and counting need them.
 
-To find an optimum, columns of weight >= 0 can be left out of a problem with dummies (packing.py). To rank
-or to count solutions they cannot; and a tuple that is listed twice must count once.
+An optimum can be found without the columns of weight >= 0 of a problem with dummies (packing.py). Ranking and
+counting need them, and a tuple that is listed twice must count once.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class AllColumns:
     Attributes
     ----------
     rows : int32 array, shape (N, S)
-        Measurements of each column, numbered through all sensors; -1 where the sensor missed.
+        Measurements of each column, numbered over all sensors; -1 where the sensor missed.
     weights : float array, shape (N,)
-        Cost of the tuple, with dummies less the costs of its singletons.
+        Cost of the tuple; with dummies, less the costs of its singletons.
     origin : int32 array, shape (N,)
         Its row of ``problem.tuples``.
     slack : bool array, shape (R,)
@@ -44,7 +44,7 @@ class AllColumns:
     bound : float
         Sum of the multipliers.
     error : float
-        A solution weighs at least the bound and its reduced costs, less this: what rounding has taken.
+        Rounding error: a solution weighs at least the bound plus its reduced costs, less this.
     offset : float
         Weight plus this is the cost.
     single : int64 array
@@ -65,17 +65,17 @@ class AllColumns:
 
     @property
     def scale(self) -> float:
-        """Size of the numbers that light solutions are sums of, > 0 where any of them is.
+        """Magnitude of the numbers that light solutions are sums of; 0 only if all are 0.
 
-        A column's weight is what its multipliers add up to and its reduced cost, which solutions near the bound do not
-        have: however dear the others are, they do not count.
+        Solutions near the bound have columns of small reduced cost, whose weights are about the sums of their
+        multipliers. The weights of other columns do not count, however large.
         """
         least = self.reduced[self.reduced > 0.0].min(initial=np.inf)
         priced = float(np.abs(self.weights - self.reduced).max(initial=0.0))
         return max(abs(self.bound), priced, float(least) if np.isfinite(least) else 0.0)
 
     def keep(self, excess: float) -> Packing:
-        """Return the packing of the columns whose reduced cost is at most ``excess``, by components."""
+        """Return the packing, split into components, of the columns whose reduced cost is at most ``excess``."""
         chosen = np.flatnonzero(self.reduced <= excess).astype(np.int32)
         return assemble(self.rows[chosen], self.weights[chosen], self.slack, chosen)
 
@@ -95,7 +95,7 @@ def price_all_columns(problem: AssignmentProblem, run: Run) -> AllColumns:
     prepared = prepare(problem)
     packing = prepared.packing
     slack = slack_of(problem)
-    # before the ascent, which takes the time that is left
+    # before the ascent, which takes the remaining time
     rows, weights, origin = distinct_columns(problem)
     # with dummies, columns of weight >= 0 have reduced costs >= 0 with any multipliers <= 0
     duals = np.zeros(slack.size)
@@ -106,7 +106,7 @@ def price_all_columns(problem: AssignmentProblem, run: Run) -> AllColumns:
 
 
 def slack_of(problem: AssignmentProblem) -> NDArray[np.bool_]:
-    """Whether each measurement, numbered through all sensors, may stay uncovered."""
+    """Whether each measurement, numbered over all sensors, may stay uncovered."""
     sizes = problem.sizes
     return np.ones(int(sizes.sum()), dtype=np.bool_) if problem.dummy else np.repeat(sizes > sizes.min(), sizes)
 
@@ -115,7 +115,7 @@ def distinct_columns(problem: AssignmentProblem) -> tuple[NDArray[np.int32], Flo
     """Return rows, weights and origin of all columns (see ``AllColumns``)."""
     prepared = prepare(problem)
     sizes = problem.sizes.astype(np.int64)
-    # uncompiled, numpy would warn of the hash's overflow, which is meant
+    # where this is interpreted, numpy would warn of the hash's overflow, which is intended
     with np.errstate(over="ignore"):
         return _distinct_columns(
             problem.tuples, problem.costs, np.cumsum(sizes) - sizes, prepared.single_cost, problem.dummy
@@ -131,7 +131,7 @@ def priced(
     offset: float,
     single: NDArray[np.int64],
 ) -> AllColumns:
-    """Put columns and multipliers together."""
+    """Combine columns and multipliers."""
     duals = np.where(slack, np.minimum(duals, 0.0), duals)
     reduced, least = _reduced(rows, weights, duals)
     error = margin(float(np.abs(duals).sum()), rows.shape[1]) - slack.size * least
@@ -152,7 +152,7 @@ def priced(
 
 @njit
 def _reduced(rows: Any, weights: Floats, duals: Floats) -> Any:
-    """Reduced costs, 0 where they are negative, and the least that there was."""
+    """Reduced costs, with negative ones set to 0, and the least before that."""
     reduced = np.empty(weights.size)
     least = 0.0
     for j in range(weights.size):
@@ -167,7 +167,7 @@ def _reduced(rows: Any, weights: Floats, duals: Floats) -> Any:
 
 @njit
 def _distinct_columns(tuples: Any, costs: Floats, offsets: Any, single_cost: Floats, dummy: bool) -> Any:
-    """Columns of two or more measurements (without dummies: all), each once, at its smallest cost."""
+    """Distinct columns of two or more measurements (without dummies: all), each at its smallest cost."""
     num, num_sensors = tuples.shape
     size = 16
     while size < 2 * num:

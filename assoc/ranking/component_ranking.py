@@ -1,11 +1,10 @@
 """The k lightest solutions of one component or of many: enumeration where it is quick, else branching first.
 
-Enumeration (enumeration.py) is quick where the multipliers' bound is near the optimum. Where it is not, the
-component is branched as in packing/branching (are two measurements of the same source or not?): the linear program of
-every node gives the best multipliers there are for it, and what its reduced costs leave of a node is enumerated as soon
-as a small budget suffices. A search that takes long begins anew, with cuts and in parts split on counts. Enumeration
-knows nothing of these: it may list solutions of another part as well, with their own weights, and a solution that is
-known already is not listed again.
+Enumeration (enumeration.py) is quick where the multipliers' bound is near the optimum. Elsewhere the component is
+branched as in packing/branching (do two measurements have the same source?): the linear program gives every node its
+best multipliers, and a node is enumerated as soon as a small budget suffices for the columns that remain. A search
+that takes long is restarted with cuts, split on counts. Enumeration ignores cuts and counts: it may list solutions of
+another part, at their true weights; a known solution is not listed again.
 """
 
 from __future__ import annotations
@@ -61,11 +60,11 @@ from assoc.ranking.enumeration import (
 
 FIRST_BUDGET = 3000
 NODE_BUDGET = 500
-# nodes after which a search may begin anew with cuts and in parts, and again whenever they have doubled
+# nodes after which a search may restart with cuts and split on counts, and again whenever they have doubled
 _HARD = 40
-# the share of the way to the limit by which parts must raise what is proved
+# share of the gap to the limit by which a split must raise the bound
 _RAISED = 0.02
-# a budget that is never used up
+# an unlimited budget
 _ALL = 1 << 60
 
 
@@ -81,15 +80,15 @@ class ComponentRanking:
     k : int
         Solutions wanted.
     limit : float
-        Only solutions that weigh less are looked for.
+        Only solutions that weigh less are searched for.
     tolerance : float
-        Differences of weight that are ties.
+        Weights that differ by no more are ties.
     budget : int
-        Decisions of enumeration at a node, beyond one for each row, before it is branched.
+        Decisions of enumeration at a node, beyond one for each row, before the node is branched.
     deadline : float
-        When time is over, by the kernels' clock (clock.py): the node at work stays open.
+        Time limit by the kernels' clock (clock.py); the current node then stays open.
     memory_allows : callable, optional
-        Whether the search may take so many bytes more (`Run.memory_allows`).
+        Whether the search may allocate this many bytes more (`Run.memory_allows`).
     """
 
     def __init__(
@@ -112,7 +111,7 @@ class ComponentRanking:
         self._root = plain_root(packing, duals)
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
-        # the parts of the root that are still to be searched, the least bound last
+        # the parts of the root not searched yet, the least bound last
         self._waiting: list[Leaf] = []
         self._split_at = _HARD
         self.nodes = 0
@@ -129,7 +128,7 @@ class ComponentRanking:
 
     @property
     def proven(self) -> float:
-        """Every solution that was not found weighs at least this."""
+        """Lower bound on the weight of all solutions not found."""
         cut = float(cut_of(self._store, self._wanted))
         waiting = self._waiting[-1].bound if self._waiting else np.inf
         return min(cut, self._open.least_bound, waiting)
@@ -137,7 +136,7 @@ class ComponentRanking:
     def solutions(self) -> tuple[Floats, list[NDArray[np.int32]]]:
         """Return weights (ascending) and the columns of each solution."""
         weights, chosen = _sorted_store(self._store)
-        return weights, [own[: int(np.argmax(own < 0))] for own in chosen]
+        return weights, [columns[: int(np.argmax(columns < 0))] for columns in chosen]
 
     def run(self, nodes: int) -> None:
         """Search until ``nodes`` more nodes are done or nothing is left."""
@@ -160,11 +159,11 @@ class ComponentRanking:
                 self._open.grow(self._memory_allows)
 
     def _split(self) -> bool:
-        """Begin anew with cuts and in parts, where that raises what is proved; whether it does."""
-        # where this does not pay, it may with a nearer cut
+        """Restart with cuts, split on counts, if that raises the bound; whether it does."""
+        # a split that does not pay now may pay with a lower cutoff
         self._split_at = 2 * self.nodes
         packing, cut = self._packing, float(cut_of(self._store, self._wanted))
-        # the room of the search so far and that of another one
+        # the memory of this search and of a second one
         needed = 2.0 * work_memory(most_rows(packing), packing.num_columns, packing.num_sensors)
         if not (cut < np.inf and self._open.given_up == np.inf and self._memory_allows(needed)):
             return False
@@ -178,7 +177,7 @@ class ComponentRanking:
         return True
 
     def _begin(self) -> bool:
-        """Make room for the search; without memory for it the root is given up."""
+        """Allocate the search; without memory for it the root is given up."""
         packing = self._packing
         if not self._memory_allows(work_memory(packing.num_rows, packing.num_columns, packing.num_sensors)):
             self._open.give_up()
@@ -200,7 +199,7 @@ def _sorted_store(store: Store) -> Any:
 
 @inner_njit
 def _priced(work: Work, num: int) -> PricedColumns:
-    """The columns of the node at work with its multipliers, indexed by row."""
+    """The columns of the current node with its multipliers, indexed by row."""
     cols, active = work.cols, work.node.active
     num_sensors = cols.shape[1]
     own_cols = np.empty((num, num_sensors), np.int32)
@@ -230,7 +229,7 @@ def _priced(work: Work, num: int) -> PricedColumns:
 
 @inner_njit
 def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
-    """The pair to branch on, what is to be done with it (`decide`), and whether it is likelier together."""
+    """The pair to branch on, the decision about it (`decide`), and whether it is likelier together."""
     program, cols, basis, trials = work.program, work.cols, work.basis, work.trials
     if status == OPTIMAL:
         count = doubtful_pairs(cols, basis, trials)
@@ -245,7 +244,7 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
             return (trials.pairs[which, 0], trials.pairs[which, 1]), verdict, True
     one, two = any_open_pair(cols, allowed, work.trial)
     if one < 0:
-        # no column shares a row with another one: whether it is used is the question
+        # columns share no rows: branch on whether one is used
         for j in allowed.active:
             for s in range(cols.shape[1]):
                 for t in range(s + 1, cols.shape[1]):
@@ -258,13 +257,13 @@ def _question(work: Work, allowed: Allowed, status: int, effort: Effort) -> Any:
 def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store, node_limit: int) -> Any:
     """Search depth first; the number of open nodes, the nodes done, and the arrays of the store.
 
-    Stops early with nodes open when there is no room left for two children, or time is over. The arrays are no record:
-    where Ctrl-C comes while a result is converted, numba calls a record's class without having found it.
+    Stops early with nodes open when there is no room left for two children, or time is over. The arrays are a plain
+    tuple: when Ctrl-C interrupts the conversion of a record, numba calls its class without having found it.
     """
     deadline = wanted.deadline
     budget = wanted.budget
     nodes = 0
-    # the node whose basis is at work
+    # the node whose basis is loaded
     at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
@@ -288,7 +287,7 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
             steps, store = enumerate_solutions(_priced(work, num), 0, work.trial.size, bound, own, True, store)
             cut = min(cut_of(store, wanted), work.limit)
             if steps == NOT_COMPLETE and is_over(deadline):
-                # the node is as it was on the stack; what it has listed already is known again
+                # the node is unchanged on the stack; solutions it has listed already are recognised
                 break
             if steps != NOT_COMPLETE:
                 lower = cut
@@ -300,7 +299,7 @@ def _rank(work: Work, stack: Stack, num_open: int, wanted: Wanted, store: Store,
         allowed = allowed_at(work, num)
         pair, verdict, likely = _question(work, allowed, status, Effort(cut, 0, deadline))
         if pair[0] < 0:
-            # nothing to ask: once more, as the node is on the stack, and to the end
+            # nothing to branch on: enumerate the node from the stack again, without a budget
             num_open, nodes, budget = top + 1, nodes - 1, _ALL
             continue
         if verdict == NEITHER:
@@ -320,12 +319,12 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
     Parameters
     ----------
     packing
-        The lists of ``row_cols`` are reordered.
+        The lists in ``row_cols`` are reordered.
     reduced, duals : float arrays
         Reduced costs and multipliers.
     wanted : Wanted
-        Its budget is that of each component, beyond one decision for each of its rows; its limit is how far above
-        their bounds all components together may be.
+        Its budget is for each component, beyond one decision for each row; its limit is the total excess of all
+        components over their bounds.
 
     Returns
     -------
@@ -336,7 +335,7 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
     pointer, columns : int64 and int32 arrays
         Solution i has the columns ``columns[pointer[i]:pointer[i + 1]]``.
     proven : float array, shape (C,)
-        What is not among a component's solutions weighs at least this; -inf: the budget or the time did not suffice.
+        Lower bound on a component's unlisted solutions; -inf: the budget or the time did not suffice.
     """
     row_start = packing.row_start
     num_components = row_start.size - 1
@@ -363,7 +362,7 @@ def rank_components(packing: PackingArrays, reduced: Floats, duals: Floats, want
             proven[c] = cut_of(store, own_wanted)
             own, chosen = _sorted_store(store)
             if own.size:
-                # what this component needs above its bound the others cannot use
+                # the excess that this component needs is not available to the others
                 room -= own[0] - base
             for i in range(own.size):
                 if count == weights.size:

@@ -1,4 +1,4 @@
-"""The k lightest solutions of a whole problem: rounds of growing excess, component by component."""
+"""The k lightest solutions of a problem: rounds of growing excess, component by component."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from assoc.ranking.merging import merge
 
 Columns = NDArray[np.int32]
 
-# excess of a round, as a multiple of that of the best solution known
+# excess of a round, as a multiple of that of the best known solution
 _AHEAD = 1.1
-# weights this near, as a share of what sums go through, are ties
+# weights that differ by less than this share of the summed magnitudes are ties
 _TIE = 1e-12
 
 
 @dataclass(slots=True)
 class Found:
-    """Solutions that are proved to be the lightest.
+    """The solutions proved to be the lightest.
 
     Attributes
     ----------
     chosen : list of int32 arrays
         Columns of each solution, lightest first.
     rest : float
-        No other solution weighs less.
+        Lower bound on the weights of all other solutions.
     nodes : int
         Nodes of branch and bound.
     known : int32 array or None
-        Columns of the lightest solution that was met, where none is proved to be the lightest.
+        Columns of the lightest solution found, where none is proved to be the lightest.
     """
 
     chosen: list[Columns]
@@ -50,7 +50,7 @@ class Found:
 
 @dataclass(slots=True)
 class _Lists:
-    """Ranked solutions of each component: weights, columns, and what all others weigh at least."""
+    """Ranked solutions of each component: weights, columns, and a lower bound on the others' weights."""
 
     weights: list[Floats] = field(default_factory=list)
     columns: list[list[Columns]] = field(default_factory=list)
@@ -95,30 +95,30 @@ class Deepening:
             return Found([], columns.bound)
         steps = np.concatenate([columns.reduced, columns.slack_reduced[columns.slack]])
         steps = np.unique(steps[steps > self._tolerance])
-        # two deviations of a row for each solution wanted are a fair guess of how far one must look
-        place = 2 * self._k
+        # two deviations of a row for each solution wanted are a fair first guess of the excess
+        deviations = 2 * self._k
         best = Found([], columns.bound)
         while True:
-            excess = self._excess(steps, place)
+            excess = self._excess(steps, deviations)
             found = self._round(excess)
             if (len(found.chosen), found.rest) > (len(best.chosen), best.rest):
                 best = found
             best.nodes, best.known = self._nodes, self._known
             if len(best.chosen) >= self._k or excess == np.inf or self._run.should_stop():
                 break
-            # a head start may have gone further than twice as many deviations
-            place = 2 * max(place, int(np.searchsorted(steps, excess)) if self._ahead.weight < np.inf else 0)
+            # the head start's excess may exceed that of twice as many deviations
+            deviations = 2 * max(deviations, int(np.searchsorted(steps, excess)) if self._ahead.weight < np.inf else 0)
         if not best.chosen and best.rest == np.inf:
             raise infeasible(columns.keep(np.inf))
         return best
 
-    def _excess(self, steps: Floats, place: int) -> float:
-        """Return the excess of a round: so many deviations, and no less than a solution is known to have."""
-        if place >= steps.size:
+    def _excess(self, steps: Floats, deviations: int) -> float:
+        """Return the excess of a round: that of so many deviations, or of the best known solution if larger."""
+        if deviations >= steps.size:
             return np.inf
         known = self._ahead.weight - self._columns.bound + 4.0 * self._tolerance
-        # a little more than that of one solution: the others should not take a round of their own
-        return max(float(steps[place]), _AHEAD * known) if known < np.inf else float(steps[place])
+        # a little more than that of the solution, so that the others do not need another round
+        return max(float(steps[deviations]), _AHEAD * known) if known < np.inf else float(steps[deviations])
 
     def _round(self, excess: float) -> Found:
         """Rank all solutions of at most this excess; fewer than k if there are fewer."""
@@ -128,7 +128,7 @@ class Deepening:
         if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
             return Found([], beyond)
         duals = columns.duals[packing.row_origin]
-        # rows without columns stay uncovered and use up their share
+        # rows without columns stay uncovered and use up some of the excess
         room = excess + (columns.bound - float(duals.sum())) + self._tolerance
         if room <= 0.0:
             return Found([], beyond)
@@ -137,8 +137,8 @@ class Deepening:
             return Found([], columns.bound)
         lower = np.array(
             [
-                min(own[0], proven) if own.size else proven
-                for own, proven in zip(lists.weights, lists.proven, strict=True)
+                min(weights[0], proven) if weights.size else proven
+                for weights, proven in zip(lists.weights, lists.proven, strict=True)
             ]
         )
         if np.isposinf(lower).any():
@@ -146,29 +146,29 @@ class Deepening:
         total_lower = math.fsum(lower)
         unlisted = total_lower + (np.array(lists.proven) - lower)
         rest = min(beyond, float(unlisted.min(initial=np.inf)))
-        if any(own.size == 0 for own in lists.weights):
+        if any(weights.size == 0 for weights in lists.weights):
             return Found([], rest)
-        start = np.concatenate([[0], np.cumsum([own.size for own in lists.weights])]).astype(np.int64)
+        start = np.concatenate([[0], np.cumsum([weights.size for weights in lists.weights])]).astype(np.int64)
         weights = np.concatenate([*lists.weights, np.zeros(0)])
         total, choice = merge(start, weights, self._k + 1)
         if total[0] < self._known_weight:
             self._known, self._known_weight = _origins(packing, lists, choice[0]), float(total[0])
-        # a full list excludes what is lighter than its last by more than a tie: where all in it tie, than its first
-        ties = float(np.minimum([own[0] for own in lists.weights] - lower, self._tolerance).sum())
+        # a full list excludes what is lighter than its last solution by more than a tie; if all tie, than its first
+        ties = float(np.minimum([weights[0] for weights in lists.weights] - lower, self._tolerance).sum())
         proved = min(int(np.searchsorted(total, rest + 4.0 * self._tolerance + ties, side="right")), self._k)
         if proved < total.size:
             rest = min(rest, float(total[proved]))
         return Found([_origins(packing, lists, pick) for pick in choice[:proved]], rest)
 
     def _rank_components(self, packing: Packing, duals: Floats, room: float) -> _Lists | None:
-        """Rank every component; None where the head start says that more excess is needed anyway."""
+        """Rank every component; None where the head start shows that more excess is needed."""
         reduced = self._columns.reduced[packing.origin]
         wanted = Wanted(self._k, room, self._tolerance, FIRST_BUDGET, self._run.deadline())
         start, weights, pointer, columns, proven = rank_components(packing.arrays, reduced, duals, wanted)
         lists = _Lists()
         for c in range(packing.num_components):
-            own = slice(start[c], start[c + 1])
-            lists.weights.append(weights[own])
+            part = slice(start[c], start[c + 1])
+            lists.weights.append(weights[part])
             lists.columns.append([columns[pointer[i] : pointer[i + 1]] for i in range(start[c], start[c + 1])])
             lists.proven.append(float(proven[c]))
         hard = np.flatnonzero(np.isneginf(proven))
@@ -177,10 +177,10 @@ class Deepening:
             if np.inf > self._ahead.weight - self._columns.bound > room:
                 return None
         bounds = np.add.reduceat(duals, packing.row_start[:-1]) if hard.size else np.zeros(0)
-        # what the components done need above their bounds the others cannot use
-        used = sum(own[0] - bound for own, bound in zip(lists.weights, bounds, strict=False) if own.size)
+        # the excess that the ranked components need is not available to the others
+        used = sum(part[0] - bound for part, bound in zip(lists.weights, bounds, strict=False) if part.size)
         for index in hard:
-            # its multipliers bound a component that there was no time for
+            # a component that there was no time for is bounded by its multipliers
             lists.proven[index] = float(bounds[index])
             if not self._run.should_stop():
                 self._branch(packing, duals, int(index), float(bounds[index] + room - used), lists)
@@ -189,19 +189,19 @@ class Deepening:
         return lists
 
     def _branch(self, packing: Packing, duals: Floats, c: int, limit: float, lists: _Lists) -> None:
-        """Rank a component that was too much for enumeration; the lists are filled in."""
+        """Rank a component that enumeration could not finish; fill in its lists."""
         component = packing.component(c)
-        own_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
+        component_duals = duals[packing.row_start[c] : packing.row_start[c + 1]]
         ranking = ComponentRanking(
             component,
-            own_duals,
+            component_duals,
             self._k,
             limit,
             self._tolerance,
             deadline=self._run.deadline(),
             memory_allows=self._run.memory_allows,
         )
-        # about ten milliseconds of work between two looks at the clock
+        # about ten milliseconds of work between two checks of the clock
         turn = max(1, 100_000 // max(component.num_columns, 1))
         while not ranking.done and not self._run.should_stop():
             ranking.run(turn)
@@ -211,12 +211,12 @@ class Deepening:
         first = int(packing.col_start[c])
         found, chosen = ranking.solutions()
         lists.weights[c] = found
-        lists.columns[c] = [own + np.int32(first) for own in chosen]
-        # before its first node is done the search has no bound of its own
+        lists.columns[c] = [solution + np.int32(first) for solution in chosen]
+        # before its first node is done the search has no bound
         lists.proven[c] = max(ranking.proven, lists.proven[c])
 
 
 def _origins(packing: Packing, lists: _Lists, pick: NDArray[np.int32]) -> Columns:
     """Return the columns of one solution from each component's list."""
-    own = [columns[i] for columns, i in zip(lists.columns, pick, strict=True)]
-    return packing.origin[np.concatenate([np.zeros(0, np.int32), *own])]
+    picked = [columns[i] for columns, i in zip(lists.columns, pick, strict=True)]
+    return packing.origin[np.concatenate([np.zeros(0, np.int32), *picked])]

@@ -1,10 +1,10 @@
 """The true k best solutions of an assignment problem.
 
-Two sensors: Murty's algorithm (murty/murty.py). More: the multipliers of the dual bound give every solution its
-excess, the sum of its reduced costs, over the bound. All solutions whose excess is at most D use only
-columns of reduced cost <= D. D grows until k solutions lie within; for each D the columns that are left
-fall apart into components, each component's solutions are ranked (component_ranking.py), and the ranked lists
-are merged (merging.py). Nothing is sampled or guessed: a solution that is not listed has been excluded by a bound.
+Two sensors: Murty's algorithm (murty/murty.py). More sensors: the excess of a solution over the dual bound is the sum
+of its reduced costs. Solutions of excess at most D use only columns of reduced cost <= D. D grows until it admits k
+solutions. For each D the remaining columns split into components, each component's solutions are ranked
+(component_ranking.py), and the ranked lists are merged (merging.py). Nothing is sampled or guessed: every solution
+that is not listed is excluded by a bound.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from assoc.solvers.greedy.fallback import prepare_fallback
 from assoc.solvers.greedy.parameters import GreedyParameters
 from assoc.solvers.greedy.solve import greedy_choice
 
-# bytes of a solution and for each measurement in it: in the search's stores while they grow, and as an answer
+# bytes of a solution and of each measurement in it: in the search's stores while they grow, and as an answer
 _SOLUTION, _MEASUREMENT = 2_000, 130
 
 
@@ -50,18 +50,19 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     problem : AssignmentProblem
         What to solve; any number of sensors, with or without dummies.
     k : int
-        How many; if the problem has fewer solutions, all of them are returned. If there is memory for fewer (some
-        2 kB and 150 bytes for each measurement of the problem), so many are, and ``stopped_by`` says "memory_limit".
+        Number of solutions; if the problem has fewer, all of them are returned. Where memory suffices only for fewer
+        (about 2 kB each, and 150 bytes for each measurement of the problem), fewer are returned, and ``stopped_by`` is
+        "memory_limit".
     time_limit : float, optional
-        Seconds. When they are over, the list is cut after the last rank that is proved. If not even the
-        best is, the best solution known is returned alone; its ``status`` is then "feasible".
+        Seconds, after which the list is cut behind the last rank that is proved. If not even the best is proved, only
+        the best known solution is returned; its ``status`` is then "feasible".
 
     Returns
     -------
     list of Solution
-        By cost, equal costs by their tuples. Solutions are different when their sets of tuples are: a tuple
+        Sorted by cost, equal costs by their tuples. Solutions differ when their sets of tuples do: a tuple
         that is listed twice counts once, at its smaller cost. The ``lower_bound`` of the i-th solution holds
-        for all solutions that are not among the i - 1 before it.
+        for all solutions except the i - 1 before it.
 
     Raises
     ------
@@ -72,9 +73,9 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
 
     Notes
     -----
-    Costs that differ by rounding alone (relative 1e-12) count as equal; which of the solutions that tie for
-    the last place are returned is not defined. Where large costs cancel so that rounding hides the order, ranks
-    are "feasible": they may cost more than the true ones, by their gap at the most.
+    Costs that differ only by rounding (relative 1e-12) count as equal; which of the solutions that tie for
+    the last rank are returned is not defined. Where large costs cancel so that rounding hides the order, the ``status``
+    of ranks is "feasible": they may cost more than the true ones, by at most their gap.
 
     References
     ----------
@@ -86,36 +87,36 @@ def kbest(problem: AssignmentProblem, k: int, *, time_limit: float | None = None
     started, k, limit = time.perf_counter(), checked_k(k), checked_time_limit(time_limit)
     known: list[Solution] = []
     with interruptible():
-        for own in conditioned(problem):
+        for version in conditioned(problem):
             run = Run(0, time_limit=limit, started=started)
-            found = [own.restored(problem, one) for one in rank(own.problem, k, None, run).solutions]
-            places = {one.tuples.tobytes() for one in known}
-            new = [one for one in found if one.tuples.tobytes() not in places]
-            # up to the first that has a lowered cost; where time is over that one is better than none
-            sure = next((place for place, one in enumerate(new) if own.alters(one)), len(new))
+            found = [version.restored(problem, solution) for solution in rank(version.problem, k, None, run).solutions]
+            listed = {solution.tuples.tobytes() for solution in known}
+            new = [solution for solution in found if solution.tuples.tobytes() not in listed]
+            # up to the first with a lowered cost; when time is over, that one is better than nothing
+            sure = next((i for i, solution in enumerate(new) if version.alters(solution)), len(new))
             count = max(sure, 1) if run.stopped_by and not known else sure
-            known += [_at_rank(one, len(known) + place + 1) for place, one in enumerate(new[:count])]
+            known += [_at_rank(solution, number) for number, solution in enumerate(new[:count], len(known) + 1)]
             if sure == len(new) or run.stopped_by or len(known) >= k:
                 break
     return known[:k]
 
 
-def _at_rank(solution: Solution, place: int) -> Solution:
-    """The solution with its place in the list."""
-    parameters = {**solution.parameters, "rank": place}
+def _at_rank(solution: Solution, number: int) -> Solution:
+    """The solution with its rank in the list."""
+    parameters = {**solution.parameters, "rank": number}
     return solution if parameters == solution.parameters else replace(solution, parameters=parameters)
 
 
 @dataclass(frozen=True, slots=True)
 class Ranking:
-    """The k best and what is known of all others.
+    """The k best solutions and a bound on all others.
 
     Attributes
     ----------
     solutions : list of Solution
         See ``kbest``.
     rest : float
-        No other solution costs less than this; ``inf``: there is no other.
+        Lower bound on the cost of all other solutions; ``inf`` if there is no other.
     columns : AllColumns
         The columns and their prices.
     """
@@ -126,7 +127,7 @@ class Ranking:
 
 
 def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run | None = None) -> Ranking:
-    """Return the k best together with a bound on the rest; a run that is under way has its own time limit."""
+    """Return the k best and a bound on the rest; a given run brings its own time limit."""
     started = time.perf_counter()
     run = run or Run(0, time_limit=checked_time_limit(time_limit), started=started)
     each = _SOLUTION + (_MEASUREMENT + 4 * problem.num_sensors) * int(problem.sizes.sum())
@@ -137,7 +138,7 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
     if problem.num_sensors == 2:
         columns, found = rank_two_sensors(problem, most, run)
     else:
-        # what stands for the best when time is over: the ascent would leave no time for it
+        # the fallback comes first: the ascent might leave no time for it
         prepare_fallback(packing, run)
         columns = price_all_columns(problem, run)
         found = Deepening(columns, most, run, ahead).run()
@@ -160,19 +161,19 @@ def rank(problem: AssignmentProblem, k: int, time_limit: float | None, run: Run 
             iterations=found.nodes,
             runtime=runtime,
             stopped_by=run.stopped_by or "converged",
-            parameters={"k": k, "rank": place + 1},
+            parameters={"k": k, "rank": index + 1},
             compile_time=compile_time,
         )
-        for place, (cost, indices) in enumerate(answers)
+        for index, (cost, indices) in enumerate(answers)
     ]
     return Ranking(solutions, rest, columns)
 
 
 def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:
-    """By how much rounding can have changed the sums that solutions of this weight are compared by.
+    """Bound the rounding errors of the sums by which solutions of this weight are compared.
 
-    Reduced costs are >= 0, so that the negative weights of a solution add up to no more than its multipliers do;
-    weights are differences of costs.
+    Reduced costs are >= 0, so that the magnitude of a solution's negative weights is bounded by that of its
+    multipliers; weights are differences of costs.
     """
     if not math.isfinite(weight):
         return 0.0
@@ -181,12 +182,12 @@ def _rounding(columns: AllColumns, prepared: Prepared, weight: float) -> float:
 
 
 def checked_k(k: object) -> int:
-    """Return a number of solutions wanted as an int.
+    """Return k as an int.
 
     Raises
     ------
     InvalidInputError
-        It is not a whole number >= 1.
+        ``k`` is not a whole number >= 1.
     """
     if not isinstance(k, (int, np.integer)) or isinstance(k, bool) or k < 1:
         raise InvalidInputError(f"k: expected a whole number >= 1, got {k!r}")
@@ -196,28 +197,28 @@ def checked_k(k: object) -> int:
 def _in_order(problem: AssignmentProblem, chosen: list[NDArray[np.intp]]) -> list[tuple[float, NDArray[np.intp]]]:
     """Cost and tuples in lexicographic order of each solution; solutions by cost, equal costs by tuples."""
     sizes = [indices.size for indices in chosen]
-    used, place = np.unique(np.concatenate(chosen), return_inverse=True)
+    used, index = np.unique(np.concatenate(chosen), return_inverse=True)
     order = np.lexsort(problem.tuples[used].T[::-1])
     rank_of = np.empty(used.size, dtype=np.intp)
     rank_of[order] = np.arange(used.size)
     owner = np.repeat(np.arange(len(chosen)), sizes)
-    ranks = rank_of[place]
+    ranks = rank_of[index]
     by_solution = np.split(ranks[np.lexsort((ranks, owner))], np.cumsum(sizes)[:-1])
     answers = []
-    for own in by_solution:
-        indices = used[order[own]]
-        answers.append((math.fsum(problem.costs[indices].tolist()), own.tolist(), indices))
+    for ordered in by_solution:
+        indices = used[order[ordered]]
+        answers.append((math.fsum(problem.costs[indices].tolist()), ordered.tolist(), indices))
     answers.sort(key=lambda answer: answer[:2])
     return [(cost, indices) for cost, _, indices in answers]
 
 
 def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
-    """Return the greedy solution, which a run on a large problem has made already, with a bound that is known.
+    """Return the greedy solution, which a run on a large problem has already made, with the bound given.
 
     Raises
     ------
     InfeasibleError
-        The greedy choice is a dead end (possible only without dummies), and no time is left to get out of it.
+        The greedy choice cannot be completed (possible only without dummies), and no time is left for a search.
     """
     prepared = prepare(problem)
     columns = run.fallback if run.fallback is not None else greedy_choice(prepared.packing, run)
@@ -229,7 +230,7 @@ def quick(problem: AssignmentProblem, bound: float, run: Run) -> Solution:
 def _unproved(
     problem: AssignmentProblem, bound: float, k: int, run: Run, columns: AllColumns, known: NDArray[np.int32] | None
 ) -> Solution:
-    """Return the best solution known when time was over before the best was proved."""
+    """Return the best solution known, where time ended before one was proved optimal."""
     if known is None:
         solution = quick(problem, bound, run)
     else:

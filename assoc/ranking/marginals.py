@@ -1,4 +1,4 @@
-"""Association probabilities of tuples, as intervals that hold."""
+"""Association probabilities of tuples, as guaranteed intervals."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # inverse temperatures at which the unseen weight is bounded
 _EXPONENTS = (1.0, 0.75, 0.5, 0.0)
-# a share of the weight that sums may lose in any case
+# share of the weight that sums may always lose to rounding
 _ROUNDING = 1e-12
 # a column this far above the solutions listed weighs nothing at any of these temperatures but the last, which counts
 _FAR = 4000.0
@@ -46,14 +46,14 @@ class Marginals(Shown):
     tuples : int32 array, shape (T, S)
         Every distinct tuple of the problem, false alarms (singletons) among them.
     probability : float array, shape (T,)
-        Share of the tuple's solutions in the weight of the k best of its cluster.
+        Weight of the solutions with this tuple, as a share of the k best of its cluster.
     lower, upper : float arrays, shape (T,)
-        The probability among all solutions lies between.
+        Bounds on the probability among all solutions.
     unseen : float
-        Share of the weight that solutions beyond the k best can have at most, in the cluster where that is
-        largest: the width of the widest interval.
+        Largest possible share of the weight of the solutions beyond the k best, over all clusters: the width of the
+        widest interval.
     listed : int
-        Solutions that were listed, of all clusters together.
+        Number of solutions listed, over all clusters.
     """
 
     tuples: NDArray[np.int32]
@@ -86,9 +86,9 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
         Costs are negative log likelihood ratios, so that a solution weighs exp(-cost).
     k : int, default 100
         Solutions to list for each cluster of tuples (``problem.components()``); clusters are independent, so
-        that k of each say more than any number of the whole.
+        that k of each give narrower intervals than k of the whole problem.
     time_limit : float, optional
-        Seconds for the rankings; with fewer solutions proved the intervals are wider.
+        Seconds for the rankings; the fewer solutions are proved, the wider the intervals.
 
     Raises
     ------
@@ -108,21 +108,21 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
 
         W(t) / (W + U)  <=  P(t)  <=  (W(t) + U) / (W + U),
 
-    and W(t) / W lies between. Two things are known of the others: their excess E over the dual bound is at
-    least d, where the ranking stopped; and Z(a), the sum of exp(-a E) over all solutions, is at most what
-    ``partition_function.log_partition`` says. For any a in [0, 1], since E >= d,
+    and W(t) / W lies between. The others are bounded by two facts: their excess E over the dual bound is at
+    least d, where the ranking stopped; and Z(a), the sum of exp(-a E) over all solutions, is at most
+    ``exp(partition_function.log_partition(...))``. For any a in [0, 1], since E >= d,
 
         sum_{others} exp(-E)  <=  exp(-(1 - a) d) ( Z(a) - sum_{k best} exp(-a E) ).
 
-    a = 1 is the plain partition function, a = 0 the number of solutions times the weight of the next; U is
-    the least of several.
+    a = 1 gives the plain partition function, a = 0 the number of solutions times the weight of the next one; U is
+    the least bound over several a.
     """
     checked_k(k)
     run = Run(0, time_limit=checked_time_limit(time_limit))
-    # what stands for clusters that there is no time for
+    # the fallback for clusters that there is no time for
     prepare_fallback(prepare(problem).packing, run)
-    tuples, place = distinct(problem.tuples)
-    # a ranking sorts its columns out before it looks at a clock, which takes about as long as all this did
+    tuples, index = distinct(problem.tuples)
+    # a ranking prepares its columns before it checks the clock, which takes about as long as all this did
     begin = run.elapsed() / max(problem.num_tuples, 1)
     probability, lower, upper = np.ones((3, len(tuples)))
     unseen, listed = 0.0, 0
@@ -130,16 +130,16 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
     for cluster, which in _clusters(problem):
         if run.should_stop() or run.remaining() < begin * len(which):
             unseen, listed = 1.0, listed + 1
-            _guess(problem, place[waiting], place, probability, lower, upper, run)
+            _guess(problem, index[waiting], index, probability, lower, upper, run)
             break
         waiting[which] = False
         # a cluster that is the whole problem has its greedy solution already
         clock = run if cluster is problem else Run(0, time_limit=run.time_limit, started=run.started)
-        own, share, count = _of_cluster(cluster, k, clock)
+        shares, share, count = _of_cluster(cluster, k, clock)
         listed += count
         unseen = max(unseen, share)
-        # tuples that are listed twice are one: each solution has it once, at whichever place
-        touched, total = _totals(place[which], own, len(tuples))
+        # a tuple that is listed twice is one tuple: each solution has it once, in either row
+        touched, total = _totals(index[which], shares, len(tuples))
         probability[touched] = np.minimum(total, 1.0)
         lower[touched] = probability[touched] * (1.0 - share)
         upper[touched] = np.minimum(lower[touched] + share, 1.0)
@@ -147,12 +147,12 @@ def marginals(problem: AssignmentProblem, k: int = 100, *, time_limit: float | N
 
 
 def _guess(
-    problem: AssignmentProblem, waiting: NDArray[np.int64], place: NDArray[np.int64], probability: Floats,
+    problem: AssignmentProblem, waiting: NDArray[np.int64], index: NDArray[np.int64], probability: Floats,
     lower: Floats, upper: Floats, run: Run,
 ) -> None:  # fmt: skip
-    """Fill in what is known of clusters when time is over: nothing; the greedy solution stands for the best."""
+    """Fill in the clusters not ranked when time is over: the greedy solution, with the interval [0, 1]."""
     chosen = np.zeros(probability.size)
-    chosen[place[_greedy(problem, run)]] = 1.0
+    chosen[index[_greedy(problem, run)]] = 1.0
     probability[waiting], lower[waiting], upper[waiting] = chosen[waiting], 0.0, 1.0
 
 
@@ -171,10 +171,10 @@ def _greedy(problem: AssignmentProblem, run: Run) -> NDArray[np.int64]:
 
 
 def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, NDArray[np.intp]]]:
-    """Independent clusters as problems of their own, small ones first, and the rows of their tuples.
+    """Independent clusters as separate problems, small ones first, and the rows of their tuples.
 
-    A single measurement that no tuple connects has nothing to decide and is left out. Without dummies the
-    measurements of the smallest sensor bind all clusters together.
+    A single measurement in no other tuple needs no decision and is left out. Without dummies the measurements of the
+    smallest sensor connect all clusters.
     """
     if not problem.dummy:
         yield problem, np.arange(problem.num_tuples)
@@ -189,41 +189,41 @@ def _clusters(problem: AssignmentProblem) -> Iterator[tuple[AssignmentProblem, N
             yield AssignmentProblem(np.stack(columns, axis=1), problem.costs[which], sizes), which
 
 
-def _totals(place: NDArray[np.int64], own: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
-    """Return which distinct tuples a cluster has, and the sums of what its tuples have."""
-    if 10 * place.size > num:
+def _totals(index: NDArray[np.int64], values: Floats, num: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return the distinct tuples of a cluster, and the sum of the values of each."""
+    if 10 * index.size > num:
         seen = np.zeros(num, dtype=bool)
-        seen[place] = True
+        seen[index] = True
         touched = np.flatnonzero(seen)
-        return touched, np.asarray(np.bincount(place, own, num), dtype=np.float64)[touched]
-    touched, number = np.unique(place, return_inverse=True)
-    return touched, np.asarray(np.bincount(number.reshape(-1), own), dtype=np.float64)
+        return touched, np.asarray(np.bincount(index, values, num), dtype=np.float64)[touched]
+    touched, number = np.unique(index, return_inverse=True)
+    return touched, np.asarray(np.bincount(number.reshape(-1), values), dtype=np.float64)
 
 
 def _of_cluster(problem: AssignmentProblem, k: int, run: Run) -> tuple[Floats, float, int]:
-    """Each tuple's share in the weight of the k best, the share of the unseen rest, and how many are listed."""
-    # one more than is listed: its cost bounds all that are not
+    """Each tuple's share in the weight of the k best, the share of the unseen rest, and the number listed."""
+    # rank one more than is listed: its cost bounds the rest
     ranking = rank(problem, k + 1, None, run)
     solutions = ranking.solutions[:k]
     rest = min([ranking.rest, *(solution.lower_bound for solution in ranking.solutions[k:])])
     cost_of = np.array([solution.cost for solution in solutions])
     weights = np.exp(cost_of.min() - cost_of)
     total = float(weights.sum())
-    own = np.zeros(problem.num_tuples)
+    weight_of = np.zeros(problem.num_tuples)
     for solution, weight in zip(solutions, weights, strict=True):
-        own[solution.indices] += weight
+        weight_of[solution.indices] += weight
     others = _others(problem, ranking.columns, cost_of, rest, run)
     share = others / (total + others) if others < np.inf else 1.0
-    # large costs are known to fewer digits than their differences need; below this the sums lose as much
+    # large costs have fewer exact digits than their differences need; sums lose as much as errors below this
     rounding = 2.0 * float(np.finfo(float).eps * np.abs(cost_of).max())
     if rounding > _ROUNDING:
         share = min(share + 4.0 * rounding, 1.0)
-    # what every listed solution has, it has with certainty up to the others; sums lose digits
-    return np.minimum(own / total, 1.0), share, len(solutions)
+    # the share of a tuple in every listed solution is 1, whatever rounding did to the sums
+    return np.minimum(weight_of / total, 1.0), share, len(solutions)
 
 
 def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, rest: float, run: Run) -> float:
-    """Bound the weight, relative to the best's, of all solutions but those listed; the others cost ``rest``."""
+    """Bound the weight, relative to the best's, of all unlisted solutions, each of which costs at least ``rest``."""
     if rest == np.inf:
         return 0.0
     bound = columns.bound + columns.offset
@@ -248,10 +248,10 @@ def _others(problem: AssignmentProblem, columns: AllColumns, listed: Floats, res
 
 
 def _rounding(problem: AssignmentProblem, columns: AllColumns, excess: float) -> float:
-    """How far the sum of a solution's reduced costs may be from its cost less the bound.
+    """Bound the difference between the sum of a solution's reduced costs and its cost less the bound.
 
-    Weights are differences of costs, and reduced costs are differences of weights: what they lose is a share of the
-    largest of them, however small the differences are. Columns far above the solutions listed do not count.
+    Weights are differences of costs, and reduced costs are differences of weights: their rounding error is a share of
+    the largest operand, however small the difference. Columns far above the solutions listed do not count.
     """
     near = columns.reduced <= excess + _FAR
     rows = max(columns.slack.size, 1)

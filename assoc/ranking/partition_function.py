@@ -5,18 +5,18 @@ its uncovered rows, all terms >= 0 (enumeration.py). For a temperature 1 / a
 
     Z(a) = sum over all x of exp(-a E(x))
 
-is a product over the components of the packing. Within a component every solution is found by going through
-the sensors in any order and choosing for each row what covers it, unless an earlier choice does:
+is a product over the components of the packing. Within a component every solution results from visiting the
+sensors in any order and choosing a column for each row that no earlier choice covers:
 
     Z(a) <= prod_r ( [r may stay uncovered] exp(a u_r) + sum of exp(-a rc_j) over the columns j that begin in r )
 
 where a column begins in its row of the first sensor in that order, and the first term is 1 for a row that a
-column beginning elsewhere can cover. The product also counts choices that do not fit together, so it is
-sharpened by deciding rows: of the parts so far the one with the largest product is split by the choices for
-one of its rows. With time enough nothing but solutions is left and the sum is exact.
+column beginning elsewhere can cover. The product also counts incompatible choices. To sharpen it, the part with
+the largest product is split by the choices for one of its rows, again and again. With enough time only solutions
+remain, and the sum is exact.
 
-The excess of every solution may be large, where the linear program is far from any: exp(-E) is then 0 in floating
-point, and yet it is all there is. Terms are therefore carried as logarithms wherever their sum would underflow.
+Where the linear program's bound is weak, every solution has a large excess and exp(-E) underflows. Terms are kept as
+logarithms wherever their sum would underflow.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ from assoc.ranking.columns import AllColumns
 
 # column visits for each component: about a tenth of a second in all for a hard one
 WORK = 20_000_000
-# parts below this share of what is known (a logarithm) are not split
+# parts below this share of the total (a logarithm) are not split
 _SMALL = -30.0
-# sums below have lost digits, or all, to underflow
+# sums below this have lost digits to underflow
 _TINY = 1e-280
 
 
@@ -81,11 +81,11 @@ def log_partition(
     a : float
         Inverse temperature >= 0; 0 counts the solutions.
     work : int
-        Column visits spent on each component.
+        Largest number of column visits for each component.
     deadline : float
-        After it, in seconds of `time.monotonic`, no component is sharpened: the bound holds, but is wide.
+        Time, in seconds of `time.monotonic`, after which no component is sharpened: the bound is valid, but weak.
     packing : Packing, optional
-        ``columns.keep(inf)``, where it is at hand.
+        ``columns.keep(inf)``, if already computed.
     """
     packing = packing or columns.keep(np.inf)
     log_weights = -a * columns.reduced[packing.origin]
@@ -93,7 +93,7 @@ def log_partition(
     log_alone[columns.slack] = -a * columns.slack_reduced[columns.slack]
     inside = np.zeros(columns.slack.size, dtype=bool)
     inside[packing.row_origin] = True
-    # a row without columns stays uncovered, at its price
+    # a row without columns stays uncovered
     total = float(log_alone[~inside & columns.slack].sum())
     log_alone = log_alone[packing.row_origin]
     for c in range(packing.num_components):
@@ -159,7 +159,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
         for x in range(row_ptr[row] - 1, row_ptr[row + 1]):
             j = -1
             if x < row_ptr[row]:
-                # to leave the row uncovered
+                # the choice to leave the row uncovered
                 if log_alone[row] == -np.inf:
                     continue
                 price = log_alone[row]
@@ -169,7 +169,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
                     continue
                 price = log_weights[j]
             if is_over(deadline):
-                # the part counts whole, beside those of its choices that are counted already: still a bound
+                # the whole part is added to those of its choices that are counted already: still an upper bound
                 largest, closed = _added(largest, closed, log_bound[node])
                 break
             if used == log_spent.size:
@@ -194,7 +194,7 @@ def _log_sum_of_solutions(terms: Terms, work: int, deadline: float) -> float:
     if closed == 0.0:
         return -np.inf
     result = min(top, largest + math.log(closed))
-    # sums of logarithms lose digits with their size, exp and log of many parts a few more
+    # the rounding of sums of logarithms grows with their size; exp and log of many parts lose a few digits more
     size_of_sums = abs(result) + 50.0 + num_rows * math.log(log_weights.size + 1.0)
     return result + 1e-11 + 4e-16 * (num_rows + 3) * size_of_sums
 
@@ -220,7 +220,7 @@ def _is_open(cols: Any, done: Any, j: int) -> bool:
 
 @inner_njit
 def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
-    """Return the least logarithm of the product (module's equation) over the cyclic orders of the sensors."""
+    """Return the least logarithm of the product (see the module) over the cyclic orders of the sensors."""
     cols, weights, alone = terms.cols, terms.weights, terms.alone
     num, num_sensors = cols.shape
     best = np.inf
@@ -256,7 +256,7 @@ def _log_product(terms: Terms, done: Any, factor: Floats, reach: Any) -> float:
 
 @inner_njit
 def _log_row(terms: Terms, done: Any, row: int, first: int) -> float:
-    """Logarithm of a row's sum where it underflows: the columns that begin in the row, and leaving it uncovered."""
+    """Logarithm of a row's sum where it underflows: over the columns that begin in it, and leaving it uncovered."""
     cols, num_sensors = terms.cols, terms.cols.shape[1]
     largest, total = _added(-np.inf, 0.0, terms.log_alone[row])
     for x in range(terms.row_ptr[row], terms.row_ptr[row + 1]):

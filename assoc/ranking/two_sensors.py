@@ -24,7 +24,7 @@ def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllC
     rows, weights, origin = distinct_columns(problem)
     slack = slack_of(problem)
     n, m = (int(size) for size in problem.sizes)
-    # Murty's rows are the sensor with fewer measurements: they have fewer choices to split by
+    # the rows are the sensor with fewer measurements: each node then has fewer children
     own, other = rows[:, 0], rows[:, 1] - np.int32(n)
     own_alone, other_alone = slack[:n], slack[n:]
     turned = n > m
@@ -41,7 +41,7 @@ def rank_two_sensors(problem: AssignmentProblem, k: int, run: Run) -> tuple[AllC
     prepared = prepare(problem)
     if not murty.feasible:
         raise infeasible(prepared.packing)
-    # shortest paths of some ten milliseconds between two looks at the clock
+    # shortest paths between two checks of the clock: some ten milliseconds
     turn = min(2000, max(1, 5_000_000 // max(weights.size, 1)))
     while not murty.done and not run.should_stop():
         murty.run(turn)

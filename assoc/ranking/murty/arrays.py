@@ -63,7 +63,7 @@ class Queues(NamedTuple):
     limits: NDArray[np.float64]
 
 
-class Taboo(NamedTuple):
+class Forbidden(NamedTuple):
     """Rows, columns and edges that a path must not use."""
 
     row: NDArray[np.bool_]
@@ -146,9 +146,9 @@ def index_edges(rows: Any, columns: Any, num_rows: int, num_columns: int, keep: 
 
 
 @inner_njit
-def new_taboo(graph: Graph) -> Taboo:
+def new_forbidden(graph: Graph) -> Forbidden:
     """Nothing is forbidden yet."""
-    return Taboo(
+    return Forbidden(
         np.zeros(graph.row_alone.size, np.bool_),
         np.zeros(graph.column_alone.size, np.bool_),
         np.zeros(graph.costs.size, np.bool_),

@@ -15,42 +15,42 @@ from assoc._system.compiled import inner_njit
 from assoc.packing.kernels.copying import copy_to
 from assoc.packing.kernels.heap import pop, push
 from assoc.packing.kernels.sorting import order_of
-from assoc.ranking.murty.arrays import ALONE, Graph, Nodes, PathWork, Queues, Taboo
+from assoc.ranking.murty.arrays import ALONE, Forbidden, Graph, Nodes, PathWork, Queues
 
 
 @inner_njit
-def set_taboo(graph: Graph, nodes: Nodes, taboo: Taboo, parent: int, place: int, on: bool) -> None:
+def set_forbidden(graph: Graph, nodes: Nodes, forbidden: Forbidden, parent: int, place: int, on: bool) -> None:
     """Mark or unmark what the child at index ``place`` must not use: its fixed rows and its forbidden edges."""
     for t in range(place):
         r = nodes.order[parent, t]
-        taboo.row[r] = on
+        forbidden.row[r] = on
         if nodes.edge_of[parent, r] >= 0:
-            taboo.column[graph.columns[nodes.edge_of[parent, r]]] = on
+            forbidden.column[graph.columns[nodes.edge_of[parent, r]]] = on
     own = nodes.edge_of[parent, nodes.order[parent, place]]
     if own >= 0:
-        taboo.edge[own] = on
+        forbidden.edge[own] = on
     if place == nodes.fixed[parent]:
-        forbidden = nodes.forbidden
+        links = nodes.forbidden
         node = parent
-        while node >= 0 and forbidden[node, 1] != -1:
+        while node >= 0 and links[node, 1] != -1:
             # an entry is 2 + edge, so that 1 stands for staying unmatched
-            if forbidden[node, 1] >= 2:
-                taboo.edge[forbidden[node, 1] - 2] = on
-            node = forbidden[node, 0]
+            if links[node, 1] >= 2:
+                forbidden.edge[links[node, 1] - 2] = on
+            node = links[node, 0]
 
 
 @inner_njit
 def may_stay_alone(graph: Graph, nodes: Nodes, parent: int, row: int) -> bool:
     """Whether the child of ``row`` may leave that row unmatched."""
-    order, fixed, forbidden = nodes.order, nodes.fixed, nodes.forbidden
+    order, fixed, links = nodes.order, nodes.fixed, nodes.forbidden
     if not graph.row_alone[row] or nodes.edge_of[parent, row] == ALONE:
         return False
     if fixed[parent] < order.shape[1] and order[parent, fixed[parent]] == row:
         node = parent
-        while node >= 0 and forbidden[node, 1] != -1:
-            if forbidden[node, 1] == 1:
+        while node >= 0 and links[node, 1] != -1:
+            if links[node, 1] == 1:
                 return False
-            node = forbidden[node, 0]
+            node = links[node, 0]
     return True
 
 
@@ -72,13 +72,13 @@ def _relax(work: PathWork, size: int, num_reached: int, item: int, value: float,
 
 @inner_njit
 def search_path(
-    graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, parent: int, row: int, alone: bool, limit: float
+    graph: Graph, nodes: Nodes, forbidden: Forbidden, work: PathWork, parent: int, row: int, alone: bool, limit: float
 ) -> Any:
     """Dijkstra from a row to what its parent matched it to; length (inf: above the limit), reached, tree."""
     costs, columns, row_ptr, row_edges = graph.costs, graph.columns, graph.row_ptr, graph.row_edges
     row_alone, column_alone = graph.row_alone, graph.column_alone
     edge_of, row_of, u, v = nodes.edge_of, nodes.row_of, nodes.u, nodes.v
-    taboo_row, taboo_column, taboo_edge = taboo
+    forbidden_row, forbidden_column, forbidden_edge = forbidden
     distance, _, _, closed, _, tree_row, tree_distance, queue_key, queue_item = work
     dummy = column_alone.size
     own = edge_of[parent, row]
@@ -95,7 +95,7 @@ def search_path(
             for x in range(row_ptr[i], row_ptr[i + 1]):
                 e = row_edges[x]
                 j = columns[e]
-                if taboo_column[j] or (i == row and taboo_edge[e]):
+                if forbidden_column[j] or (i == row and forbidden_edge[e]):
                     continue
                 value = d + max(0.0, costs[e] - u[parent, i] - v[parent, j])
                 if value <= limit:
@@ -123,12 +123,12 @@ def search_path(
             i = item - dummy - 1
         elif item == dummy:
             for j in range(dummy):
-                if column_alone[j] and not taboo_column[j] and row_of[parent, j] != ALONE:
+                if column_alone[j] and not forbidden_column[j] and row_of[parent, j] != ALONE:
                     value = d + max(0.0, z - v[parent, j])
                     if value <= limit:
                         size, num_reached = _relax(work, size, num_reached, j, value, -1, -1)
             for r in range(row_alone.size):
-                if edge_of[parent, r] == ALONE and not taboo_row[r] and r != row:
+                if edge_of[parent, r] == ALONE and not forbidden_row[r] and r != row:
                     value = d + max(0.0, u[parent, r] + z)
                     if value <= limit:
                         size, num_reached = _relax(work, size, num_reached, dummy + 1 + r, value, -1, -1)
@@ -151,15 +151,15 @@ def clear(work: PathWork, num_reached: int) -> None:
 
 @inner_njit
 def make_node(
-    graph: Graph, nodes: Nodes, taboo: Taboo, work: PathWork, node: int, parent: int, place: int, alone: bool
+    graph: Graph, nodes: Nodes, forbidden: Forbidden, work: PathWork, node: int, parent: int, place: int, alone: bool
 ) -> None:
     """Turn a child into a node: its solution and the multipliers that prove it the best of its kind."""
     columns = graph.columns
-    edge_of, row_of, u, v, order, fixed, forbidden, node_cost = nodes
+    edge_of, row_of, u, v, order, fixed, links, node_cost = nodes
     distance, previous, previous_row, closed, reached, tree_row, tree_distance, _, _ = work
     dummy = graph.column_alone.size
     row = order[parent, place]
-    length, num_reached, num_tree = search_path(graph, nodes, taboo, work, parent, row, alone, np.inf)
+    length, num_reached, num_tree = search_path(graph, nodes, forbidden, work, parent, row, alone, np.inf)
     copy_to(edge_of[node], edge_of[parent])
     copy_to(row_of[node], row_of[parent])
     copy_to(u[node], u[parent])
@@ -167,8 +167,8 @@ def make_node(
     copy_to(order[node], order[parent])
     fixed[node] = place
     own = edge_of[parent, row]
-    forbidden[node, 0] = parent if place == fixed[parent] else -1
-    forbidden[node, 1] = own + 2 if own >= 0 else 1
+    links[node, 0] = parent if place == fixed[parent] else -1
+    links[node, 1] = own + 2 if own >= 0 else 1
     node_cost[node] = node_cost[parent] + length
     for t in range(num_tree):
         u[node, tree_row[t]] += length - tree_distance[t]
@@ -195,48 +195,48 @@ def make_node(
 
 
 @inner_njit
-def open_children(graph: Graph, nodes: Nodes, taboo: Taboo, queues: Queues, node: int, worst: float) -> None:
+def open_children(graph: Graph, nodes: Nodes, forbidden: Forbidden, queues: Queues, node: int, worst: float) -> None:
     """Queue the children of a node by their bounds."""
     columns, row_alone = graph.columns, graph.row_alone
     edge_of, order, fixed, node_cost = nodes.edge_of, nodes.order, nodes.fixed, nodes.cost
-    taboo_row, taboo_column, counts, limits = taboo.row, taboo.column, queues.counts, queues.limits
+    forbidden_row, forbidden_column, counts, limits = forbidden.row, forbidden.column, queues.counts, queues.limits
     num_rows = row_alone.size
     first = fixed[node]
     for t in range(first):
         r = order[node, t]
-        taboo_row[r] = True
+        forbidden_row[r] = True
         if edge_of[node, r] >= 0:
-            taboo_column[columns[edge_of[node, r]]] = True
+            forbidden_column[columns[edge_of[node, r]]] = True
     if first < num_rows:
         # the row with forbidden edges stays first, so that all other children have it fixed
         start = first + 1 if first > 0 or node > 0 else first
         bounds = np.empty(num_rows - start)
         for t in range(start, num_rows):
-            bounds[t - start] = -_way_round(graph, nodes, taboo, node, order[node, t])
+            bounds[t - start] = -_way_round(graph, nodes, forbidden, node, order[node, t])
         copy_to(order[node, start:], order[node, start:][order_of(bounds)])
     for t in range(first, num_rows):
         r = order[node, t]
-        bound = node_cost[node] + _way_round(graph, nodes, taboo, node, r)
+        bound = node_cost[node] + _way_round(graph, nodes, forbidden, node, r)
         if bound <= worst:
             if bound < np.inf:
                 push(queues.key, queues.item, counts[1], bound, (np.int64(node) * num_rows + t) << 1)
                 counts[1] += 1
         else:
             limits[0] = min(limits[0], worst)
-        taboo_row[r] = True
+        forbidden_row[r] = True
         if edge_of[node, r] >= 0:
-            taboo_column[columns[edge_of[node, r]]] = True
+            forbidden_column[columns[edge_of[node, r]]] = True
     for r in range(num_rows):
-        taboo_row[r] = False
-    taboo_column[:] = False
+        forbidden_row[r] = False
+    forbidden_column[:] = False
 
 
 @inner_njit
-def _way_round(graph: Graph, nodes: Nodes, taboo: Taboo, node: int, row: int) -> float:
+def _way_round(graph: Graph, nodes: Nodes, forbidden: Forbidden, node: int, row: int) -> float:
     """Return a bound on any path from a row to what it is matched to: the first step and the last."""
     costs, rows, columns, row_alone, column_alone, row_ptr, row_edges, column_ptr, column_edges = graph
     edge_of, u, v = nodes.edge_of, nodes.u, nodes.v
-    taboo_row, taboo_column = taboo.row, taboo.column
+    forbidden_row, forbidden_column = forbidden.row, forbidden.column
     own = edge_of[node, row]
     z = v[node, column_alone.size]
     out = np.inf
@@ -244,7 +244,7 @@ def _way_round(graph: Graph, nodes: Nodes, taboo: Taboo, node: int, row: int) ->
         out = max(0.0, -u[node, row] - z)
     for x in range(row_ptr[row], row_ptr[row + 1]):
         e = row_edges[x]
-        if e != own and not taboo_column[columns[e]]:
+        if e != own and not forbidden_column[columns[e]]:
             out = min(out, max(0.0, costs[e] - u[node, row] - v[node, columns[e]]))
     if own < 0:
         return out + max(0.0, u[node, row] + z)
@@ -254,6 +254,6 @@ def _way_round(graph: Graph, nodes: Nodes, taboo: Taboo, node: int, row: int) ->
     into = max(0.0, z - v[node, column]) if column_alone[column] else np.inf
     for x in range(column_ptr[column], column_ptr[column + 1]):
         e = column_edges[x]
-        if e != own and not taboo_row[rows[e]]:
+        if e != own and not forbidden_row[rows[e]]:
             into = min(into, max(0.0, costs[e] - u[node, rows[e]] - v[node, column]))
     return out + into

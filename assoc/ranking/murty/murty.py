@@ -34,14 +34,14 @@ from assoc.ranking.murty.arrays import (
     Nodes,
     Queues,
     index_edges,
+    new_forbidden,
     new_nodes,
     new_path_work,
     new_queues,
-    new_taboo,
     twice,
     with_edges,
 )
-from assoc.ranking.murty.children import clear, make_node, may_stay_alone, open_children, search_path, set_taboo
+from assoc.ranking.murty.children import clear, make_node, may_stay_alone, open_children, search_path, set_forbidden
 
 
 class Murty:
@@ -80,7 +80,7 @@ class Murty:
             self._least = float(self._nodes.cost[0])
             self._reduced = costs - self._nodes.u[0, rows] - self._nodes.v[0, columns]
             self._tolerance = 1e-9 * (abs(self._least) + float(np.abs(costs).max(initial=0.0)))
-            self._place = 2 * k
+            self._num_deviations = 2 * k
             self._begin()
 
     @property
@@ -119,7 +119,7 @@ class Murty:
         target = self.evaluations + evaluations
         while not self.done and self.evaluations < target:
             if self._queues.counts[1] == 0:
-                self._place *= 2
+                self._num_deviations *= 2
                 self._begin()
             self._grow()
             self._drop_edges()
@@ -139,8 +139,8 @@ class Murty:
     def _begin(self) -> None:
         """Restart from the best solution, searching only for solutions of a limited excess over it."""
         self._excess = np.inf
-        if self._place < self._reduced.size:
-            self._excess = float(np.partition(self._reduced, self._place)[self._place])
+        if self._num_deviations < self._reduced.size:
+            self._excess = float(np.partition(self._reduced, self._num_deviations)[self._num_deviations])
         queues = self._queues
         queues.limits[:] = self._least + self._excess
         queues.counts[:3] = 0, 1, 1
@@ -204,7 +204,7 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
     num_rows = graph.row_alone.size
     node_cost = nodes.cost
     heap_key, heap_item, best, best_item, counts, limits = queues
-    taboo = new_taboo(graph)
+    forbidden = new_forbidden(graph)
     work = new_path_work(graph)
     stop = counts[3] + evaluations
     while counts[1] > 0 and counts[0] < min(k, node_cost.size) and counts[3] < stop:
@@ -226,11 +226,11 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
             parent = (item >> 1) // num_rows
             row = nodes.order[parent, place]
             alone = may_stay_alone(graph, nodes, parent, row)
-            set_taboo(graph, nodes, taboo, parent, place, True)
+            set_forbidden(graph, nodes, forbidden, parent, place, True)
             if exact == 0:
                 counts[3] += 1
                 length, num_reached, _ = search_path(
-                    graph, nodes, taboo, work, parent, row, alone, worst - node_cost[parent]
+                    graph, nodes, forbidden, work, parent, row, alone, worst - node_cost[parent]
                 )
                 clear(work, num_reached)
                 if length < np.inf:
@@ -248,11 +248,11 @@ def _advance(graph: Graph, nodes: Nodes, queues: Queues, k: int, evaluations: in
                     limits[0] = min(limits[0], worst)
             else:
                 node = counts[0]
-                make_node(graph, nodes, taboo, work, node, parent, place, alone)
-            set_taboo(graph, nodes, taboo, parent, place, False)
+                make_node(graph, nodes, forbidden, work, node, parent, place, alone)
+            set_forbidden(graph, nodes, forbidden, parent, place, False)
             if exact == 0:
                 continue
         counts[0] += 1
         # also those of the k-th solution: their costs bound the rest
         worst = min(limits[1], -best[0] if counts[2] >= k else np.inf)
-        open_children(graph, nodes, taboo, queues, node, worst)
+        open_children(graph, nodes, forbidden, queues, node, worst)

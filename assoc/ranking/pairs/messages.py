@@ -35,34 +35,34 @@ _ROUNDS, _SETTLED = 200, 1e-10
 
 
 @njit
-def next_round(graph: PairGraph, log_weight: Floats, heard: Floats, said: Floats) -> None:
+def next_round(graph: PairGraph, log_weight: Floats, incoming: Floats, outgoing: Floats) -> None:
     """Compute all outgoing messages from the incoming ones."""
     ptr, edge, mate = graph.ptr, graph.edge, graph.mate
     for v in range(ptr.size - 1):
         for x in range(ptr[v], ptr[v + 1]):
-            said[x] = -_log_one_and(ptr[v], ptr[v + 1], x, edge, mate, log_weight, heard)
+            outgoing[x] = -_log_one_and(ptr[v], ptr[v + 1], x, edge, mate, log_weight, incoming)
 
 
 @njit
-def _log_one_and(first: int, last: int, but: int, edge: Any, mate: Any, log_weight: Floats, heard: Floats) -> float:
+def _log_one_and(first: int, last: int, but: int, edge: Any, mate: Any, log_weight: Floats, incoming: Floats) -> float:
     """ln(1 + sum of weight times incoming message) over a vertex' edges except ``but``."""
     top = 0.0
     for y in range(first, last):
         if y != but:
-            top = max(top, log_weight[edge[y]] + heard[mate[y]])
+            top = max(top, log_weight[edge[y]] + incoming[mate[y]])
     total = math.exp(-top)
     for y in range(first, last):
         if y != but:
-            total += math.exp(log_weight[edge[y]] + heard[mate[y]] - top)
+            total += math.exp(log_weight[edge[y]] + incoming[mate[y]] - top)
     return top + math.log(total)
 
 
 @njit
 def log_bounds(graph: PairGraph, log_weight: Floats) -> tuple[Floats, Floats]:
     """Lower and upper bounds on the logarithm of each pair's probability."""
-    heard = np.zeros(graph.edge.size)
-    low, high = np.empty(heard.size), np.empty(heard.size)
-    next_round(graph, log_weight, heard, low)
+    incoming = np.zeros(graph.edge.size)
+    low, high = np.empty(incoming.size), np.empty(incoming.size)
+    next_round(graph, log_weight, incoming, low)
     next_round(graph, log_weight, low, high)
     next_round(graph, log_weight, high, low)
     lower, upper = np.full(log_weight.size, -np.inf), np.zeros(log_weight.size)
@@ -75,10 +75,10 @@ def log_bounds(graph: PairGraph, log_weight: Floats) -> tuple[Floats, Floats]:
 
 
 @njit
-def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, heard_there: float, heard: Floats) -> float:
+def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, incoming_here: float, incoming: Floats) -> float:
     """Log probability of the pair at index x of vertex v, from its incoming message and those of v's other edges."""
-    others = _log_one_and(graph.ptr[v], graph.ptr[v + 1], x, graph.edge, graph.mate, log_weight, heard)
-    own = log_weight[graph.edge[x]] + heard_there
+    others = _log_one_and(graph.ptr[v], graph.ptr[v + 1], x, graph.edge, graph.mate, log_weight, incoming)
+    own = log_weight[graph.edge[x]] + incoming_here
     top = max(own, others)
     return own - top - math.log(math.exp(own - top) + math.exp(others - top))
 
@@ -86,13 +86,13 @@ def _log_share(graph: PairGraph, v: int, x: int, log_weight: Floats, heard_there
 @njit
 def log_beliefs(graph: PairGraph, log_weight: Floats) -> Floats:
     """Messages of belief propagation, one for each end of each edge."""
-    heard, said = np.zeros(graph.edge.size), np.zeros(graph.edge.size)
+    incoming, outgoing = np.zeros(graph.edge.size), np.zeros(graph.edge.size)
     for _ in range(_ROUNDS):
-        next_round(graph, log_weight, heard, said)
-        next_round(graph, log_weight, said, heard)
-        if np.abs(heard - said).max() < _SETTLED:
+        next_round(graph, log_weight, incoming, outgoing)
+        next_round(graph, log_weight, outgoing, incoming)
+        if np.abs(incoming - outgoing).max() < _SETTLED:
             break
-    return heard
+    return incoming
 
 
 def log_dropped(graph: PairGraph, log_weight: Floats, kept: Array, beliefs: Floats) -> tuple[Floats, Floats]:

@@ -24,7 +24,7 @@ from assoc.ranking.pairs.graph import PairGraph
 OPEN, PAIR, CLOSE = 0, 1, 2
 """Kinds of steps."""
 DONE = -1
-"""Bit of a vertex that is closed."""
+"""Marks a closed vertex."""
 _LARGE = 1e150
 
 
@@ -32,11 +32,11 @@ class Work(NamedTuple):
     """Buffers for planning a sweep, one number for each vertex."""
 
     left: Any
-    """Edges before the sweep."""
+    """Edges not processed yet."""
     place: Any
-    """1 + the bit of an open vertex in the table's index; 0 before it is opened, DONE afterwards."""
+    """1 + the bit of an open vertex in the table's index; 0 before it is opened, DONE after it is closed."""
     near: Any
-    """Whether it or a neighbour is open."""
+    """Whether the vertex or a neighbour is open."""
 
 
 @njit
