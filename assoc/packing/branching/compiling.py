@@ -1,4 +1,4 @@
-"""What hard problems need of branch and bound, compiled before they need it, most of it by another process."""
+"""Compile branch and bound ahead of time for hard problems, most of it in another process."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from assoc.packing.simplex.dual import Effort
 
 
 def compile_branching_ahead(*, surely: bool) -> None:
-    """Have the search compiled by another process, where it is not compiled yet.
+    """Compile the search in another process, unless it is compiled already.
 
-    Where it will surely be needed this process compiles the trials of pairs meanwhile: the other one takes longer than
-    what this one has to compile before its first search, and comes to the trials when they are in the cache.
+    If ``surely``, this process compiles the trials of pairs meanwhile: the other process takes longer than this one
+    needs before its first search, and finds the trials in the cache.
     """
     if compile_ahead(search_depth_first, compile_branching) and surely:
         _compile_trials()
 
 
 def compile_all_branching_ahead() -> None:
-    """Have it compiled with what searches to the end need besides, and also where nothing is to be interpreted."""
+    """Compile in another process also what searches to the end need, and even where kernels are not interpreted."""
     compile_ahead(search_depth_first, compile_all_branching, anyway=True)
 
 
 def compile_branching() -> None:
-    """Compile the search, on three measurements of which each two could be one target."""
+    """Compile the search, on three measurements any two of which could be one target."""
     _on_three(to_the_end=False)
 
 
 def compile_all_branching() -> None:
-    """Compile the search, and the cuts of its root: the three measurements are an odd set, of which one is cut off."""
+    """Compile the search and the cuts of its root: the three measurements are an odd set with a violated cut."""
     compile_branching()
     _on_three(to_the_end=True)
 

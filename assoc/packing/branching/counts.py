@@ -1,16 +1,16 @@
-"""The root of a branch and bound split on counts: how many columns have q rows, how many rows are left uncovered.
+"""Split the root of a branch and bound on counts: how many columns have q rows, how many rows are uncovered.
 
 Where the linear program's bound is far from the optimum it mixes solutions of different kinds: 38.8 targets seen by all
-sensors, say. No pair of measurements says much about that number, but *at most 38* and *at least 39* raise the bound at
-once, each in a program of its own. What is split so are the *leaves*, each of which is then searched as a root. A tree
-grows about like the sixth power of the gap between bound and aim, so that it can be told which split pays.
+sensors, say. No pair of measurements has much influence on that number, but *at most 38* and *at least 39*, each in a
+separate program, raise the bound at once. Each *leaf* of these splits is then searched as a root. A tree grows roughly
+with the sixth power of the gap between bound and aim, which predicts whether a split pays.
 
-The linear program gets two rows and one column for a count c, which is to be within l .. h:
+For a count c in the range l .. h the linear program gets two rows and one column:
 
     c + z = h,     z + s = h - l,     z >= 0, s >= 0.
 
-All coefficients are whole and none is negative, as everywhere in the program; only the right-hand sides differ from
-leaf to leaf. The column z has no row of measurements and weighs nothing: greedy solutions and pairs pass it over.
+All coefficients are whole numbers >= 0, as everywhere in the program; only the right-hand sides differ between
+leaves. The column z has no measurements and weight 0: greedy solutions and pairs ignore it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from assoc.packing.simplex.basis import basis_of, primal_values
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Program, all_allowed, certified, make_feasible, weight_limit
 
-# leaves at the most; the power of the gap by which trees grow; the share of its tree at which a leaf is split
+# most leaves; the power of the gap by which trees grow; the share of its tree at which a leaf is split
 _LEAVES = 16
 _POWER = 6.0
 _PAYS = 0.9
@@ -39,14 +39,14 @@ _WHOLE = 1e-6
 
 
 class Leaf(NamedTuple):
-    """One part of the solutions.
+    """A part of the solutions.
 
     Attributes
     ----------
     root : Root
-        Its linear program, and where its search begins.
+        Its linear program, and the start of its search.
     bound : float
-        No solution of this part weighs less.
+        Lower bound on the solutions of this part.
     """
 
     root: Root
@@ -59,9 +59,9 @@ class _Counts(NamedTuple):
     Attributes
     ----------
     times : int32 array, shape (C, N)
-        What each column adds to each count.
+        Contribution of each column to each count.
     least, most : int64 arrays, shape (C,)
-        The range, both ends included.
+        The ranges, both ends included.
     """
 
     times: NDArray[np.int32]
@@ -69,13 +69,13 @@ class _Counts(NamedTuple):
     most: NDArray[np.int64]
 
     def within(self, k: int, least: int, most: int) -> _Counts:
-        """These with another range of count k."""
+        """The same counts with another range of count k."""
         least_of, most_of = self.least.copy(), self.most.copy()
         least_of[k], most_of[k] = least, most
         return self._replace(least=least_of, most=most_of)
 
     def only(self, which: NDArray[np.bool_]) -> _Counts:
-        """Some of them."""
+        """The counts of a mask."""
         return _Counts(self.times[which], self.least[which], self.most[which])
 
     def sides(self) -> Floats:
@@ -84,7 +84,7 @@ class _Counts(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A leaf, the ranges that it is, and the LP's values of the counts (none where it is not solved)."""
+    """A leaf, its ranges, and the LP's values of the counts (empty if it is not solved)."""
 
     leaf: Leaf
     counts: _Counts
@@ -92,26 +92,26 @@ class _Part(NamedTuple):
 
 
 def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, deadline: float) -> list[Leaf]:
-    """Parts of the solutions that hold every one below the cutoff, each with a program of its own.
+    """Split the solutions below the cutoff into parts, each with its own program.
 
     Parameters
     ----------
     packing : Packing
         One component.
     root : Root
-        Of all solutions.
+        The root of all solutions.
     cutoff : float
-        Nothing that weighs as much is looked for.
+        Only solutions of less weight are searched for.
     goal : float
-        What is to be shown first is that nothing weighs less; a split pays that makes this easier.
+        The bound to prove first; a split pays if it makes that easier.
     deadline : float
-        When time is over (clock.py).
+        Time limit (clock.py).
 
     Returns
     -------
     list of Leaf
-        Those whose bound is below the cutoff; programs differ in their right-hand sides alone. A split that does not
-        pay leaves one, of all solutions, with the program as it was.
+        The leaves whose bound is below the cutoff; their programs differ only in the right-hand sides. If no split
+        pays, one leaf of all solutions, with the program unchanged.
     """
     everything = _counts_of(packing)
     counted = _Counted(root, everything, cutoff, deadline)
@@ -119,31 +119,31 @@ def split_on_counts(packing: Packing, root: Root, cutoff: float, goal: float, de
     used = np.zeros(len(everything.times), dtype=np.bool_)
     for part in parts:
         used |= (part.counts.least > everything.least) | (part.counts.most < everything.most)
-    # the rows of counts that no leaf is about would only make programs larger
+    # rows of counts that no leaf restricts would only make programs larger
     counted = _Counted(root, everything.only(used), cutoff, deadline)
     leaves = []
     for part in parts:
         if is_over(deadline):
-            # each takes a factorisation; those of before hold as well
+            # each takes a factorisation; the earlier bounds are valid, too
             leaves = [part.leaf for part in parts]
             break
         again = counted.part(part.counts.only(used)).leaf
-        # a second solution may stop short of the first one's bound
+        # a second solution of the program may end below the first one's bound
         leaves.append(again._replace(bound=max(again.bound, part.leaf.bound)))
     return [leaf for leaf in leaves if leaf.bound < counted.effort.cutoff]
 
 
 def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None) -> tuple[OpenNodes, Work]:
-    """The open nodes of a leaf, which are its root alone, and room for its search.
+    """The open nodes of a leaf, at first only its root, and the buffers of its search.
 
     Parameters
     ----------
     packing : Packing
     leaf : Leaf
     given_up : float
-        What the open nodes before say of nodes that were given up.
+        Lower bound on the nodes given up so far.
     work : Work or None
-        The room of the search before, which is used again where it fits.
+        The buffers of the search before, reused where they fit.
     """
     root, program = leaf.root, leaf.root.program
     nodes = OpenNodes(root)
@@ -152,15 +152,15 @@ def begin_leaf(packing: Packing, leaf: Leaf, given_up: float, work: Work | None)
     if work is None or work.program.rows is not program.rows:
         new = new_work(_with_counts(packing.arrays, program), program, root.slack)
         if work is not None:
-            # what is known of pairs stays true
+            # pseudo-costs of pairs stay valid
             new = knowing(new, work.trials)
         work = new
-    # the programs of one split differ in their right-hand sides alone
+    # the programs of one split differ only in their right-hand sides
     return nodes, work._replace(program=program)
 
 
 def _with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
-    """The packing with the further columns of a program: they have no rows and weigh nothing."""
+    """The packing with the additional columns of a program: they have no rows and weight 0."""
     more = program.weights.size - arrays.weights.size
     return arrays._replace(
         cols=np.concatenate([arrays.cols, np.full((more, arrays.cols.shape[1]), -1, dtype=np.int32)]),
@@ -169,12 +169,12 @@ def _with_counts(arrays: PackingArrays, program: Program) -> PackingArrays:
 
 
 def most_rows(packing: Packing) -> float:
-    """Rows of a packing's program with all the cuts and counts that it may have."""
+    """Rows of a packing's program with the most cuts and counts."""
     return MOST_ROWS * packing.num_rows + 2 * (packing.num_sensors + 1)
 
 
 def _counts_of(packing: Packing) -> _Counts:
-    """Columns with q rows, for every q of two and more, columns with two and more, rows that are covered."""
+    """Counts of columns with q rows for every q >= 2, of columns with two rows or more, and of covered rows."""
     sizes = (packing.cols >= 0).sum(axis=1)
     rows = packing.num_rows
     present = [int(q) for q in np.unique(sizes) if q >= 2]
@@ -189,7 +189,7 @@ def _counts_of(packing: Packing) -> _Counts:
 
 
 class _Counted:
-    """The program of a root with rows for counts, solved for any ranges of these."""
+    """The program of a root with rows for counts, solved for any ranges of the counts."""
 
     def __init__(self, root: Root, counts: _Counts, cutoff: float, deadline: float) -> None:
         self._sets = root.sets
@@ -204,7 +204,7 @@ class _Counted:
         )
 
     def part(self, counts: _Counts, start: _Part | None = None) -> _Part:
-        """Solve the program for these ranges, from the basis of another part."""
+        """Solve the program for these ranges, from the basis of another part if given."""
         sides = np.concatenate([self._program.sides[: self._size], counts.sides()])
         program = self._program._replace(sides=sides)
         allowed = all_allowed(program, self._slack)
@@ -224,7 +224,7 @@ class _Counted:
 
 
 def _split(counted: _Counted, counts: _Counts, goal: float) -> list[_Part]:
-    """Split the least bound again and again, as long as that pays."""
+    """Split the part of least bound repeatedly, as long as that pays."""
     waiting = [counted.part(counts)]
     settled: list[_Part] = []
     while waiting and len(waiting) + len(settled) < _LEAVES and not is_over(counted.effort.deadline):
@@ -238,7 +238,7 @@ def _split(counted: _Counted, counts: _Counts, goal: float) -> list[_Part]:
 
 
 def _best_split(counted: _Counted, part: _Part, goal: float) -> list[_Part] | None:
-    """Both sides of the count that leaves the smallest trees; None: no split pays."""
+    """Both sides of the split that leaves the smallest trees; None if no split pays."""
     bound = part.leaf.bound
     if part.values is None or bound >= goal:
         return None

@@ -1,7 +1,7 @@
-"""The kernel of branch and bound: nodes from the top of a stack, until none is left or the limits are reached.
+"""The kernel of branch and bound: takes nodes from a stack until it is empty or a limit is reached.
 
-At each node: its linear program, a solution rounded from that, and a pair to branch on. What the linear program alone
-decides, columns and sides of pairs, is taken at once.
+At each node it solves the linear program, rounds its solution, and chooses a pair to branch on. Columns and sides of
+pairs that the linear program alone excludes are dropped at once.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from assoc.packing.simplex.program import Allowed
 
 
 class Limits(NamedTuple):
-    """What is looked for, and when a search stops.
+    """Which solutions to search for, and when to stop.
 
     Attributes
     ----------
     tolerance : float
-        How much better than the incumbent a solution must be.
+        Least improvement on the incumbent.
     aim : float
-        The weight below which it must be.
+        Weight below which solutions must be.
     nodes : int
-        Nodes at the most.
+        Most nodes.
     deadline : float
-        When time is over, by the kernels' clock (clock.py).
+        Time limit by the kernels' clock (clock.py).
     """
 
     tolerance: float
@@ -44,7 +44,7 @@ class Limits(NamedTuple):
 
 @inner_njit
 def _greedy(work: Work, allowed: Allowed) -> Any:
-    """Take columns by ``key`` while they fit; the weight (inf when a duty is left) and their number."""
+    """Take columns by ``key`` while they fit; the weight (inf if a row without slack stays uncovered), the number."""
     cols, weights, trial, active, slack = work.cols, work.weights, work.trial, allowed.active, allowed.slack
     covered = np.zeros(trial.size, np.bool_)
     weight = 0.0
@@ -75,7 +75,7 @@ def _greedy(work: Work, allowed: Allowed) -> Any:
 
 @inner_njit
 def _by_values(work: Work, allowed: Allowed) -> bool:
-    """Lower the keys by the LP's values, so that these decide first; whether all of them are whole numbers."""
+    """Lower the keys by the LP's values, so that large values come first; whether all are whole numbers."""
     in_basis, values, active, key = work.basis.place, work.basis.values, allowed.active, work.key
     whole = True
     for a in range(active.size):
@@ -89,7 +89,7 @@ def _by_values(work: Work, allowed: Allowed) -> bool:
 
 @search_njit
 def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float, limits: Limits) -> Any:
-    """Search depth first; the number of open nodes, the incumbent's weight, its number of columns, the nodes done.
+    """Search depth first; the number of open nodes, the incumbent's weight and number of columns, the nodes done.
 
     Stops early with nodes open when there is no room left for two children, or time is over.
     """
@@ -97,7 +97,7 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
     cols, program, basis, trials = work.cols, work.program, work.basis, work.trials
     count_found = -1
     nodes = 0
-    # the node whose basis is at work
+    # the node whose basis is loaded
     at_work = -1
     while num_open > 0 and nodes < node_limit:
         top = num_open - 1
@@ -105,7 +105,7 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
         if lower >= min(incumbent - tolerance, aim):
             num_open = top
             continue
-        # what holds nothing better needs no room: given up for want of it, it would end the passes
+        # pruned nodes need no room: giving them up for want of it would end the passes
         if not has_room(stack, top):
             break
         num = open_node(work, stack, top, at_work)
@@ -115,7 +115,7 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
         late = False
         while True:
             cut = min(incumbent - tolerance, aim, work.limit)
-            # a little more than the cut, for what rounding takes off the bound
+            # a little more than the cut, as rounding lowers the bound
             status, bound = relax(work, num, cut + 0.1 * tolerance, deadline)
             if status == STOPPED and is_over(deadline):
                 late = True
@@ -150,14 +150,14 @@ def search_depth_first(work: Work, stack: Stack, num_open: int, incumbent: float
                 break
             num = keep_side(work, num, (one, two), verdict == TOGETHER)
         if late:
-            # the node is as it was on the stack
+            # the node is unchanged on the stack
             break
         num_open = top
         nodes += 1
         if closed:
             continue
         if one < 0:
-            # columns that share a row are the same: the lightest of each kind
+            # columns that share a row are equal: take the lightest of each kind
             allowed = allowed_at(work, num)
             for a in range(num):
                 work.key[a] = work.weights[work.node.active[a]]

@@ -1,4 +1,4 @@
-"""Finding any solution of a problem without dummies, or proving that there is none."""
+"""Find any solution of a problem without dummies, or prove that there is none."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from assoc.packing.branching.search import BranchAndBound
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
-# nodes for each component: some minutes on the hardest that were seen; `exact` alone searches to the end
+# nodes for each component: some minutes on the hardest seen; only `exact` searches to the end
 _NODES = 20_000
 
 
 def first_solution(packing: Packing, run: Run) -> NDArray[np.int32] | None:
-    """Return the columns of some complete solution; None when none exists, or time or nodes are used up."""
+    """Return the columns of a complete solution; None if there is none, or time or nodes are used up."""
     if bool((~packing.slack & (np.diff(packing.row_ptr) == 0)).any()):
         return None
     chosen = []

@@ -1,8 +1,8 @@
 """The bases of the latest branchings, so that their other sides do not have to compute them anew.
 
-Depth first, the other side of a branching is taken up when all below the first one is done. To compute the inverse of
-its basis anew takes as long as dozens of exchanges, to copy it as long as one. Which basis a place holds is told by its
-variables: the inverse follows from them.
+Depth first, the second side of a branching is searched after the whole subtree of the first. Recomputing the inverse of
+its basis takes as long as dozens of pivots, copying it as long as one. A kept basis is identified by its variables,
+which determine the inverse.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from assoc.packing.kernels.copying import copy_to
 from assoc.packing.simplex.basis import Basis
 from assoc.packing.simplex.program import Program
 
-# bases at the most, and elements of their inverses together
+# most bases kept, and most elements of all their inverses
 _BASES, _ELEMENTS = 8, 4_000_000
 
 
 class KeptBases(NamedTuple):
-    """``K`` bases of ``m`` rows at the most, the oldest of which makes room for a new one.
+    """Up to ``K`` bases of ``m`` rows; a new one replaces the oldest.
 
     Attributes
     ----------
     variable : int32 array, shape (K, m)
-        As of a `Basis`; -1 where there is none.
+        As in `Basis`; -1 in unused entries.
     inverse : float array, shape (K, m, m)
     norms : float array, shape (K, m)
     age : int64 array, shape (K,)
     latest : int64 array, shape (1,)
-        The place of the latest one.
+        Index of the latest one.
     """
 
     variable: NDArray[np.int32]
@@ -44,12 +44,12 @@ class KeptBases(NamedTuple):
 
 
 def kept_memory(rows: float) -> float:
-    """Bytes that the inverses take."""
+    """Bytes of the inverses."""
     return 8.0 * min(_BASES * rows * rows, _ELEMENTS)
 
 
 def no_kept_bases(program: Program) -> KeptBases:
-    """Room for bases of a program, fewer where they are large."""
+    """Allocate kept bases of a program, fewer where they are large."""
     size = program.sides.size
     count = min(_BASES, _ELEMENTS // max(size * size, 1))
     return KeptBases(
@@ -74,9 +74,9 @@ def keep_basis(kept: KeptBases, basis: Basis) -> None:
 
 @inner_njit
 def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> bool:
-    """Make ``basis`` the kept one of its variables, but for multipliers and anchors; False: there is none.
+    """Copy the kept basis of the same variables, except multipliers and anchors, to ``basis``; False if there is none.
 
-    ``again``: it will be asked for once more.
+    ``again``: it will be needed once more.
     """
     count, num, size = kept.age.size, program.weights.size, program.sides.size
     place = -1
@@ -89,9 +89,9 @@ def take_kept(kept: KeptBases, program: Program, basis: Basis, again: bool) -> b
             place = candidate
             break
     if place >= 0:
-        # what was kept after it belongs to nodes that are done
+        # bases kept after it belong to nodes that are done
         kept.latest[0] = place if again else (place + count - 1) % count
-        # right-hand sides may be others by now (counts.py)
+        # right-hand sides may have changed (counts.py)
         basis.values[:] = 0.0
         for r in range(size):
             for i in range(size):

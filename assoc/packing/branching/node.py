@@ -1,6 +1,6 @@
-"""The node at work: taken from the stack, solved, thinned out, and put back as two.
+"""Operations on the current node: load it from the stack, solve it, drop columns, branch.
 
-The search for the best solution (search.py) and that for the k best (ranking/component_ranking.py) take these steps.
+Used by the search for the best solution (search.py) and for the k best (ranking/component_ranking.py).
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from assoc.packing.simplex.program import (
 
 
 class Work(NamedTuple):
-    """What the search of one packing has at hand.
+    """Data and buffers of the search of one packing.
 
     Attributes
     ----------
     cols : int32 array, shape (N, S)
-        Rows of the columns, as the packing has them.
+        Rows of the packing's columns.
     weights : float array, shape (N,)
-        Weights of the columns; the program may have others, none of them larger.
+        Weights of the columns; those of the program may be smaller.
     program : Program
     basis : Basis
-        Of the node at work.
+        Basis of the current node.
     node : Allowed
-        What it allows; ``active`` is room.
+        What the current node allows; ``active`` is a buffer.
     trials : Trials
     kept : KeptBases
-        Of the latest branchings.
+        Bases of the latest branchings.
     duals : float array, shape (rows of the program,)
         Multipliers of the node's bound, feasible.
     key : float array, shape (N,)
-        Room for what columns are sorted by.
+        Buffer for the sort keys of columns.
     found, trial : int32 arrays, shape (R,)
-        Columns of the best solution found, and room for another one.
+        Columns of the best solution found, and a buffer for another one.
     limit : float
-        No solution weighs as much.
+        More than any solution weighs.
     """
 
     cols: NDArray[np.int32]
@@ -72,13 +72,13 @@ class Work(NamedTuple):
 
 
 def work_memory(rows: float, columns: int, sensors: int) -> float:
-    """Bytes that `new_work` takes: an inverse by columns and by rows, those kept, and what is known of pairs."""
-    # of a column: two lists for pricing, masks, and its rows, in the program and in two orders for pricing
+    """Bytes that `new_work` takes: the inverse by columns and by rows, kept bases, pseudo-costs of pairs."""
+    # per column: two lists for pricing, masks, and its rows, in the program and in two orders for pricing
     return 34.0 * rows * rows + kept_memory(rows) + (200.0 + 12.0 * max(sensors - 8, 0)) * columns
 
 
 def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
-    """Room for the search of a program whose first rows are those of the packing."""
+    """Allocate the search of a program whose first rows are those of the packing."""
     num_rows = packing.slack.size
     return Work(
         packing.cols, packing.weights, program, new_basis(program), all_allowed(program, slack),
@@ -88,15 +88,15 @@ def new_work(packing: PackingArrays, program: Program, slack: Any) -> Work:
 
 
 def knowing(work: Work, trials: Trials) -> Work:
-    """The room, where what other trials of the same packing have learnt of pairs is known, and added to."""
+    """The same buffers, sharing the pseudo-costs of other trials on the same packing."""
     return work._replace(trials=work.trials._replace(gain=trials.gain, tried=trials.tried))
 
 
 @inner_njit
 def drop(work: Work, num: int, bound: float, cut: float) -> int:
-    """Drop the columns and the slack that no solution below the cut has; how many columns are left.
+    """Drop the columns and the slack that no solution below the cut has; return the number of columns left.
 
-    Leaves the reduced costs of those in ``key``.
+    Leaves their reduced costs in ``key``.
     """
     program, duals, key = work.program, work.duals, work.key
     active, columns, slack = work.node.active, work.node.columns, work.node.slack
@@ -104,7 +104,7 @@ def drop(work: Work, num: int, bound: float, cut: float) -> int:
     for a in range(num):
         j = active[a]
         reduced = reduced_cost(program, duals, j)
-        # a column at the cut itself stays, and so does every one where the bound is no number
+        # a column at the cut itself stays, and all columns stay if the bound is NaN
         if bound + reduced > cut:
             columns[j] = False
         else:
@@ -119,20 +119,20 @@ def drop(work: Work, num: int, bound: float, cut: float) -> int:
 
 @inner_njit
 def allowed_at(work: Work, num: int) -> Allowed:
-    """What the node at work allows, of which so many columns are left."""
+    """What the current node allows, with its first ``num`` columns."""
     return Allowed(work.node.active[:num], work.node.columns, work.node.slack)
 
 
 @inner_njit
 def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
-    """Make the node at ``top`` the one at work, unless its basis is at hand; how many columns it has."""
+    """Load the node at ``top``, unless its basis is loaded; return its number of columns."""
     basis = work.basis
     num = take_node(stack, top, work.node)
     if at_work != top:
         copy_to(basis.variable, stack.variable[top])
         copy_to(basis.duals, stack.duals[top])
         copy_to(basis.anchors, stack.duals[top])
-        # below the first side of a branching, taken up anew, waits the other one with the same basis
+        # the other side of a branching waits below the first one, with the same basis
         again = top > 0
         for i in range(basis.variable.size):
             again = again and stack.variable[top - 1, i] == basis.variable[i]
@@ -143,7 +143,7 @@ def open_node(work: Work, stack: Stack, top: int, at_work: int) -> int:
 
 @inner_njit
 def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
-    """Solve the linear program of the node at work; how that ended, and a bound that holds."""
+    """Solve the current node's linear program; return the status, and a valid bound."""
     allowed = allowed_at(work, num)
     status, _ = solve_dual(work.program, allowed, work.basis, Effort(cutoff, most_exchanges(work.program), deadline))
     copy_to(work.duals, work.basis.duals)
@@ -153,7 +153,7 @@ def relax(work: Work, num: int, cutoff: float, deadline: float) -> Any:
 
 @inner_njit
 def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
-    """Make the node at work the one side of it that is left; how many columns it has."""
+    """Replace the current node by its only remaining side; return its number of columns."""
     side, node = work.trials.side, work.node
     num = answer(work.cols, allowed_at(work, num), pair, joined, side)
     copy_to(node.active[:num], side.active[:num])
@@ -164,7 +164,7 @@ def keep_side(work: Work, num: int, pair: Any, joined: bool) -> int:
 
 @inner_njit
 def branch(work: Work, stack: Stack, top: int, num: int, pair: Any, likely: bool, lower: float) -> int:
-    """Put both sides of the node at work on the stack, the likelier one last: searched first; the open nodes."""
+    """Push both sides of the current node, the likelier last, to be searched first; return the number of open nodes."""
     side = work.trials.side
     keep_basis(work.kept, work.basis)
     for turn in range(2):

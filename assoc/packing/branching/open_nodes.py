@@ -1,6 +1,6 @@
 """The open nodes of a depth-first branch and bound.
 
-A node is a set of columns (a piece of the arena), for each row whether it may stay uncovered, and the basis and the
+A node is a set of columns (a slice of the arena), a mask of rows that may stay uncovered, and the basis and the
 multipliers from which its linear program starts.
 """
 
@@ -36,19 +36,19 @@ class Stack(NamedTuple):
 
 
 class OpenNodes:
-    """A stack of nodes in arrays that grow; at first the root alone.
+    """A stack of nodes in arrays that grow; at first only the root.
 
     Attributes
     ----------
     arrays : Stack
         ``arena``: columns of all open nodes; ``first``, ``size``: node t has the columns
         ``arena[first[t]:first[t] + size[t]]``; ``slack``, shape (depth, rows of the program): which may stay uncovered;
-        ``bound``: no solution of the node weighs less; ``variable``, ``duals``, shape (depth, rows of the program):
-        its basis and the multipliers of that.
+        ``bound``: lower bound of the node; ``variable``, ``duals``, shape (depth, rows of the program): its basis and
+        multipliers.
     count : int
         Number of open nodes.
     given_up : float
-        No solution of the nodes that were given up for want of memory weighs less; ``inf``: none was.
+        Lower bound of the nodes given up for want of memory; ``inf`` if none was.
     """
 
     def __init__(self, root: Root) -> None:
@@ -73,7 +73,7 @@ class OpenNodes:
         duals: Floats,
         bound: float = -np.inf,
     ) -> None:
-        """Hold one node alone: its columns, which rows may stay uncovered, its basis and multipliers, its bound."""
+        """Replace all nodes by one: its columns, the rows that may stay uncovered, its basis, multipliers and bound."""
         arrays = self.arrays
         arrays.arena[: columns.size] = columns
         arrays.first[0], arrays.size[0], arrays.bound[0] = 0, columns.size, bound
@@ -82,7 +82,7 @@ class OpenNodes:
 
     @property
     def least_bound(self) -> float:
-        """No solution of any node that is open or was given up weighs less; ``inf`` where there is none."""
+        """Lower bound of all nodes that are open or were given up; ``inf`` if there are none."""
         return min(self.given_up, float(self.arrays.bound[: self.count].min()) if self.count else math.inf)
 
     def give_up(self) -> None:
@@ -91,13 +91,13 @@ class OpenNodes:
         self.given_up = min(self.given_up, float(self.arrays.bound[self.count]))
 
     def grow(self, memory_allows: Callable[[float], bool]) -> None:
-        """Double the room; where there is no memory for that, give up the deepest node.
+        """Double the capacity; without memory for that, give up the deepest node.
 
-        The search is depth first: its nodes are few, but on problems of a million columns each is large, and it may
-        go down for hours. Without the deepest node it goes on, beside and above that, in the memory that it has.
+        A depth-first search has few open nodes, but on problems of a million columns each is large, and the search may
+        descend for hours. Without the deepest node it continues with the others in the memory that it has.
         """
         grown = sum(array.nbytes for array in self.arrays)
-        # the old arrays beside the new ones
+        # old and new arrays exist at the same time
         if not memory_allows(3.0 * grown):
             self.give_up()
             return
@@ -106,13 +106,13 @@ class OpenNodes:
 
 @inner_njit
 def has_room(stack: Stack, top: int) -> bool:
-    """Whether there is room for two children in the place of the node at ``top``."""
+    """Whether there is room to replace the node at ``top`` by two children."""
     return top + 2 < stack.first.size and stack.first[top] + 2 * stack.size[top] <= stack.arena.size
 
 
 @inner_njit
 def take_node(stack: Stack, top: int, node: Allowed) -> int:
-    """Make the node at ``top`` the one at work; how many columns it has."""
+    """Load the node at ``top``; return its number of columns."""
     num = stack.size[top]
     copy_to(node.active[:num], stack.arena[stack.first[top] : stack.first[top] + num])
     copy_to(node.slack, stack.slack[top])
@@ -124,7 +124,7 @@ def take_node(stack: Stack, top: int, node: Allowed) -> int:
 
 @inner_njit
 def push_node(stack: Stack, top: int, node: Allowed, basis: Basis, lower: float) -> None:
-    """Put a node on top of those below ``top``; its columns follow theirs."""
+    """Push a node above those below ``top``; its columns follow theirs."""
     place = stack.first[top - 1] + stack.size[top - 1] if top > 0 else 0
     num = node.active.size
     stack.first[top] = place

@@ -1,10 +1,11 @@
-"""Which pair of measurements to branch on: tried on both sides by some steps of the simplex method.
+"""Choose the pair of measurements to branch on: strong branching with pseudo-costs.
 
-Branching asks of two measurements of different sensors whether they have the same source (the rule of Ryan and
-Foster for set partitioning). *Together* drops the columns with only one of them and makes both a duty, *apart* those
-with both: a mask on the columns, no new row. In the LP's solution the answer is in doubt where the columns with both
-add up to something between 0 and 1. Pairs with the greatest doubt are tried (strong branching); what was gained is
-kept for each pair, so that pairs that were tried often enough elsewhere in the tree are judged by that (pseudo-costs).
+Branching decides whether two measurements of different sensors have the same source (the rule of Ryan and Foster for
+set partitioning). *Together* drops the columns with only one of them, and both must be covered; *apart* drops those
+with both. Both are masks on the columns, without new rows. A pair is fractional where the LP values of the columns
+with both rows add up to something between 0 and 1. The most fractional pairs are tried on both sides by some steps of
+the simplex method. Gains are kept for each pair: pairs that were tried often enough elsewhere in the tree are judged
+by their mean gain (pseudo-costs).
 
 References
 ----------
@@ -29,35 +30,36 @@ from assoc.packing.simplex.dual import CUT, INFEASIBLE, Effort, bound_of
 from assoc.packing.simplex.program import Allowed, Program, certified, make_feasible
 from assoc.packing.simplex.trial import Trial, begin_trials, new_trial, try_dual
 
-# pairs tried at a node at the most, and in a row without a better one; steps of the simplex method for each side
+# most pairs tried at a node, and in a row without a better one; steps of the simplex method for each side
 _CANDIDATES = 16
 _IN_VAIN = 5
 _EXCHANGES = 25
-# trials of a pair after which what they gained is believed
+# trials of a pair after which its mean gain is used instead
 _RELIABLE = 2
 # an LP value this near to a whole number is one
 WHOLE = 1e-6
-# what `decide` says in place of a pair: one side holds nothing better, so that the other one is what is left
+# answers of `decide`: branch on the pair, or only the side together or apart can have a better solution
 NEITHER, TOGETHER, APART = -1, -2, -3
 
 
 class Trials(NamedTuple):
-    """What trials of pairs need and what they have gained.
+    """Buffers for trials of pairs, and the gains so far.
 
     Attributes
     ----------
     mass : float array, shape (R, R)
-        Room: how much the columns with both rows add up to; 0 between calls.
+        Buffer: sum of the LP values of the columns with both rows; 0 between calls.
     gain, tried : float32 array, shape (2, R, R), and uint8 array of the same shape
-        Mean gain of the bound for each unit of the LP's values that a side forbids; side 0: apart, 1: together.
+        Mean gain of the bound for each unit of LP value that a side forbids, and the number of trials; side 0: apart,
+        1: together.
     pairs, values : int64 array, shape (K, 2), float array, shape (K,)
-        The pairs in doubt, the most doubtful first, and their mass.
+        The fractional pairs, the most fractional first, and their mass.
     trial : Trial
-        Of the side that is tried.
+        The trial of a side.
     side : Allowed
-        What that side allows; its ``active`` is room.
+        What that side allows; ``active`` is a buffer.
     duals : float array, shape (rows of the program,)
-        Its multipliers.
+        Multipliers of that side.
     """
 
     mass: NDArray[np.float64]
@@ -71,7 +73,7 @@ class Trials(NamedTuple):
 
 
 def new_trials(program: Program, num_rows: int) -> Trials:
-    """Room for trials of pairs of measurements, the program's first rows; nothing is known of any."""
+    """Allocate trials of pairs of measurements, the program's first rows."""
     num, size = program.weights.size, program.sides.size
     rows = num_rows
     return Trials(
@@ -83,7 +85,7 @@ def new_trials(program: Program, num_rows: int) -> Trials:
 
 @inner_njit
 def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
-    """Whether column j is no longer allowed where two rows are together (no column may have only one) or apart."""
+    """Whether column j is forbidden where two rows are together (no column has only one) or apart (none has both)."""
     uses = 0
     for s in range(cols.shape[1]):
         if cols[j, s] == one or cols[j, s] == two:
@@ -93,7 +95,7 @@ def is_dropped(cols: Any, j: int, one: int, two: int, joined: bool) -> bool:
 
 @njit
 def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) -> int:
-    """Fill ``side`` with what is allowed once the question is answered; how many columns are."""
+    """Fill ``side`` with what is allowed where the pair is together or apart; the number of columns allowed."""
     active, columns, slack = side.active, side.columns, side.slack
     columns[:] = False
     copy_to(slack, allowed.slack)
@@ -112,7 +114,7 @@ def answer(cols: Any, allowed: Allowed, pair: Any, joined: bool, side: Allowed) 
 
 @inner_njit
 def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
-    """Find the pairs of rows whose answer is most in doubt in the LP's solution; how many there are."""
+    """Find the most fractional pairs of rows of the LP's solution; return their number."""
     mass, pairs, values = trials.mass, trials.pairs, trials.values
     num, num_sensors = cols.shape
     count = 0
@@ -157,13 +159,13 @@ def doubtful_pairs(cols: Any, basis: Basis, trials: Trials) -> int:
 def _try(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, which: Any, effort: Effort
 ) -> Any:
-    """Try one side of a pair; how it ended, and the bound that the multipliers give (to rounding)."""
+    """Try one side of a pair; how it ended, and the bound from the multipliers (but for rounding)."""
     pair, joined = which
     count = answer(cols, allowed, pair, joined, trials.side)
     side = Allowed(trials.side.active[:count], trials.side.columns, trials.side.slack)
     status = try_dual(program, side, basis, trials.trial, effort)
     if status == CUT or status == INFEASIBLE:
-        # to be believed it must hold
+        # this bound excludes the side, so it must be valid
         copy_to(trials.duals, trials.trial.basis.duals)
         make_feasible(program, side, trials.duals)
         return status, certified(program, side, trials.duals)
@@ -174,12 +176,13 @@ def _try(
 def decide(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
-    """Choose one of the doubtful pairs; it and what is to be done with it.
+    """Choose one of the fractional pairs.
 
     Returns
     -------
     int, int
-        The place of the pair, and `NEITHER` (branch), or `TOGETHER` or `APART`: the only side with anything better.
+        The index of the pair, and `NEITHER` (branch), or `TOGETHER` or `APART`: the only side that can have a better
+        solution.
     """
     bound = bound_of(program, basis)
     gap = effort.cutoff - bound
@@ -216,9 +219,9 @@ def decide(
 
 @inner_njit
 def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
-    """Return two rows that one column has together and another one not; -1, -1: there are none.
+    """Return two rows that some columns have together and others do not; -1, -1 if there are none.
 
-    Columns that share a row are then the same: the lightest of each kind can be taken.
+    Without such a pair columns that share a row are equal, and the lightest of each kind can be taken.
     """
     counts[:] = 0
     for j in allowed.active:
@@ -240,7 +243,7 @@ def any_open_pair(cols: Any, allowed: Allowed, counts: Any) -> Any:
 
 @inner_njit
 def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any) -> int:
-    """Find pairs that the LP's solution, in whole numbers, has together: those in most other columns; how many."""
+    """Find pairs that the whole-numbered LP solution has together, those in most other columns; return their number."""
     pairs, values = trials.pairs, trials.values
     num, num_sensors = cols.shape
     counts[:] = 0
@@ -256,7 +259,7 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
         for s in range(num_sensors):
             for t in range(s + 1, num_sensors):
                 one, two = cols[j, s], cols[j, t]
-                # where there is nothing else and both must be covered, there is no question
+                # if no other column has one of the rows and both must be covered, the pair is decided
                 if (
                     one < 0
                     or two < 0
@@ -284,9 +287,9 @@ def certain_pairs(cols: Any, allowed: Allowed, basis: Basis, trials: Trials, cou
 def part_certain(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, count: int, effort: Effort
 ) -> Any:
-    """Choose the certain pair that costs the most to have apart; it and what is to be done with it, as `decide`.
+    """Choose the certain pair that costs the most to have apart; return as `decide`.
 
-    -1: of no pair there is a question, as all that has one row of it has the other one too.
+    -1 if every pair is decided: columns with one of its rows have the other one, too.
     """
     begin_trials(program, allowed, basis, trials.trial)
     pick, best = -1, -np.inf

@@ -1,4 +1,4 @@
-"""The root of a branch and bound: its linear program, made tighter by cuts before any branching."""
+"""The root of a branch and bound: its linear program, tightened by cuts before branching."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from assoc.packing.simplex.cuts import odd_sets, with_cuts
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Program, all_allowed, make_feasible, program_of, weight_limit
 
-# rounds of cuts at the most; of them in a row that may gain less than this share of the gap; cuts for each row
+# most rounds of cuts; most in a row that gain less than this share of the gap; cuts for each row
 _ROUNDS, _IN_VAIN, _GAIN = 30, 3, 0.01
 _CUTS = 0.5
 MOST_ROWS = 1.0 + _CUTS
 """Rows of a program with cuts, as a multiple of those without."""
-# what whole-numbered weights of a solution are lowered by at the most, as a share of the least difference
+# most by which a solution's whole-numbered weights are lowered, as a share of their least difference
 _LOWERED = 5e-4
 
 
 class Root(NamedTuple):
-    """A linear program and where its search begins.
+    """A linear program and the start of its search.
 
     Attributes
     ----------
     program : Program
         Rows of measurements, then cuts.
     slack : bool array, shape (rows of the program,)
-        Whether a row may stay uncovered; all cuts may.
+        Whether a row may stay uncovered; true for all cuts.
     variable : int32 array, duals : float array, shape (rows of the program,)
         A basis and its multipliers.
     sets : bool array, shape (cuts, R)
-        The odd sets of rows of which the cuts are made.
+        The odd sets of rows that define the cuts.
     """
 
     program: Program
@@ -57,19 +57,19 @@ def plain_root(packing: Packing, duals: Floats) -> Root:
 
 
 def _lowered(packing: Packing) -> Floats:
-    """Whole-numbered weights made different, each lowered by a little.
+    """Perturb whole-numbered weights: each is lowered by a little.
 
-    Among equal weights the simplex method stands still for long. No bound becomes invalid, and the search for
-    something better by a whole number does not miss what a solution weighs less.
+    With equal weights the simplex method is degenerate. Bounds stay valid, and a search for solutions better by a whole
+    number still finds them, as a solution's weight is lowered by less than that.
     """
     number = np.arange(packing.num_columns, dtype=np.uint64)
     share = (number * np.uint64(2654435761) % np.uint64(2**32)) / 2.0**32
-    # a packing in which nothing is left to cover has no rows
+    # a packing without anything to cover has no rows
     return packing.weights - _LOWERED * packing.granularity / max(packing.num_rows, 1) * share
 
 
 def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: float) -> Root:
-    """The root with cuts, as long as these raise its bound; purged of those that no longer do.
+    """The root with cuts, added while they raise its bound; cuts that are not tight are removed.
 
     Parameters
     ----------
@@ -78,9 +78,9 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
     duals : float array, shape (R,)
         Multipliers to start from.
     cutoff : float
-        Nothing that weighs as much is looked for.
+        Only solutions of less weight are searched for.
     deadline : float
-        When time is over (clock.py).
+        Time limit (clock.py).
     """
     rows = packing.num_rows
     root = plain_root(packing, duals)
@@ -117,7 +117,7 @@ def root_with_cuts(packing: Packing, duals: Floats, cutoff: float, deadline: flo
 def _renumbered(
     variable: NDArray[np.int32], num: int, rows: int, tight: NDArray[np.bool_], new: int
 ) -> NDArray[np.int32]:
-    """A basis without the cuts that are not tight, and with the slack of so many new ones."""
+    """The basis without the removed cuts, and with the slacks of the new ones."""
     kept = np.concatenate([np.arange(rows), np.where(tight, rows + np.cumsum(tight) - 1, -1)])
     is_column = variable < num
     kind, row = np.divmod(np.where(is_column, 0, variable - num), kept.size)

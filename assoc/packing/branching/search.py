@@ -1,16 +1,16 @@
 """Branch and bound on a packing: the linear program at every node, branching on pairs of measurements.
 
-A node is a set of columns and, for some rows, the duty to be covered (open_nodes.py). Its linear program is solved from
-its parent's basis by the dual simplex method (packing/simplex); its bound is computed anew from the multipliers, so
-that it holds whatever rounding did there. Columns and slack whose reduced cost exceeds the gap are dropped. Branching
-(pairs.py) asks of two measurements of different sensors whether they have the same source: *together* drops the
-columns with only one of them, *apart* those with both.
+A node is a set of columns and a set of rows that must be covered (open_nodes.py). Its linear program is solved from
+its parent's basis by the dual simplex method (packing/simplex); its bound is recomputed from the multipliers, so that
+it is valid despite rounding. Columns and slack whose reduced cost exceeds the gap are dropped. Branching (pairs.py)
+decides whether two measurements of different sensors have the same source: *together* drops the columns with only one
+of them, *apart* those with both.
 
-A search that is meant to go to the end makes several *passes*. Each looks for solutions below an *aim*, near the root's
-bound at first, as if it were the incumbent's weight: few columns are left and few nodes, whatever the incumbent. Where
-there is none, that is proved, and the next aim is farther off. What a pass finds is better than anything left, and what
-the passes before the last one cost is little, as trees grow fast with the gap. Where they take more than some nodes,
-the root is split on counts (counts.py), if that pays, and passes go through its parts, the least bound first.
+A search to the end makes several *passes*. Each searches for solutions below an *aim*, at first near the root's bound,
+as if the aim were the incumbent's weight: few columns and few nodes remain, whatever the incumbent. A pass that finds
+no solution proves the aim as a bound, and the next aim is higher. The best solution that a pass finds is optimal.
+Passes before the last one are cheap, as trees grow fast with the gap. If they take many nodes, the root is split on
+counts (counts.py), if that pays, and passes search its parts, the least bound first.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from assoc.packing.branching.root import plain_root, root_with_cuts
 from assoc.packing.packing import Packing
 from assoc.packing.run import memory_allows
 
-# the first aim and the last one, as shares of the way from the root's bound to the incumbent, and how they grow
+# the first and the last aim, as shares of the gap between the root's bound and the incumbent, and their growth
 _FIRST, _LAST, _GROWTH = 0.05, 0.9, 1.7
-# nodes after which a split of the root on counts is tried, and again whenever they have doubled: most searches have
-# ended before
+# nodes after which a split of the root on counts is tried, and again whenever they have doubled; most searches end
+# before that
 _HARD = 40
-# a split is judged by what it saves passes that aim so many times as far; it is made if it raises the bound by this
-# share of the way there
+# a split is judged by the savings of passes with aims so many times as far; it is made if it raises the bound by this
+# share of the distance
 _FARTHER, _RAISED = 3.0, 0.02
 
 
@@ -51,17 +51,17 @@ class BranchAndBound:
     duals : float array, shape (R,)
         Multipliers to start from.
     incumbent : float
-        Only solutions of less weight are looked for; ``inf`` if none is known.
+        Only solutions of less weight are searched for; ``inf`` if none is known.
     tolerance : float
-        How much better a solution must be to count.
+        Least improvement that counts.
     deadline : float
-        When time is over, by the kernels' clock (clock.py): the node at work stays open.
+        Time limit by the kernels' clock (clock.py); the current node then stays open.
     memory_allows : callable, optional
-        Whether the search may take so many bytes more (`Run.memory_allows`).
+        Whether the search may allocate this many bytes more (`Run.memory_allows`).
     to_the_end : bool
-        Whether the search is meant to go to the end: then its root is made tighter by cuts, and it makes passes.
+        Whether to search to the end: with cuts at the root, and in passes.
     floor : float
-        It is known that no solution weighs less; a search to the end aims beyond that at once.
+        A known lower bound; a search to the end starts with an aim above it.
     """
 
     def __init__(
@@ -87,11 +87,11 @@ class BranchAndBound:
         self._root = plain_root(packing, np.where(packing.slack, np.minimum(duals, 0.0), duals))
         self._open = OpenNodes(self._root)
         self._work: Work | None = None
-        # the parts of the root: all of them, and those that this pass has still to search, the least bound last
+        # the parts of the root: all of them, and those that this pass has yet to search, the least bound last
         self._leaves: list[Leaf] = []
         self._waiting: list[Leaf] = []
         self._split_at = _HARD
-        # this pass looks for solutions below the aim; those before have shown that none is below the floor
+        # this pass searches for solutions below the aim; earlier ones proved that none is below the floor
         self._aim, self._floor = np.inf, floor
 
     @property
@@ -104,15 +104,15 @@ class BranchAndBound:
 
     @property
     def out_of_memory(self) -> bool:
-        """Whether nodes were given up that could hold something better."""
+        """Whether nodes were given up that could have a better solution."""
         return self._open.given_up < self.weight - self.tolerance
 
     @property
     def lower_bound(self) -> float:
-        """No solution weighs less."""
+        """Lower bound on all solutions' weights."""
         if self._searched < self.weight - self.tolerance:
             return self._searched
-        # whole-numbered weights: what is not better by a tolerance below 1 is not better at all
+        # with whole-numbered weights, a solution that is not better by a tolerance below 1 is not better at all
         whole = self.tolerance < self._packing.granularity
         return self.weight if whole else self.weight - self.tolerance
 
@@ -123,7 +123,7 @@ class BranchAndBound:
             if self._work is None and not self._begin():
                 return
             if self._open.count and self._splits():
-                # what this pass has shown stays; the rest of it goes through the parts
+                # the bound that this pass has proved stays; the rest of the pass searches the parts
                 self._floor = self._searched
                 self._begin_pass()
                 continue
@@ -144,7 +144,7 @@ class BranchAndBound:
                     self._next_pass()
 
     def _begin(self) -> bool:
-        """Make room for the search; without memory for it the root is given up."""
+        """Allocate the search; without memory for it the root is given up."""
         if not self._memory_allows(self._room()):
             self._open.give_up()
             return False
@@ -159,18 +159,18 @@ class BranchAndBound:
         return True
 
     def _room(self) -> float:
-        """Bytes that a search takes, with all the cuts and counts that it may have."""
+        """Bytes that a search takes with the most cuts and counts."""
         rows = most_rows(self._packing) if self._to_the_end else float(self._packing.num_rows)
         return work_memory(rows, self._packing.num_columns, self._packing.num_sensors)
 
     @property
     def _least_waiting(self) -> float:
-        """No solution of the parts that this pass has still to search weighs less."""
+        """Lower bound on the parts that this pass has yet to search."""
         return self._waiting[-1].bound if self._waiting else np.inf
 
     @property
     def _searched(self) -> float:
-        """No solution weighs less, unless it is the incumbent."""
+        """Lower bound on all solutions except the incumbent."""
         return max(self._floor, min(self._aim, self._open.least_bound, self._least_waiting))
 
     @property
@@ -180,7 +180,7 @@ class BranchAndBound:
         return max(root, min((leaf.bound for leaf in self._leaves), default=root))
 
     def _next_pass(self) -> None:
-        """Begin anew at the root or its parts, with an aim that is farther off."""
+        """Restart at the root or its parts with a higher aim."""
         self._floor = max(self._floor, self._aim)
         self._splits()
         self._begin_pass()
@@ -195,13 +195,13 @@ class BranchAndBound:
         self._set_aim()
 
     def _splits(self) -> bool:
-        """Split the root on counts, where a search is long and that pays; whether the parts are new."""
+        """Split the root on counts, where the search is long and that pays; whether the parts are new."""
         known = self._to_the_end and self.weight < np.inf and self._open.given_up == np.inf
         if not known or self.nodes < self._split_at:
             return False
-        # where no split pays, one may with a better incumbent or another aim
+        # a split that does not pay now may pay with a better incumbent or another aim
         self._split_at = 2 * self.nodes
-        # the room of the search so far and that of another one
+        # the memory of this search and of a second one
         if not self._memory_allows(2.0 * self._room()):
             return False
         cutoff, bound = self.weight - self.tolerance, self._root_bound
@@ -215,15 +215,15 @@ class BranchAndBound:
         return True
 
     def _next_leaf(self) -> None:
-        """Begin with the part of the least bound that this pass has not searched yet."""
+        """Begin the unsearched part of least bound."""
         given_up = self._open.given_up
         self._open, self._work = begin_leaf(self._packing, self._waiting.pop(), given_up, self._work)
 
     def _set_aim(self) -> None:
-        """Aim at a share of the way from the root's bound to the incumbent, or a step beyond what is proved."""
+        """Set the aim to a share of the gap above the root's bound, or one step above the bound proved so far."""
         root = self._root_bound
         gap = self.weight - root
         aim = root + max(_FIRST * gap, _GROWTH * (self._floor - root))
-        # without an incumbent there is nothing to go by; where the gap is rounding, a share of it may be no step at all
+        # without an incumbent there is no gap; a gap that is only rounding may have no share larger than 0
         farther = max(root, self._floor) < aim < root + _LAST * gap
         self._aim = aim if 0.0 < gap < np.inf and farther else np.inf

@@ -1,7 +1,7 @@
-"""A short branch and bound where columns are fixed: some nodes, in what is left of a linear program.
+"""A short branch and bound on the remainder of a linear program whose other columns are fixed.
 
-What is left is a program of its own (simplex/remainder.py): with half of the rows an exchange takes a quarter of the
-time. A search that fills the room for its open nodes ends there, as with its last node.
+The remainder is a separate program (simplex/remainder.py): with half of the rows a pivot takes a quarter of the time.
+The search ends after its last node, or when the memory for open nodes is full.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from assoc.packing.simplex.remainder import Remainder, remainder_of
 
 
 class Part(NamedTuple):
-    """What is searched: what the program was just solved for.
+    """The part of the solutions to search, for which the program was just solved.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Part(NamedTuple):
     slack : bool array, shape (R,)
         Rows that may stay uncovered.
     fixed : int array
-        Columns that must be used; of those that share a row with them none but themselves is in ``columns``.
+        Columns that must be used; ``columns`` has no other column that shares a row with them.
     """
 
     columns: NDArray[np.bool_]
@@ -40,12 +40,12 @@ class Part(NamedTuple):
 
 
 class Lessons(NamedTuple):
-    """What short searches of a packing have learnt of its pairs of rows, for those that follow.
+    """Pseudo-costs of pairs of rows, shared by the short searches of a packing.
 
     Attributes
     ----------
     gain, tried : float32 and uint8 arrays, shape (2, R, R)
-        As in pairs.py (`Trials`); true in every program of the packing.
+        As in pairs.py (`Trials`); valid in every program of the packing.
     """
 
     gain: NDArray[np.float32]
@@ -53,14 +53,14 @@ class Lessons(NamedTuple):
 
 
 def no_lessons(packing: Packing) -> Lessons:
-    """Nothing is known of any pair."""
+    """No pair has been tried."""
     shape = (2, packing.num_rows, packing.num_rows)
     return Lessons(np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
 
 
 def short_memory(packing: Packing, rows: float) -> float:
-    """Bytes that such a search takes at the most in a program of so many rows."""
-    # open nodes, and what is known of pairs with a copy of it
+    """Most bytes that such a search takes in a program of ``rows`` rows."""
+    # open nodes, and the pseudo-costs of pairs with a copy
     nodes = 60.0 * packing.num_columns
     return 20.0 * packing.num_rows**2 + nodes + work_memory(rows, packing.num_columns, packing.num_sensors)
 
@@ -68,24 +68,24 @@ def short_memory(packing: Packing, rows: float) -> float:
 def search_shortly(
     packing: Packing, linear: LinearProgram, part: Part, cutoff: float, limits: Limits, lessons: Lessons
 ) -> tuple[NDArray[np.int64], bool]:
-    """Search the part that a program was just solved for.
+    """Search the part for which a program was just solved.
 
     Parameters
     ----------
     packing : Packing
     linear : LinearProgram
-        Of the packing, perhaps with cuts.
+        The packing's program, perhaps with cuts.
     part : Part
     cutoff : float
-        Only solutions of less weight are looked for.
+        Only solutions of less weight are searched for.
     limits : Limits
     lessons : Lessons
-        Of the packing; added to.
+        Those of the packing; updated.
 
     Returns
     -------
     int array, bool
-        Columns of the best solution found (none: nothing was found), and whether nothing was left to search.
+        Columns of the best solution found (empty: none was found), and whether the search was exhaustive.
     """
     wait_for_kernels()
     nothing = np.zeros(0, dtype=np.int64)
@@ -106,7 +106,7 @@ def search_shortly(
 
 
 def _remainder(packing: Packing, linear: LinearProgram, part: Part) -> Remainder | None:
-    """What is left of the program with those columns fixed."""
+    """The remainder of the program with those columns fixed."""
     slack = linear.slack.copy()
     slack[: packing.num_rows] = part.slack
     columns = part.columns.copy()
@@ -115,7 +115,7 @@ def _remainder(packing: Packing, linear: LinearProgram, part: Part) -> Remainder
 
 
 def _arrays(packing: Packing, rest: Remainder) -> PackingArrays:
-    """The columns of a packing that are left, over the rows that are left, as branch and bound takes them."""
+    """The remaining columns of a packing over the remaining rows, as branch and bound takes them."""
     rows = rest.rows[rest.rows < packing.num_rows]
     place = np.full(packing.num_rows + 1, -1, dtype=np.int32)
     place[rows] = np.arange(rows.size)

@@ -1,12 +1,12 @@
-"""A basis of the linear program with the inverse of its matrix, and what changes both.
+"""A basis of the linear program with the inverse of its matrix, and the operations that change them.
 
-The inverse is dense and kept by columns, so that all that is done with it are sums of contiguous columns: memory for
-rows^2 numbers, and no more. A column of the program has a handful of ones, so that its coordinates in the basis are the
-sum of a handful of these columns.
+The inverse is dense and stored by columns, so that all operations are sums of contiguous columns; it takes memory for
+rows^2 numbers. A column of the program has a handful of ones, so that its coordinates in the basis are the sum of a
+handful of these columns.
 
-What a row has in the basis where no column of the program stands for it is its slack, or an *anchor*: a variable that
-is 0 in every solution, whose cost can be what we like. With anchors of cost u, any multipliers u are those of a basis
-(the unit matrix): so a search starts from the multipliers of the dual ascent, and anchors that left do not return.
+A row without a column in the basis has its slack there, or an *anchor*: a variable that is 0 in every solution, at any
+cost. Anchors of cost u make any multipliers u those of a basis, the unit matrix: this is how a search starts from the
+multipliers of the dual ascent. Anchors that have left the basis do not return.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from assoc.packing.kernels.sorting import order_of
 from assoc.packing.simplex.pricing import Pricing, new_pricing
 from assoc.packing.simplex.program import Allowed, Program
 
-# a pivot smaller than this is none
+# smaller pivots are rejected
 SMALL_PIVOT = 1e-7
-# squared lengths of the inverse's rows that are computed anew
+# squared lengths of the inverse's rows above this are recomputed
 _LONG = 1e10
 
 
 class Basis(NamedTuple):
-    """A basis and what follows from it; changed in place. Of its ``m`` places each has one variable.
+    """A basis and the values derived from it; changed in place. Each of its ``m`` positions has one variable.
 
     Attributes
     ----------
     variable : int32 array, shape (m,)
-        What is in each place: column j as j, the slack of row r as n + r, the anchor of row r as n + m + r.
+        Variable at each position: column j as j, the slack of row r as n + r, the anchor of row r as n + m + r.
     free : bool array, shape (m,)
-        Whether what is in each place may be above 0 (dual.py: `note_free`).
+        Whether the variable at each position may be above 0 (dual.py: `note_free`).
     place, slack_place : int32 arrays, shapes (n,) and (m,)
-        Where each column and each slack is, -1: not in the basis.
+        Position of each column and each slack; -1 if not in the basis.
     inverse : float array, shape (m, m)
-        Row r: the coordinates of the r-th unit vector, place by place (the inverse transposed).
+        The inverse, transposed: row r has the coordinates of the r-th unit vector, by position.
     norms : float array, shape (m,)
-        Squared length of each row of the inverse (of each column here): weights of the steepest edge.
+        Squared length of each row of the inverse (a column of this array): weights of the steepest edge.
     values : float array, shape (m,)
         Values of the variables in the basis.
     duals : float array, shape (m,)
@@ -51,11 +51,11 @@ class Basis(NamedTuple):
     anchors : float array, shape (m,)
         Costs of the anchors.
     row, column, sums : float arrays, shape (m,)
-        Room for a row and a column of the tableau, and for sums over all places.
+        Buffers for a row and a column of the tableau, and for sums over all positions.
     pricing : Pricing
-        The columns that are allowed, and their reduced costs.
+        The allowed columns, and their reduced costs.
     age : int64 array, shape (1,)
-        Exchanges since everything was computed anew.
+        Pivots since the last refactorisation.
     """
 
     variable: NDArray[np.int32]
@@ -75,12 +75,12 @@ class Basis(NamedTuple):
 
 
 def new_basis(program: Program) -> Basis:
-    """Room for a basis."""
+    """Allocate a basis."""
     return basis_without(program, program.sides.size)
 
 
 def basis_without(program: Program, columns: int) -> Basis:
-    """Room for a basis of whose inverse there are so many columns alone."""
+    """Allocate a basis with only ``columns`` columns of the inverse."""
     num, size = program.weights.size, program.sides.size
     return Basis(
         np.zeros(size, np.int32), np.zeros(size, np.bool_), np.full(num, -1, np.int32), np.full(size, -1, np.int32),
@@ -98,7 +98,7 @@ def copy_basis(source: Basis, target: Basis) -> None:
 
 @inner_njit
 def copy_without_inverse(source: Basis, target: Basis) -> None:
-    """Give ``target`` the variables of ``source``, their values, the weights of the edges, and the multipliers."""
+    """Copy the variables of ``source``, their values, the edge weights and the multipliers to ``target``."""
     copy_to(target.variable, source.variable)
     copy_to(target.place, source.place)
     copy_to(target.slack_place, source.slack_place)
@@ -109,7 +109,7 @@ def copy_without_inverse(source: Basis, target: Basis) -> None:
 
 @njit
 def begin_from_duals(program: Program, allowed: Allowed, duals: Floats, basis: Basis) -> None:
-    """The basis of slacks and anchors whose multipliers these are."""
+    """Make ``basis`` the one of slacks and anchors with these multipliers."""
     num, size = program.weights.size, program.sides.size
     basis.place[:] = -1
     basis.slack_place[:] = -1
@@ -141,7 +141,7 @@ def coordinates(program: Program, basis: Basis, j: int, column: Floats) -> None:
 
 @inner_njit
 def exchange(basis: Basis, p: int, column: Floats) -> None:
-    """Let the variable of these coordinates take place p: the inverse, the norms, the values."""
+    """Pivot: the variable of these coordinates enters at position p. Updates the inverse, the norms, the values."""
     inverse, row, sums, norms, values = basis.inverse, basis.row, basis.sums, basis.norms, basis.values
     size = column.size
     pivot = column[p]
@@ -160,12 +160,12 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
     for i in range(size):
         if column[i] != 0.0:
             ratio = column[i] / pivot
-            # rounding may not make it less than the part that is added
+            # rounding must not make it less than the part that is added
             least = 1e-4 + 1e-3 * ratio * ratio * own
             norm = norms[i] - 2.0 * ratio * sums[i] + ratio * ratio * own
             norms[i] = norm if norm > least else least
             if not norms[i] < _LONG:
-                # what rounding leaves of such numbers is no length; and one that is no number would never leave
+                # rounding spoils updates of norms this large; and a variable with a NaN norm would never leave
                 norms[i] = 0.0
                 for r in range(size):
                     norms[i] += inverse[r, i] * inverse[r, i]
@@ -177,7 +177,7 @@ def exchange(basis: Basis, p: int, column: Floats) -> None:
 
 @inner_njit
 def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
-    """Note that a variable has taken place p."""
+    """Record that a variable has entered at position p."""
     num, size = program.weights.size, program.sides.size
     old = basis.variable[p]
     if old < num:
@@ -194,9 +194,9 @@ def enter(program: Program, basis: Basis, p: int, variable: int) -> None:
 
 @njit
 def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
-    """Compute everything anew from ``variable``; places that have become dependent get anchors.
+    """Refactor: recompute everything from ``variable``; positions of dependent variables get anchors.
 
-    The multipliers are then those of the basis, but for the rows of new anchors, which keep theirs.
+    The multipliers are then those of the basis, except for the rows of new anchors, which keep theirs.
     """
     num, size = program.weights.size, program.sides.size
     inverse, row, column = basis.inverse, basis.row, basis.column
@@ -206,7 +206,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
     basis.slack_place[:] = -1
     inverse[:] = 0.0
     taken = np.zeros(size, np.bool_)
-    # every row that has no unit vector of its own is filled by a column
+    # rows without a unit vector in the basis get a column
     for r in range(size):
         inverse[r, r] = 1.0
         basis.variable[r] = num + size + r
@@ -256,7 +256,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
     for r in range(size):
         if not taken[r]:
             basis.anchors[r] = old[r]
-    # what follows from the inverse
+    # values derived from the inverse
     costs = np.zeros(size)
     for i in range(size):
         code = basis.variable[i]
@@ -278,7 +278,7 @@ def refactor(program: Program, allowed: Allowed, basis: Basis) -> None:
 
 
 def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], duals: Floats) -> Basis:
-    """The basis of these variables, its anchors with these costs."""
+    """The basis of these variables, with anchors of these costs."""
     basis = new_basis(program)
     basis.variable[:] = variable
     basis.duals[:] = duals
@@ -289,7 +289,7 @@ def basis_of(program: Program, allowed: Allowed, variable: NDArray[np.int32], du
 
 @inner_njit
 def residual(program: Program, basis: Basis) -> float:
-    """How far the values in the basis are from satisfying the rows."""
+    """Largest violation of a row by the values of the basis."""
     num, size = program.weights.size, program.sides.size
     left = basis.sums
     copy_to(left, program.sides)
@@ -303,7 +303,7 @@ def residual(program: Program, basis: Basis) -> float:
                 left[program.rows[k]] -= value
     largest = 0.0
     for r in range(size):
-        # what is no number is no residual that is small
+        # a NaN must not pass for a small residual
         if not abs(left[r]) <= largest:
             largest = abs(left[r])
     return largest

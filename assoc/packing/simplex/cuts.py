@@ -1,4 +1,4 @@
-"""Cuts from odd sets of rows: what whole-numbered solutions satisfy and the linear program's solution does not.
+"""Cuts from odd sets of rows: whole-numbered solutions satisfy them, the linear program's solution does not.
 
 Of an odd set Q of rows, each covered at most once, at most (|Q| - 1) / 2 pairs can be covered together:
 
@@ -7,10 +7,10 @@ Of an odd set Q of rows, each covered at most once, at most (|Q| - 1) / 2 pairs 
 (Half of the sum of the rows in Q, rounded down: a {0, 1/2} cut. Odd holes and cliques of the conflict graph are among
 them.) The linear program's solution violates it by (1 - f(Q)) / 2, where
 
-    f(Q) = sum of what the rows in Q leave uncovered + sum of x_j over the columns with an odd number of rows in Q.
+    f(Q) = sum of the slacks of the rows in Q + sum of x_j over the columns with an odd number of rows in Q.
 
-Sets of small f are looked for by tabu search, one row entering or leaving at a time. A cut is a row of the program like
-any other, with a slack that may be anything; that slack is a whole number in every whole-numbered solution.
+Tabu search finds sets of small f; a move adds or removes one row. A cut is a row of the program like any other, with a
+slack, which is a whole number in every whole-numbered solution.
 
 References
 ----------
@@ -33,9 +33,9 @@ from assoc.packing.simplex.program import Program
 
 # an LP value this near to a whole number is one
 _WHOLE = 1e-6
-# f of a set that is worth a cut; sets kept of one search; moves from each row, and how long a moved row rests
+# largest f of a set that is worth a cut; sets kept of one search; moves from each row; tabu tenure
 _LARGEST, _KEPT, _MOVES, _REST = 0.96, 30, 40, 6
-# the share of a set's rows that another one of the same search may have
+# largest share of a set's rows that another set of the same search may have
 _COMMON = 0.7
 
 
@@ -48,7 +48,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
     cols : int32 array, shape (N, S)
         Rows of the columns.
     basis : Basis
-        Optimal.
+        An optimal basis.
     num_rows : int
         Rows of measurements; cuts follow them.
 
@@ -101,7 +101,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
         odd[:] = False
         rest[:] = 0
         for r in range(num_rows):
-            # what f changes by when the row enters or leaves
+            # change of f when the row enters or leaves
             change[r] = max(uncovered[r], 0.0)
             for k in range(pointer[r], pointer[r + 1]):
                 change[r] += values[by_row[k]]
@@ -129,7 +129,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
             row = -1
             least = np.inf
             for r in range(num_rows):
-                # the first row stays: else every search would end at the empty set
+                # the first row stays, or every search would end at the empty set
                 if pointer[r] < pointer[r + 1] and rest[r] <= move and r != begin and change[r] < least:
                     least = change[r]
                     row = r
@@ -142,7 +142,7 @@ def odd_sets(cols: Any, basis: Basis, num_rows: int) -> Any:
 
 @inner_njit
 def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
-    """Insert a set in order of f, unless it has too many rows in common with a better one; how many are kept."""
+    """Insert a set in order of f, unless it shares too many rows with a better one; return the number kept."""
     place = kept
     for i in range(kept):
         common, size, other = 0, 0, 0
@@ -153,7 +153,7 @@ def _keep(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> int:
         if common > _COMMON * min(size, other):
             if score >= scores[i] - 1e-9:
                 return kept
-            # the new one takes its place
+            # the new one replaces it
             for k in range(i, kept - 1):
                 copy_to(sets[k], sets[k + 1])
                 scores[k] = scores[k + 1]
@@ -180,16 +180,16 @@ def _keep_at(sets: Any, scores: Floats, kept: int, new: Any, score: float) -> in
 
 
 def with_cuts(cols: Any, weights: Floats, num_rows: int, sets: Any) -> Program:
-    """The linear program of columns over rows, and a further row for the cut of each set."""
+    """The linear program of columns over rows, with a further row for the cut of each set."""
     start, rows, sides = _entries(cols, num_rows, sets)
     return Program(weights, start, rows, sides, cols.shape[1])
 
 
 @njit
 def _entries(cols: Any, num_rows: int, sets: Any) -> Any:
-    """Where each column's rows begin, the rows, and the right-hand sides.
+    """Start of each column's rows, the rows, and the right-hand sides.
 
-    A plain tuple: where Ctrl-C comes while a result is converted, numba calls a record's class without having found it.
+    A plain tuple: when Ctrl-C interrupts the conversion of a record, numba calls its class without having found it.
     """
     num, num_sensors = cols.shape
     start = np.zeros(num + 1, np.int64)

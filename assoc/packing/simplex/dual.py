@@ -1,8 +1,8 @@
-"""The dual simplex method: from multipliers that are feasible to those that are optimal, uphill all the way.
+"""The dual simplex method: from feasible multipliers to optimal ones, with a rising bound.
 
-The variable that leaves is chosen by the steepest edge. Its weights, the lengths of the inverse's rows, cost next to
-nothing here, as the pass over the inverse that changes it yields them. The one that enters is chosen by the ratio test
-of Harris: among those that come first to within a tolerance, the one with the largest pivot.
+The leaving variable is chosen by steepest edge. Its weights, the lengths of the inverse's rows, are cheap here, as they
+result from the pass that updates the inverse. The entering variable is chosen by Harris' ratio test: of the variables
+whose ratio is least to within a tolerance, the one with the largest pivot.
 
 References
 ----------
@@ -34,25 +34,25 @@ from assoc.packing.simplex.basis import (
 from assoc.packing.simplex.pricing import Pricing, list_columns, price, sum_rows
 from assoc.packing.simplex.program import Allowed, Program, make_feasible
 
-# how a search ends: at the optimum, at the cutoff, without any solution, or before
+# status of a program: optimal, cutoff reached, infeasible, or stopped before
 OPTIMAL, CUT, INFEASIBLE, STOPPED = 0, 1, 2, 3
 
-# values this far beyond their limits are within them; entries below this in a row of the tableau are 0
+# values this far beyond their limits count as within them; smaller entries in a row of the tableau count as 0
 _VALUE = 1e-9
 _ENTRY = 1e-9
-# reduced costs, as a share of the largest weight: this far below 0 they are 0
+# reduced costs this far below 0, as a share of the largest weight, count as 0
 _COST = 1e-12
-# exchanges between two looks at the residual and at the clock, and after which everything is computed anew: a basis
-# may be at work for thousands of short calls
+# pivots between two checks of the residual and of the clock, and between two refactorisations: a basis may be used
+# for thousands of short calls
 _LOOK = 20
 _FRESH = 400
 _RESIDUAL = 1e-9
-# exchanges for each row, many times what it takes: among costs of many magnitudes rounding can lead round in circles
+# most pivots for each row, many times the usual number: among costs of many magnitudes rounding can cause cycling
 _A_ROW = 200
 
 
 class Effort(NamedTuple):
-    """Where a search stops: at a bound of ``cutoff``, after so many exchanges, at a deadline (clock.py)."""
+    """When to stop: at a bound of ``cutoff``, after ``exchanges`` pivots, or at a deadline (clock.py)."""
 
     cutoff: float
     exchanges: int
@@ -61,13 +61,13 @@ class Effort(NamedTuple):
 
 @njit
 def most_exchanges(program: Program) -> int:
-    """Exchanges after which an optimum that has not been found is given up."""
+    """Pivots after which the search for the optimum is given up."""
     return _A_ROW * program.sides.size
 
 
 @inner_njit
 def cost_tolerance(program: Program, allowed: Allowed) -> float:
-    """Reduced costs this far below 0 are 0."""
+    """Reduced costs this far below 0 count as 0."""
     scale = 0.0
     for j in allowed.active:
         scale = max(scale, abs(program.weights[j]))
@@ -76,7 +76,7 @@ def cost_tolerance(program: Program, allowed: Allowed) -> float:
 
 @inner_njit
 def bound_of(program: Program, basis: Basis) -> float:
-    """The bound of the multipliers, as they are."""
+    """The bound of the multipliers, without a check of their feasibility."""
     sides, duals = program.sides, basis.duals
     bound = 0.0
     for r in range(sides.size):
@@ -86,7 +86,7 @@ def bound_of(program: Program, basis: Basis) -> float:
 
 @inner_njit
 def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
-    """Note which places have a variable that may be above 0: columns and slacks that are allowed."""
+    """Mark the positions whose variable may be above 0: allowed columns and slacks."""
     num, size = program.weights.size, program.sides.size
     variable, columns, slack = basis.variable, allowed.columns, allowed.slack
     for i in range(size):
@@ -96,13 +96,13 @@ def note_free(program: Program, allowed: Allowed, basis: Basis) -> None:
 
 @inner_njit
 def leaving(basis: Basis) -> int:
-    """The place whose variable is farthest outside its limits, measured along the edge; -1: none is."""
+    """The position whose variable is farthest outside its limits, measured along the edge; -1 if none is."""
     values, norms, free, scores = basis.values, basis.norms, basis.free, basis.pricing.ratios
     for i in range(values.size):
         value = values[i]
         inside = value >= -_VALUE and (free[i] or value <= _VALUE)
         score = value * value / norms[i]
-        # whatever rounding made of the norms, what is outside its limits must be found
+        # variables outside their limits must be found even if rounding has spoilt the norms
         score = score if score > 0.0 else np.inf
         scores[i] = 0.0 if inside else score
     return int(place_of_largest(basis.pricing.bits, values.size))
@@ -110,7 +110,7 @@ def leaving(basis: Basis) -> int:
 
 @inner_njit
 def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
-    """Fill ``entries`` with the row of the tableau and ``reduced`` with what slacks cost; how many there are."""
+    """Fill ``entries`` with the tableau row and ``reduced`` with the slacks' reduced costs; return their number."""
     row, duals, in_basis, slack, pricing = basis.row, basis.duals, basis.slack_place, allowed.slack, basis.pricing
     entries, reduced, count = pricing.entries, pricing.reduced, pricing.listed[0]
     sum_rows(row, sign, pricing, entries)
@@ -122,28 +122,28 @@ def _fill_entries(allowed: Allowed, basis: Basis, sign: float) -> int:
 
 @inner_njit
 def _fill_ratios(pricing: Pricing, count: int, tolerance: float) -> None:
-    """Fill ``ratios`` with how far the multipliers can move until each reduced cost is below 0 by the tolerance."""
+    """Fill ``ratios`` with the steps of the multipliers at which each reduced cost is below 0 by the tolerance."""
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
     for a in range(count):
         room = reduced[a] + tolerance
         ratio = (0.0 if room < 0.0 else room) / entries[a]
-        # what is no number is no ratio
+        # NaN is not a ratio
         ratios[a] = ratio if entries[a] > _ENTRY and ratio >= 0.0 else np.inf
 
 
 @inner_njit
 def _fill_pivots(pricing: Pricing, count: int, least: float) -> None:
-    """Fill ``ratios`` with the entries of those whose reduced costs reach 0 by then, and 0 for all others."""
+    """Fill ``ratios`` with the entries of the variables whose reduced costs reach 0 by then, and 0 for all others."""
     entries, reduced, ratios = pricing.entries, pricing.reduced, pricing.ratios
     for a in range(count):
-        # a product may be too large for a number
+        # the product may overflow
         passed = reduced[a] <= least * entries[a] and reduced[a] < np.inf and entries[a] > _ENTRY
         ratios[a] = entries[a] if passed else 0.0
 
 
 @inner_njit
 def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tolerance: float) -> Any:
-    """The variable that first limits the step of the multipliers, and the step; -1: none does.
+    """The variable that first limits the step of the multipliers, and the step; -1 if none does.
 
     Fills ``entries`` with the row of the tableau, of the listed columns and the slacks.
     """
@@ -164,7 +164,7 @@ def entering(program: Program, allowed: Allowed, basis: Basis, sign: float, tole
 
 @inner_njit
 def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: float, step: float) -> None:
-    """Move the multipliers along the row of place p, and the reduced costs with them."""
+    """Move the multipliers along the row of position p, and update the reduced costs."""
     pricing, row, duals = basis.pricing, basis.row, basis.duals
     reduced, entries = pricing.reduced, pricing.entries
     for a in range(pricing.listed[0]):
@@ -178,11 +178,11 @@ def step_along(program: Program, allowed: Allowed, basis: Basis, p: int, sign: f
 
 @njit
 def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort) -> Any:
-    """Make a basis optimal; how it ended, and the exchanges made.
+    """Make a basis optimal; return the status and the number of pivots.
 
-    Its multipliers should be feasible for what is allowed now; where they are not, the search begins from others that
-    are. At the end ``duals`` give the bound, whatever the end (program.py: ``certified``). Without a solution they are
-    moved until their bound is the cutoff.
+    If its multipliers are not feasible for the allowed columns and slack, the search starts from others that are. At
+    the end ``duals`` give the bound, whatever the status (program.py: ``certified``). If the program is infeasible they
+    are moved until their bound reaches the cutoff.
     """
     num = program.weights.size
     tolerance = cost_tolerance(program, allowed)
@@ -190,7 +190,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
     _make_fit(program, allowed, basis, 1e3 * tolerance)
     done = 0
     age, row = basis.age, basis.row
-    # whether everything is to be computed anew
+    # whether to refactor
     stale = False
     while True:
         if done % _LOOK == 0 and is_over(effort.deadline):
@@ -219,7 +219,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
             if age[0] > 0:
                 stale = True
                 continue
-            # the multipliers can rise for ever; as far as they are asked for is enough
+            # the bound is unlimited; raise it to the cutoff
             step_along(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
             return INFEASIBLE, done
         if chosen < num:
@@ -239,7 +239,7 @@ def solve_dual(program: Program, allowed: Allowed, basis: Basis, effort: Effort)
 
 @inner_njit
 def _make_fit(program: Program, allowed: Allowed, basis: Basis, tolerance: float) -> None:
-    """Compute what depends on what is allowed; where the multipliers are not feasible, begin from others."""
+    """List the allowed columns and price them; if the multipliers are not feasible, start from others."""
     least = price(program, basis.duals, basis.place, basis.pricing)
     for r in range(basis.duals.size):
         if allowed.slack[r]:

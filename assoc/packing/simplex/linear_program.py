@@ -1,4 +1,4 @@
-"""The linear program of a packing: solved once for its bound, or again and again while columns come and go.
+"""The linear program of a packing: solved once for its bound, or repeatedly while the allowed columns change.
 
     program = LinearProgram(packing)
     relaxed = program.solve(duals=dual_bound(packing))       # from the multipliers of the dual ascent
@@ -6,7 +6,7 @@
     program.solve(columns=relaxed.reduced <= gap)            # warm: a few exchanges from the basis at hand
     program.back()                                           # where the mark is
 
-Kernels that search on their own take the same steps: `begin_from_duals`, `solve_dual`, `certified`.
+Search kernels take the same steps: `begin_from_duals`, `solve_dual`, `certified`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from assoc.packing.simplex.program import (
     weight_limit,
 )
 
-# columns for each row that are looked at first, and how many times as many in the next round
+# columns for each row in the first round, and their growth from round to round
 _FEW = 20
 _MORE = 4
 # a reduced cost this far below 0, as a share of the largest weight, is not rounding
@@ -41,19 +41,19 @@ _LACK = 1e-11
 
 @dataclass(frozen=True, slots=True)
 class Relaxation:
-    """A linear program as far as it was solved.
+    """The state of a linear program when solving ended.
 
     Attributes
     ----------
     status : int
         ``OPTIMAL``; ``CUT``: the bound has reached the cutoff; ``INFEASIBLE``; ``STOPPED`` before the end.
     bound : float
-        No solution that uses what is allowed weighs less, whatever the status. ``inf``: there is none.
+        Lower bound on the allowed solutions, whatever the status; ``inf`` if there is none.
     duals, reduced : float arrays, shapes (R,) and (N,)
         Multipliers that give the bound (<= 0 on rows that may stay uncovered; those of further rows come last), and
         the reduced costs that they give: at least 0 on the columns that are allowed, but for rounding.
     primal : float array, shape (N,)
-        How much of each column the LP takes; the optimum's where the status is ``OPTIMAL``.
+        LP value of each column; optimal where the status is ``OPTIMAL``.
     exchanges : int
         Steps of the simplex method.
     """
@@ -72,7 +72,7 @@ class LinearProgram:
     Parameters
     ----------
     packing : Packing
-        One component or several (then as one program). Takes memory for its number of rows, squared.
+        One component, or several as one program. Memory grows with the square of its rows.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class LinearProgram:
     slack : bool array, shape (rows of the program,)
         Whether a row may stay uncovered.
     basis : Basis
-        Where the last call has ended.
+        The basis at the end of the last call.
     """
 
     def __init__(self, packing: Packing) -> None:
@@ -93,7 +93,7 @@ class LinearProgram:
 
     @classmethod
     def extended(cls, packing: Packing, program: Program, slack: NDArray[np.bool_], basis: Basis) -> LinearProgram:
-        """The program of a packing with further rows and columns after its own, warm from a basis.
+        """The program of a packing with further rows and columns after those of the packing, warm-started from a basis.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class LinearProgram:
         slack : bool array, shape (rows of the program,)
             Whether a row may stay uncovered.
         basis : Basis
-            Is changed from now on.
+            Taken over, and changed in place.
         """
         self = cls.__new__(cls)
         self._packing, self.program, self.slack, self.basis = packing, program, slack, basis
@@ -111,9 +111,9 @@ class LinearProgram:
 
     @staticmethod
     def memory(packing: Packing, more_rows: int = 0) -> float:
-        """Bytes that the program of a packing takes, and that of one with further rows."""
+        """Bytes of the program of a packing, with ``more_rows`` further rows."""
         rows = float(packing.num_rows + more_rows)
-        # a column's rows stand in the program and in two orders for pricing
+        # a column's rows are stored in the program and in two orders for pricing
         return 8.0 * rows * rows + (120.0 + 12.0 * max(packing.num_sensors - 8, 0)) * packing.num_columns
 
     def solve(
@@ -126,23 +126,23 @@ class LinearProgram:
         exchanges: int | None = None,
         deadline: float = np.inf,
     ) -> Relaxation:
-        """Solve the program for the columns and the slack that are allowed.
+        """Solve the program for the allowed columns and slack.
 
         Parameters
         ----------
         columns : bool array, shape (N,), optional
             Columns that may be used; by default all.
         slack : bool array, shape (R,), optional
-            Rows that may stay uncovered; by default those of the packing. Where all columns of a row but one are masked
-            and the row may not stay uncovered, that one is fixed.
+            Rows that may stay uncovered; by default those of the packing. The only allowed column of a row that must be
+            covered is fixed.
         duals : float array, shape (R,), optional
-            Multipliers to start from; they need not be feasible. By default the basis of the last call is warm.
+            Multipliers to start from; they need not be feasible. By default the basis of the last call is the start.
         cutoff : float
             Stop when the bound has reached it.
         exchanges : int, optional
-            Steps at the most; by default as many as it takes.
+            Most pivots; by default unlimited.
         deadline : float
-            When to stop (clock.py).
+            Time limit (clock.py).
         """
         packing, program, basis = self._packing, self.program, self.basis
         mask = np.ones(program.weights.size, dtype=np.bool_)
@@ -170,20 +170,20 @@ class LinearProgram:
         return Relaxation(status, np.inf if bound >= limit else bound, found, reduced, primal, done)
 
     def mark(self) -> None:
-        """Remember the basis, for `back`; takes as much memory again."""
+        """Save the basis for `back`; takes as much memory again."""
         if self._marked is None:
             self._marked = new_basis(self.program)
         copy_basis(self.basis, self._marked)
 
     def back(self) -> None:
-        """Return to the basis that was marked."""
+        """Return to the marked basis."""
         assert self._marked is not None, "nothing was marked"
         copy_basis(self._marked, self.basis)
 
     def _from_duals(self, allowed: Allowed, duals: Floats, effort: Effort) -> Any:
-        """Solve from multipliers: first with the columns of small reduced cost, then with those that this leaves out.
+        """Solve from multipliers: first with the columns of small reduced cost, then adding columns that violate them.
 
-        Most columns are far from any optimum, and looking at them in every step is most of the work.
+        Most columns are far from any optimum, and pricing them in every step would be most of the work.
         """
         program, basis = self.program, self.basis
         tolerance = _LACK * float(np.abs(program.weights).max(initial=0.0))
@@ -203,7 +203,7 @@ class LinearProgram:
             done += more
             if near is allowed or more >= effort.exchanges:
                 break
-            # the bound of the few is not yet that of all
+            # the bound of the chosen columns is not yet one of all columns
             if least_reduced(program, allowed, basis.duals) >= -tolerance:
                 break
             effort = effort._replace(exchanges=effort.exchanges - more)

@@ -1,8 +1,8 @@
-"""The allowed columns laid out for pricing: whole arrays, one for each sensor.
+"""The allowed columns, laid out for pricing as one array per sensor.
 
-Whatever the simplex method asks of all columns, the sum of something over the rows of each, is then a few sums of whole
-arrays, which processors do several at a time. Columns in the basis, and those that a trial leaves out, have the reduced
-cost ``inf``: no ratio test chooses them, and nothing has to ask. Slacks follow the columns where a ratio test looks.
+Sums over the rows of every column are then a few sums of whole arrays, which processors vectorise. Columns in the basis
+and those that a trial excludes have the reduced cost ``inf``, so that no ratio test chooses them. Slacks follow the
+columns in the arrays of the ratio test.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from assoc.packing.simplex.program import Allowed, Program
 
 
 class Pricing(NamedTuple):
-    """Room for ``n`` columns, of which ``listed[0]`` are listed, and after these for the ``m`` slacks.
+    """Buffers for ``n`` columns, of which ``listed[0]`` are listed, followed by the ``m`` slacks.
 
     Attributes
     ----------
     column : int32 array, shape (n,)
         The column at each position.
     position : int32 array, shape (n,)
-        The position of each column that is listed; of others anything.
+        The position of each listed column; undefined for others.
     codes : uint32 array, shape (max(width, 3), n)
-        Rows of the columns, by position; the number of rows, m, where a column has fewer.
+        Rows of the columns, by position, padded with the number of rows m.
     extra_position, extra_row : uint32 arrays
-        Further rows: those of cuts; ``listed[1]`` of them.
+        The ``listed[1]`` further rows of columns, those of cuts.
     reduced : float array, shape (n + m,)
-        Reduced costs by position; ``inf``: not to be chosen.
+        Reduced costs by position; ``inf`` for columns that must not enter.
     entries, ratios : float arrays, shape (n + m,)
-        A row of the tableau, by position, and how far the multipliers can move before each reduced cost is 0; then
-        the entries that may be pivots. Scores of places, where a variable is to leave.
+        A row of the tableau, by position, and the step of the multipliers at which each reduced cost is 0; then the
+        entries that may be pivots. Scores of the basis positions, when the leaving variable is chosen.
     bits : int64 array, shape (n + m,)
-        The same numbers as ``ratios``, in the same memory, read as whole numbers (kernels/extremes.py).
+        The memory of ``ratios``, read as whole numbers (kernels/extremes.py).
     terms : float array, shape (m + 1,)
-        Room for what is summed up, row by row; the last is 0.
+        Buffer for the terms of sums, by row; the last is 0.
     listed : int64 array, shape (2,)
-        How many columns and how many further rows are listed.
+        Numbers of columns and of further rows listed.
     """
 
     column: NDArray[np.int32]
@@ -57,7 +57,7 @@ class Pricing(NamedTuple):
 
 
 def new_pricing(program: Program) -> Pricing:
-    """Room for the columns of a program."""
+    """Allocate pricing for the columns of a program."""
     num, size = program.weights.size, program.sides.size
     extra = int(np.maximum(np.diff(program.start) - program.width, 0).sum())
     ratios = np.empty(num + size)
@@ -116,7 +116,7 @@ def sum_rows(terms: Floats, factor: float, pricing: Pricing, sums: Floats) -> No
 
 @inner_njit
 def price(program: Program, duals: Floats, place: NDArray[np.int32], pricing: Pricing) -> float:
-    """Compute the reduced costs of the listed columns; the least of those that are not in the basis."""
+    """Compute the reduced costs of the listed columns; return the least outside the basis."""
     reduced, column, weights, count = pricing.reduced, pricing.column, program.weights, pricing.listed[0]
     sum_rows(duals, 1.0, pricing, reduced)
     least = 0.0

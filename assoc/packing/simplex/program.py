@@ -1,9 +1,9 @@
-"""A packing's linear program in the form of the simplex kernels, and bounds that hold whatever they did.
+"""A packing's linear program in the form of the simplex kernels, and bounds that are valid whatever the kernels did.
 
     min  sum_j w_j x_j     so that     sum_{j in r} a_rj x_j + s_r = b_r  for every row r,     x >= 0, s >= 0
 
 A column is the list of its rows; a row that is listed twice has the coefficient 2. Rows of measurements have b = 1;
-rows of cuts may have more. The slack s_r belongs to rows that may stay uncovered; elsewhere it is 0.
+rows of cuts may have more. The slack s_r is 0 for rows that must be covered.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Program(NamedTuple):
     start : int64 array, shape (n + 1,)
         Column j has the rows ``rows[start[j]:start[j + 1]]``.
     rows : int32 array
-        Rows of the columns, one after the other.
+        Rows of the columns, concatenated.
     sides : float array, shape (m,)
         Right-hand sides b, whole numbers.
     width : int
-        Rows of measurements that a column has at the most; they come first, then those of cuts.
+        Most rows of measurements that a column has; they come first, then those of cuts.
     """
 
     weights: Floats
@@ -44,14 +44,14 @@ class Program(NamedTuple):
 
 
 class Allowed(NamedTuple):
-    """What a solution may use: a mask on the program.
+    """The columns and slacks that a solution may use.
 
     Attributes
     ----------
     active : int32 array
         Columns that may be used, ascending.
     columns : bool array, shape (n,)
-        The same as a mask.
+        Mask of the same columns.
     slack : bool array, shape (m,)
         Rows that may stay uncovered.
     """
@@ -103,7 +103,7 @@ def least_reduced(program: Program, allowed: Allowed, duals: Floats) -> float:
 
 @njit
 def make_feasible(program: Program, allowed: Allowed, duals: Floats) -> None:
-    """Lower multipliers until no allowed column has a negative reduced cost, each by what it lacks."""
+    """Lower multipliers until no allowed column has a negative reduced cost."""
     slack, start, rows = allowed.slack, program.start, program.rows
     for r in range(duals.size):
         if slack[r] and duals[r] > 0.0:
@@ -116,10 +116,10 @@ def make_feasible(program: Program, allowed: Allowed, duals: Floats) -> None:
 
 @njit
 def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
-    """A lower bound on all whole-numbered solutions that holds whatever the multipliers are.
+    """A lower bound on all whole-numbered solutions that is valid for any multipliers.
 
-    What reduced costs lack to zero is charged for as many columns as a solution can have, and what rounding can have
-    hidden is taken off.
+    The most negative reduced cost is charged for as many columns as a solution can have, and a margin for rounding is
+    subtracted.
     """
     sides, slack, weights, start, rows = program.sides, allowed.slack, program.weights, program.start, program.rows
     total = 0.0
@@ -128,7 +128,7 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
     most = 0.0
     for r in range(duals.size):
         u = min(duals[r], 0.0) if slack[r] else duals[r]
-        # what an addition loses is kept: a plain sum of many terms is wrong by more than the margin
+        # compensated summation: the error of a plain sum of many terms exceeds the margin
         term = sides[r] * u
         new = total + term
         part = new - total
@@ -137,7 +137,7 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
         size += sides[r] * abs(u)
         most += sides[r]
     least = 0.0
-    # not a literal 0: numba would compile what it is given to for that, too
+    # not a literal 0: numba would compile the functions that take it a second time, for the literal
     longest = np.int64(0)
     for j in allowed.active:
         longest = max(longest, start[j + 1] - start[j])
@@ -150,12 +150,12 @@ def certified(program: Program, allowed: Allowed, duals: Floats) -> float:
 
 
 def weight_limit(program: Program) -> float:
-    """More than any solution can weigh: a bound beyond it says that there is none."""
+    """An upper bound on any solution's weight: a lower bound above it shows that there is no solution."""
     most = float(np.abs(program.weights).max(initial=0.0))
     return 1.0 + 2.0 * most * program.sides.size
 
 
 def all_allowed(program: Program, slack: NDArray[np.bool_]) -> Allowed:
-    """No mask: every column, and the slack of the rows that have one."""
+    """Allow every column, and the slack of the rows that have one."""
     num = program.weights.size
     return Allowed(np.arange(num, dtype=np.int32), np.ones(num, np.bool_), slack.copy())

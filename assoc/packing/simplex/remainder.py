@@ -1,10 +1,10 @@
-"""What is left of a linear program once some of its columns are fixed: a smaller one, and where it begins.
+"""The remainder of a linear program after fixing some columns: a smaller program, and its starting basis.
 
-What the fixed columns take goes from the right-hand sides; columns that are no longer allowed go, and so do the rows
-that nothing is left for. All that a search does then costs as much as the rest has rows, squared.
+The fixed columns are subtracted from the right-hand sides. Columns that are no longer allowed are removed, and so are
+rows that are satisfied. The cost of a search on the remainder grows with the square of its rows.
 
-No column of the rest has an entry in a row that is gone. So the multipliers of the other rows are as good as they were,
-and those variables of the basis that are still there are part of a basis; anchors take the places that are open.
+No remaining column has an entry in a removed row. So the multipliers of the remaining rows stay feasible, and the
+remaining variables of the basis are part of a basis; anchors fill the free positions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from assoc.packing.simplex.program import Program
 
 
 class Remainder(NamedTuple):
-    """The rest of a program; n columns, m rows.
+    """The remainder of a program; n columns, m rows.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class Remainder(NamedTuple):
     slack : bool array, shape (m,)
         Whether a row may stay uncovered.
     columns, rows : int64 arrays, shapes (n,) and (m,)
-        Their places in the whole program, ascending.
+        Their indices in the whole program, ascending.
     variable : int32 array, duals : float array, shape (m,)
-        A basis and its multipliers. Where a variable is named twice the basis has an anchor.
+        A basis and its multipliers. Where a variable is repeated the basis has an anchor.
     """
 
     program: Program
@@ -44,17 +44,17 @@ class Remainder(NamedTuple):
 def remainder_of(
     program: Program, basis: Basis, fixed: NDArray[np.int64], columns: NDArray[np.int64], slack: NDArray[np.bool_]
 ) -> Remainder | None:
-    """Return what is left; None where the fixed columns do not fit.
+    """Return the remainder; None if the fixed columns do not fit together.
 
     Parameters
     ----------
     program : Program
     basis : Basis
-        Of this program.
+        A basis of this program.
     fixed : int array
-        Columns that are in every solution of the rest.
+        Columns that must be used.
     columns : int array
-        Columns that may be used besides, ascending; none has a measurement in common with one that is fixed.
+        Other columns that may be used, ascending; none shares a measurement with a fixed one.
     slack : bool array, shape (rows of the program,)
         Rows that may stay uncovered.
     """
@@ -63,7 +63,7 @@ def remainder_of(
         return None
     entries, counts = _entries(program, columns)
     used = np.bincount(entries, minlength=sides.size) > 0
-    # a row that must be covered stays where nothing can: it says that there is no solution
+    # a row that must be covered stays even if no column covers it: then there is no solution
     rows = np.flatnonzero(used | (~slack & (sides > 0.0)))
     row_place = np.full(sides.size, -1, dtype=np.int32)
     row_place[rows] = np.arange(rows.size)
@@ -74,7 +74,7 @@ def remainder_of(
 
 
 def _entries(program: Program, columns: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """The rows of columns, one after the other, and how many each has."""
+    """The rows of the columns, concatenated, and the number of each column."""
     first = program.start[columns]
     counts = program.start[columns + 1] - first
     ends = np.cumsum(counts)
@@ -89,7 +89,7 @@ def _variables(
     row_place: NDArray[np.int32],
     size: int,
 ) -> NDArray[np.int32]:
-    """What is left of a basis, numbered anew; the first one again where there is not enough."""
+    """The remaining variables of a basis, renumbered; the first is repeated where there are too few."""
     num = program.weights.size
     place = np.full(num, -1, dtype=np.int64)
     place[columns] = np.arange(columns.size)
@@ -99,6 +99,6 @@ def _variables(
     alone = np.where(there, columns.size + kind * size + row_place[row], -1)
     numbered = np.where(is_column, place[np.where(is_column, variable, 0)], alone)
     numbered = numbered[numbered >= 0]
-    # a basis without any of them is one of anchors
+    # a basis without remaining variables has only anchors
     first = numbered[0] if numbered.size else columns.size + size
     return np.concatenate([numbered, np.full(size - numbered.size, first)]).astype(np.int32)

@@ -1,9 +1,8 @@
-"""Some steps of the dual simplex method from a basis that stays as it is: what a branch would bring.
+"""Some steps of the dual simplex method from an unchanged basis, to estimate the gain of a branch.
 
-The inverse is not changed. What the exchanges have made of it is kept as their *etas* (the product form of the
-inverse): after k of them a row or a column of the tableau takes k sums more, which for a few dozen of exchanges is far
-less than changing the inverse each time. The weights of the leaving variables are those of Devex here, as those of the
-steepest edge would need the whole inverse.
+The inverse is not changed. The pivots are kept as *etas* (the product form of the inverse): after k pivots a row or a
+column of the tableau takes k more sums, which for a few dozen pivots is far less than updating the inverse each time.
+Leaving variables are chosen by Devex weights, as those of the steepest edge would need the whole inverse.
 
 References
 ----------
@@ -43,23 +42,23 @@ _LEAST = 1e-4
 
 
 class Trial(NamedTuple):
-    """A basis at some exchanges from another one; ``K`` of them at the most.
+    """A basis up to ``K`` pivots from another one.
 
     Attributes
     ----------
     basis : Basis
-        All of it but the inverse, which has no elements here.
+        The basis, with an empty inverse.
     reduced : float array, shape (n,)
         Reduced costs at the other basis, by position.
     rows : float array, shape (m, m)
-        The other basis's inverse by rows: that one has it by columns.
+        The other basis's inverse by rows; that basis stores it by columns.
     etas : float array, shape (K, m)
-        Of each exchange what it does to the coordinates of a vector: minus the entering column's over the pivot, and 1
-        over the pivot in its place.
+        Effect of each pivot on the coordinates of a vector: minus the entering column over the pivot element, and 1
+        over the pivot element at the pivot's position.
     pivots : int32 array, shape (K,)
-        The place of each exchange.
+        The position of each pivot.
     factors, shares : float array, shape (m,), int32 array, shape (K + 1,)
-        Room: which rows of the other basis's inverse add up to one of this one's, and how much of each (else 0).
+        Buffers: the rows of the other basis's inverse that combine to one of this basis, and their factors (else 0).
     """
 
     basis: Basis
@@ -72,7 +71,7 @@ class Trial(NamedTuple):
 
 
 def new_trial(program: Program, exchanges: int) -> Trial:
-    """Room for a trial of so many exchanges."""
+    """Allocate a trial of up to ``exchanges`` pivots."""
     size = program.sides.size
     return Trial(
         basis_without(program, 0), np.empty(program.weights.size), np.empty((size, size)),
@@ -82,7 +81,7 @@ def new_trial(program: Program, exchanges: int) -> Trial:
 
 @inner_njit
 def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) -> None:
-    """Note the basis from which trials are to start, and what it allows."""
+    """Record the basis from which trials start, and what it allows."""
     pricing = trial.basis.pricing
     list_columns(program, allowed, pricing)
     price(program, base.duals, base.place, pricing)
@@ -95,7 +94,7 @@ def begin_trials(program: Program, allowed: Allowed, base: Basis, trial: Trial) 
 
 @inner_njit
 def _tableau_row(trial: Trial, done: int, p: int) -> None:
-    """Fill ``row`` with that of place p in the inverse, after the exchanges done."""
+    """Fill ``row`` with the inverse's row of position p, after the pivots done."""
     factors, shares, row = trial.factors, trial.shares, trial.basis.row
     etas, rows, pivots = trial.etas, trial.rows, trial.pivots
     factors[p] = 1.0
@@ -123,7 +122,7 @@ def _tableau_row(trial: Trial, done: int, p: int) -> None:
 
 @inner_njit
 def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, variable: int) -> None:
-    """Fill ``column`` with the coordinates of a variable in the basis, after the exchanges done."""
+    """Fill ``column`` with the coordinates of a variable in the basis, after the pivots done."""
     num, column, etas, pivots = program.weights.size, trial.basis.column, trial.etas, trial.pivots
     if variable < num:
         coordinates(program, base, variable, column)
@@ -140,7 +139,7 @@ def _tableau_column(program: Program, base: Basis, trial: Trial, done: int, vari
 
 @inner_njit
 def _exchange(trial: Trial, done: int, p: int) -> None:
-    """Let the variable of ``column`` take place p: the eta, the weights, the values."""
+    """Pivot: the variable of ``column`` enters at position p. Updates the eta, the weights, the values."""
     basis, etas = trial.basis, trial.etas
     column, values, norms = basis.column, basis.values, basis.norms
     pivot = column[p]
@@ -159,10 +158,10 @@ def _exchange(trial: Trial, done: int, p: int) -> None:
 
 @inner_njit
 def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effort: Effort) -> int:
-    """Take some steps from the optimal basis that was noted, after ``allowed`` has become less; how that ended.
+    """Take some steps from the recorded optimal basis, after ``allowed`` has been restricted; return the status.
 
-    Steps are at most as many as the trial has room for, and those of ``effort``. At the end the multipliers give the
-    bound that was reached (to rounding, so that they are to be made feasible).
+    Steps are limited by the trial's capacity and by ``effort``. At the end the multipliers give the bound reached. They
+    may be infeasible by rounding, so make them feasible before using it.
     """
     basis, num = trial.basis, program.weights.size
     copy_without_inverse(base, basis)
@@ -186,7 +185,7 @@ def try_dual(program: Program, allowed: Allowed, base: Basis, trial: Trial, effo
         _tableau_row(trial, done, p)
         chosen, step = entering(program, allowed, basis, sign, tolerance)
         if chosen < 0:
-            # the multipliers can rise for ever; as far as they are asked for is enough
+            # the bound is unlimited; raise it to the cutoff
             step_along(program, allowed, basis, p, sign, max(effort.cutoff - bound, 0.0) / abs(basis.values[p]) * 1.001)
             return INFEASIBLE
         _tableau_column(program, base, trial, done, chosen)
