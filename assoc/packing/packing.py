@@ -19,7 +19,7 @@ from assoc._system.compiled import inner_njit, njit
 
 
 class PackingArrays(NamedTuple):
-    """What kernels take of a packing; see `Packing`."""
+    """The arrays of a packing, as kernels take them; see `Packing`."""
 
     cols: NDArray[np.int32]
     weights: NDArray[np.float64]
@@ -47,9 +47,9 @@ class Packing:
     row_ptr, row_cols : int64 array (R + 1,), int32 array
         Columns of each row, ascending.
     origin : int32 array, shape (N,)
-        Each column's place in what this packing was made from.
+        Index of each column in the packing or tuples that this packing was made from.
     row_origin : int32 array, shape (R,)
-        Each row's place in what this packing was made from.
+        Index of each row in the packing or problem that this packing was made from.
     granularity : float
         1.0 where all weights are whole numbers, so that solutions differ by at least 1; else 0.0.
     arrays : PackingArrays
@@ -86,7 +86,7 @@ class Packing:
 
     @property
     def num_sensors(self) -> int:
-        """Number of sensors S: rows that a column has at the most."""
+        """Number of sensors S, the most rows that a column can have."""
         return int(self.cols.shape[1])
 
     @property
@@ -108,9 +108,9 @@ class Packing:
         return assemble(self.cols[chosen], self.weights[chosen], self.arrays.slack, chosen, self.granularity)
 
     def read_only(self) -> Packing:
-        """Return a copy whose fields cannot be written.
+        """Return a copy with read-only fields.
 
-        Its ``arrays`` can: numba would compile the kernels that take them anew for arrays that are read-only.
+        Its ``arrays`` stay writable: for read-only arrays numba would compile all kernels again.
         """
         names = (*PackingArrays._fields, "origin", "row_origin")
         arrays = {name: getattr(self, name).copy() for name in names}
@@ -122,7 +122,7 @@ class Packing:
         return copy
 
     def component(self, index: int) -> Packing:
-        """Return one component as a packing of its own."""
+        """Return one component as a separate packing."""
         first, last = int(self.col_start[index]), int(self.col_start[index + 1])
         top, end = int(self.row_start[index]), int(self.row_start[index + 1])
         cols = self.cols[first:last].copy()

@@ -1,4 +1,4 @@
-"""An assignment problem brought into packing form, and the way back."""
+"""Convert an assignment problem to packing form, and solutions back."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from assoc.packing.packing import Packing, assembled
 from assoc.problem import AssignmentProblem
 from assoc.solution import Solution
 
-# how far beyond what counts costs are from which on large ones are lowered; what is smaller than tolerances mean
+# costs above this many times the relevant ones are lowered; relevant costs below this are scaled up, for tolerances
 _FAR, _SMALL = 2.0**20, 2.0**-10
 
 
 class Conditioned(NamedTuple):
-    """A problem whose costs have a range that doubles can order, in place of another one.
+    """A replacement for another problem, with costs in a range that doubles can order.
 
     Attributes
     ----------
     problem : AssignmentProblem
-        The same tuples at costs that are no larger, in another unit.
+        The same tuples at equal or lower costs, in another unit.
     unit : float
-        A power of two: a cost of 1 stands for so much.
+        The unit of its costs, a power of two.
     lowered : bool array, shape (M,), or None
-        Tuples that cost less than in the other problem; None: it is that problem.
+        Tuples that cost less than in the other problem; None if the problem is unchanged.
     known : float
-        Solutions that cost less than this, in the unit of the other problem, have no lowered tuple.
+        Solutions that cost less than this, in the other problem's unit, have no lowered tuple.
     """
 
     problem: AssignmentProblem
@@ -40,7 +40,7 @@ class Conditioned(NamedTuple):
     known: float = math.inf
 
     def restored(self, problem: AssignmentProblem, solution: Solution) -> Solution:
-        """The solution as one of the other problem: bounds hold for it, as nothing there costs less."""
+        """The solution as one of the other problem; its bounds are valid there, as no cost is lower there."""
         if self.lowered is None:
             return solution
         cost = math.fsum(problem.costs[solution.indices].tolist())
@@ -49,12 +49,12 @@ class Conditioned(NamedTuple):
         return replace(solution, cost=cost, lower_bound=bound, duals=duals)
 
     def alters(self, solution: Solution) -> bool:
-        """Whether a solution has a tuple that costs less here."""
+        """Whether a solution has a lowered tuple."""
         return self.lowered is not None and bool(self.lowered[solution.indices].any())
 
 
 class PreparedArrays(NamedTuple):
-    """What kernels take of a prepared problem; see `Prepared` and `Packing`."""
+    """The arrays of a prepared problem, as kernels take them; see `Prepared` and `Packing`."""
 
     cols: NDArray[np.int32]
     weights: NDArray[np.float64]
@@ -68,7 +68,7 @@ class PreparedArrays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A problem in packing form and the way back.
+    """A problem in packing form, and the data to convert solutions back.
 
     Attributes
     ----------
@@ -89,17 +89,17 @@ class Prepared:
 
     @property
     def arrays(self) -> PreparedArrays:
-        """The columns and the way back from them, as kernels take them."""
+        """The columns and the data to convert solutions back, as kernels take them."""
         one = self.packing
         own = one.cols, one.weights, one.slack, one.origin, one.row_origin
         return PreparedArrays(*own, self.single, one.row_ptr, one.row_cols)
 
 
 def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
-    """Yield the problem with costs that are far above what counts lowered, then with fewer of them, till none is.
+    """Yield the problem with far too large costs lowered, then with fewer of them lowered, until none is.
 
-    A cost that is to rule a tuple out (a "big M") takes the digits of all that is added to it. A solution that is the
-    best, or the next, with lower costs and has none of these tuples is so in the problem itself.
+    A cost that is meant to exclude a tuple (a "big M") destroys the digits of all costs added to it. If the best (or
+    next) solution with lowered costs has no lowered tuple, it is also the best (or next) of the problem itself.
     """
     costs = problem.costs
     low, high = (float(costs.min()), float(costs.max())) if costs.size else (0.0, 0.0)
@@ -107,11 +107,11 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
     if high <= _FAR * least and not 0.0 < max(-low, high) < _SMALL:
         yield Conditioned(problem)
         return
-    # every solution has a tuple that costs as much as the dearest of each measurement's cheapest
+    # every solution has a tuple of at least this cost: the largest of the measurements' least costs
     counts = max(-low, _dearest_need(problem)) or least
     while True:
         shift = min(math.frexp(counts)[1], 0) if counts < _SMALL else 0
-        # more than solutions of costs that count differ by: one of those costs at most `size`, and at least -size
+        # more than the difference of two solutions of relevant costs, each between -size and size
         size = counts * float(problem.sizes.sum())
         ceiling = 8.0 * size if high > _FAR * counts else np.inf
         lowered = costs > ceiling
@@ -127,7 +127,7 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
 
 
 def _dearest_need(problem: AssignmentProblem) -> float:
-    """The largest of the least costs at which measurements that must be used can be; no less than 0."""
+    """The largest, over the measurements that must be used, of the least cost of a tuple with it; at least 0."""
     largest = 0.0
     for s, size in enumerate(problem.sizes.tolist()):
         if problem.dummy or size == problem.sizes.min():
@@ -139,7 +139,7 @@ def _dearest_need(problem: AssignmentProblem) -> float:
 
 
 def prepare(problem: AssignmentProblem) -> Prepared:
-    """Bring a problem into packing form; the result is kept with the problem, which never changes."""
+    """Convert a problem to packing form; the result is cached with the problem, which is immutable."""
     if problem._prepared is not None:
         return problem._prepared
     sizes = problem.sizes.astype(np.int64)
@@ -152,13 +152,13 @@ def prepare(problem: AssignmentProblem) -> Prepared:
     else:
         rows = (problem.tuples + (offsets - 1)[None, :]).astype(np.int32)
         slack = np.repeat(sizes > sizes.min(), sizes)
-        # the problem's are read-only: numba would compile kernels for those, too
+        # copies: the problem's arrays are read-only, and numba would compile kernels again for those
         costs = problem.costs.copy()
         arrays = assembled(rows, costs, slack, np.arange(problem.num_tuples, dtype=np.int32))
         whole = _whole_numbers(costs)
         single, single_cost = np.zeros(0, dtype=np.int64), np.zeros(0)
     packing = Packing(*(*arrays, 1.0 if whole else 0.0))
-    # the bound of every solution has this in it: to the last digit
+    # every bound contains this sum: exact to the last digit
     offset = math.fsum(single_cost.tolist()) if single_cost.any() else 0.0
     prepared = Prepared(packing, offset, single, single_cost)
     problem._prepared = prepared
@@ -177,7 +177,7 @@ def _prepare_with_dummies(
 
 @njit
 def _whole_numbers(weights: NDArray[np.float64]) -> bool:
-    """Whether all weights are whole numbers, so small that tolerances relative to their sums stay below 1."""
+    """Whether all weights are whole numbers, small enough that tolerances relative to their sums stay below 1."""
     if weights.size == 0:
         return False
     total = 0.0

@@ -1,4 +1,4 @@
-"""What a solver is given besides the problem, and what it gives back."""
+"""A solver's run and its outcome: the inputs besides the problem, and the results."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 Callback = Callable[[TracePoint], object]
 
-# points of a trace at the most
+# most points of a trace
 _TRACE = 100_000
-# seconds after which a bound that rose is worth a point
+# seconds after which a risen bound gets a point
 _NEWS = 0.5
 
 
 def memory_allows(needed: float) -> bool:
-    """Whether there is memory for so many bytes more: the budget of a search that belongs to no run."""
+    """Whether there is memory for ``needed`` bytes more, for a search without a run."""
     return memory.fits(needed)
 
 
@@ -40,27 +40,27 @@ class Run:
     Attributes
     ----------
     seed : int, SeedSequence or Generator
-        Where ``rng`` comes from.
+        Seed of ``rng``.
     offset : float
-        Added to packing weights gives costs of the problem (the cost of all singletons).
+        Packing weight plus offset is the problem's cost (the offset is the cost of all singletons).
     unit : float
-        The trace has costs in the problem's own unit, of which 1 in the packing is so many.
+        A packing weight of 1 in the problem's unit, which the trace uses.
     known : float
-        From this cost on the trace says ``inf``: some costs were lowered (`assoc.packing.prepare.Conditioned`).
+        The trace has ``inf`` for this cost and more: some costs were lowered (`assoc.packing.prepare.Conditioned`).
     time_limit : float or None
         Seconds from ``started``.
     callback : callable or None
-        Called with each TracePoint; a true answer stops the solver.
+        Called with each TracePoint; a true result stops the solver.
     reserve : float
-        Seconds before the limit at which searches end: what follows them takes passes over all columns (fallback.py).
+        Searches end this many seconds before the limit: passes over all columns follow them (fallback.py).
     fallback : int array or None
-        The greedy choice of columns, where it was made first (fallback.py).
+        The greedy choice of columns, if it was made first (fallback.py).
     start : int array or None
-        Columns of a solution that is known; no answer costs more, and solvers begin with it where they can.
+        Columns of a known solution; the result costs no more, and solvers begin with it where they can.
     watch : callable or None
-        Called by solvers that keep a state worth seeing, after each iteration: `aco` with its ``Cycle``.
+        Called after each iteration by solvers with a state to show: `aco` passes its ``Cycle``.
     compiled : float
-        Seconds that this thread had spent on compiling before the run.
+        Seconds that this thread had spent compiling before the run.
     """
 
     seed: int | np.random.SeedSequence | np.random.Generator
@@ -81,23 +81,23 @@ class Run:
 
     @property
     def rng(self) -> np.random.Generator:
-        """The only source of randomness; made when a solver first needs it, which on easy problems is never."""
+        """The only source of randomness; created on first use, which on easy problems is never."""
         if self._rng is None:
             self._rng = np.random.default_rng(self.seed)
         return self._rng
 
     def elapsed(self) -> float:
-        """Seconds since the start, compiling included: what a time limit limits."""
+        """Seconds since the start, including compiling; the time limit applies to these."""
         return time.perf_counter() - self.started
 
     def compile_time(self) -> float:
-        """Seconds of these in which kernels were compiled, or loaded as the solver's modules were."""
+        """Seconds of these spent compiling kernels, or loading kernels and the solver's modules."""
         seconds = compile_seconds() - self.compiled
-        # a callback's thread may have compiled less than the one that began
+        # a callback's thread may have compiled less than the thread that began the run
         return seconds if seconds > 0.0 else 0.0
 
     def runtime(self) -> float:
-        """Seconds of the search alone: what results report."""
+        """Seconds of the search alone, as results report them."""
         return time.perf_counter() - self.started - self.compile_time()
 
     def remaining(self) -> float:
@@ -105,11 +105,11 @@ class Run:
         return np.inf if self.time_limit is None else self.time_limit - self.reserve - self.elapsed()
 
     def deadline(self) -> float:
-        """When time is over, in seconds of `time.monotonic`: for kernels (clock.py); infinite without a time limit."""
+        """The time limit for kernels, in seconds of `time.monotonic` (clock.py); infinite without one."""
         return np.inf if self.time_limit is None else time.monotonic() + self.remaining()
 
     def should_stop(self) -> bool:
-        """Whether the time is over, or the callback or the user asked to stop; ``stopped_by`` says which."""
+        """Whether time is over, or the callback or the user asked to stop; sets ``stopped_by``."""
         if not self.stopped_by and self.remaining() <= 0.0:
             self.stopped_by = "time_limit"
         elif not self.stopped_by and end_is_asked():
@@ -117,11 +117,11 @@ class Run:
         return bool(self.stopped_by)
 
     def memory_allows(self, needed: float) -> bool:
-        """Whether so many bytes more may be taken: for searches that grow, and can do without."""
+        """Whether a search may allocate ``needed`` bytes more; for searches that can do without."""
         return memory_allows(needed)
 
     def is_silent(self) -> bool:
-        """Whether the trace has had no new point for so long that a search should say where it is."""
+        """Whether the trace has had no new point for so long that a search should add one."""
         return not self.trace or self.runtime() - self.trace[-1].seconds > _NEWS
 
     def record(self, iteration: int, weight: float, bound: float) -> None:
@@ -130,7 +130,7 @@ class Run:
         point = TracePoint(iteration, self.runtime(), cost if cost < self.known else math.inf, lower_bound)
         self.trace.append(point)
         if len(self.trace) > _TRACE:
-            # a search that improves for days: every second point is enough to see how, the first and last stay
+            # for a search that improves for days every second point is enough; the first and the last stay
             self.trace[1:-1] = self.trace[2:-1:2]
         if self.callback is not None and self.callback(point):
             self.stopped_by = self.stopped_by or "callback"
@@ -138,7 +138,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a solver found.
+    """The result of a solver.
 
     Attributes
     ----------
@@ -147,11 +147,11 @@ class Outcome:
     iterations : int
         Iterations used.
     lower_bound : float
-        A lower bound on the packing's optimum that this package has proved, by branch and bound, say. What a solver
-        from elsewhere says here is not believed.
+        A lower bound on the packing's optimum, proved by this package, for example by branch and bound. Bounds of
+        external solvers are not accepted.
     duals : float array or None
-        Multipliers of the packing's rows. Where there is no lower bound (-inf) it is computed from these; where there
-        is one they prove it, or are None.
+        Multipliers of the packing's rows. Without a lower bound (-inf) it is computed from these; with one they prove
+        it, or are None.
     """
 
     columns: NDArray[np.integer]

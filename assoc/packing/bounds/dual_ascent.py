@@ -1,4 +1,4 @@
-"""The dual bound: multipliers of the measurements from which every solver's certificate comes.
+"""The dual bound: multipliers of the measurements, the basis of every solver's certificate.
 
 For multipliers u (u <= 0 on rows with slack) the reduced cost of a column is its weight less the u of its
 rows. When no reduced cost is negative, sum(u) bounds every solution from below: this is linear programming
@@ -33,15 +33,15 @@ LEVELS = 11
 PASSES = 1000
 # over-relaxation: the kernel takes total ** 1.5 as total * sqrt(total)
 RELAXATION = 1.5
-# columns of a reduced cost of more temperatures than this weigh less than 1e-5
+# columns whose reduced cost is more than this many temperatures weigh less than 1e-5
 NEAR = 12.0
-# columns visited between two looks at the clock: about a millisecond in a kernel, and some fifty between kernels
+# columns visited between two checks of the clock: about a millisecond within a kernel, some fifty between kernels
 _LOOK = 200_000
 _VISITS = 10_000_000
 
 
 class SmoothPoint(NamedTuple):
-    """Where the smoothed ascent stands; changed in place.
+    """The state of the smoothed ascent; changed in place.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class SmoothPoint(NamedTuple):
 
 
 class _Near(NamedTuple):
-    """The columns of small reduced cost: numbered by ``place`` (-1: not near), listed by row."""
+    """The columns of small reduced cost: numbered by ``place`` (-1: not near), and listed by row."""
 
     place: Any
     row_ptr: Any
@@ -68,7 +68,7 @@ class _Near(NamedTuple):
 
 
 def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, run: Run | None = None) -> Floats:
-    """Return feasible multipliers of nearly the LP bound.
+    """Return feasible multipliers whose bound is nearly the LP bound.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ def dual_bound(packing: Packing, *, levels: int = LEVELS, passes: int = PASSES, 
     levels : int
         Temperatures, each half the one before.
     passes : int
-        Passes over the rows at one temperature at the most.
+        Most passes over the rows at one temperature.
     run : Run, optional
-        Its time limit is kept: the multipliers are feasible whenever they are returned.
+        Its time limit holds; the multipliers are feasible even if time runs out.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def _ascend(
     course: tuple[int, int],
     deadline: float,
 ) -> int:
-    """Cool through levels until all are done or the visits are used up; how many are done (-1: none, not begun)."""
+    """Cool through levels until all are done or the visits are used up; return the number done (-1: not begun)."""
     levels, passes = course
     begun = done >= 0
     if not begun:
@@ -117,11 +117,11 @@ def _ascend(
     total = 0
     while done < levels and total < _VISITS:
         if not is_over(deadline):
-            # in one go: in turns the passes would begin plainly again and again
+            # all passes of a level in one call: each call begins with plain passes
             total += smooth_passes(packing, point, temperature, passes, deadline)
         temperature *= COOLING
         done += 1
-    # where time was over from the beginning, the first pass stands: another would find the same
+    # if time was over at the beginning, the first pass is enough: another would find the same
     if done == levels and (begun or total > 0):
         hard_sweeps(packing, point.duals, point.reduced, 2)
     return done
@@ -142,8 +142,8 @@ def reduced_costs(packing: Packing, duals: Floats) -> Floats:
 def component_bounds(packing: Packing, duals: Floats) -> Floats:
     """Return a valid lower bound for each component, shape (C,), from any multipliers.
 
-    Positive multipliers of rows with slack are taken as 0. A negative reduced cost (rounding) is charged
-    for as many columns as a solution can have, so that the bound holds whatever ``duals`` are.
+    Positive multipliers of rows with slack count as 0. A negative reduced cost (rounding) is charged
+    for as many columns as a solution can have, so that the bound is valid for any ``duals``.
     ``inf`` means that a row without slack has no column: there is no solution.
     """
     return bounds_by_component(packing.arrays, duals, np.empty(packing.num_columns))
@@ -156,7 +156,7 @@ def certified_bound(packing: Packing, duals: Floats) -> float:
 
 @njit
 def spread(packing: PackingArrays) -> Floats:
-    """For each component the spread of its weights (with 0, where rows have slack), shape (C,); never 0."""
+    """Spread of the weights of each component (including 0 if rows have slack), shape (C,); never 0."""
     weights, slack, col_start, row_start = packing.weights, packing.slack, packing.col_start, packing.row_start
     result = np.ones(col_start.size - 1)
     for c in range(result.size):
@@ -192,8 +192,8 @@ def fill_reduced(packing: PackingArrays, duals: Floats, reduced: Floats) -> None
 def hard_sweeps(packing: PackingArrays, duals: Floats, updated: Floats, sweeps: int) -> None:
     """Passes with the hard minimum: each row takes the least reduced cost of its columns.
 
-    ``updated`` is left with the reduced costs as the passes have updated them. Beside large weights they are wrong by
-    as much as rounding has taken, so that they decide nothing: see `bounds_by_component`.
+    ``updated`` receives the updated reduced costs. Rounding makes them inexact where weights are large, so that
+    decisions need the exact ones: see `bounds_by_component`.
     """
     fill_reduced(packing, duals, updated)
     slack, row_ptr, row_cols = packing.slack, packing.row_ptr, packing.row_cols
@@ -210,7 +210,7 @@ def hard_sweeps(packing: PackingArrays, duals: Floats, updated: Floats, sweeps: 
 
 @inner_njit
 def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
-    """Sum of ``values[places[first:end]]`` in four strands, which do not wait for each other."""
+    """Sum of ``values[places[first:end]]`` in four independent partial sums, which processors overlap."""
     a = b = c = d = 0.0
     k = first
     while k + 4 <= end:
@@ -227,7 +227,7 @@ def _gathered_sum(values: Floats, places: Any, first: int, end: int) -> float:
 
 @inner_njit
 def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Floats, passes: int, deadline: float) -> int:
-    """Move ``point`` by smoothed passes at one temperature per component; the column visits made."""
+    """Move ``point`` by smoothed passes at one temperature per component; return the column visits."""
     slack, row_start, row_ptr = packing.slack, packing.row_start, packing.row_ptr
     duals, reduced, primal, slack_primal = point
     scale = np.empty(slack.size)
@@ -246,7 +246,7 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
         done = 0
         worst = 1.0
         while done < passes and worst >= 0.01 and not over:
-            # columns far above the minimum weigh nothing: they are left out and looked at again now and then
+            # columns far above the minimum weigh nothing: they are left out and checked again now and then
             _list_near(packing, duals, reduced, c, NEAR * t, near)
             for j in range(packing.col_start[c], packing.col_start[c + 1]):
                 if place[j] >= 0:
@@ -265,7 +265,7 @@ def smooth_passes(packing: PackingArrays, point: SmoothPoint, temperature: Float
                     if not 1e-200 < total < 1e200:
                         continue
                     worst = max(worst, abs(total - 1.0))
-                    # total ** -1.5, where over-relaxed; the logarithm is left to the end of the passes
+                    # total ** -1.5, where over-relaxed; logarithms are taken after the passes
                     factor = 1.0 / total if plain else 1.0 / (total * math.sqrt(total))
                     if 1e-3 < total < 1e3 and 1e-200 < scale[r] < 1e200:
                         scale[r] *= factor
@@ -311,7 +311,7 @@ def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, l
     for r in range(top, end):
         near_ptr[r] = position
         for k in range(row_ptr[r], row_ptr[r + 1]):
-            # written whether near or not: no branch to predict
+            # written whether near or not: no branch to mispredict
             near_cols[position] = place[row_cols[k]]
             position += place[row_cols[k]] >= 0
     near_ptr[end] = position
@@ -319,9 +319,9 @@ def _list_near(packing: PackingArrays, duals: Floats, reduced: Floats, c: int, l
 
 @njit
 def bounds_by_component(packing: PackingArrays, duals: Floats, reduced: Floats) -> Floats:
-    """The kernel of ``component_bounds``; fills in the reduced costs with which the bounds hold.
+    """The kernel of ``component_bounds``; fills in the reduced costs of the bounds.
 
-    A solution with column j weighs at least its component's bound and ``reduced[j]``: what columns are dropped by.
+    A solution with column j weighs at least its component's bound plus ``reduced[j]``: the test for dropping columns.
     """
     cols, weights, slack, row_ptr = packing.cols, packing.weights, packing.slack, packing.row_ptr
     row_start, col_start = packing.row_start, packing.col_start
@@ -333,7 +333,7 @@ def bounds_by_component(packing: PackingArrays, duals: Floats, reduced: Floats) 
         size = 0.0
         for r in range(row_start[c], row_start[c + 1]):
             u = min(duals[r], 0.0) if slack[r] else duals[r]
-            # what an addition loses is kept: a plain sum of many terms is wrong by more than the margin
+            # compensated summation: the error of a plain sum of many terms exceeds the margin
             new = total + u
             part = new - total
             lost += (total - (new - part)) + (u - part)
@@ -351,6 +351,6 @@ def bounds_by_component(packing: PackingArrays, duals: Floats, reduced: Floats) 
                     value -= min(duals[r], 0.0) if slack[r] else duals[r]
             reduced[j] = value
             least = min(least, value)
-        # what is negative in the reduced costs, for as many columns as a solution can have, and what rounding hides
+        # the most negative reduced cost, for as many columns as a solution can have, and a margin for rounding
         bounds[c] = total + lost + least * (row_start[c + 1] - row_start[c]) - margin(size, num_sensors)
     return bounds

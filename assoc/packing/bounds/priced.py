@@ -1,4 +1,4 @@
-"""A packing with multipliers that price it: reduced costs and a bound that holds."""
+"""A packing priced by multipliers: reduced costs and a valid bound."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TOLERANCE = 1e-9
 
 
 class Prices(NamedTuple):
-    """What kernels take of a priced packing: reduced costs of the columns (N,), multipliers of the rows (R,)."""
+    """A priced packing as kernels take it: reduced costs of the columns (N,), multipliers of the rows (R,)."""
 
     reduced: Floats
     duals: Floats
@@ -31,9 +31,9 @@ class Priced:
     packing : Packing
         One component or several.
     duals, reduced : float arrays, shapes (R,) and (N,)
-        Feasible multipliers and the reduced costs that they give.
+        Feasible multipliers and their reduced costs.
     bound : float
-        No solution of the packing weighs less.
+        Lower bound on the packing's solutions.
     """
 
     packing: Packing
@@ -53,17 +53,17 @@ class Priced:
 
     @property
     def tolerance(self) -> float:
-        """Gains below this do not exist or do not count: rounding, or whole-numbered weights."""
+        """Gains below this do not count: they are rounding, or impossible with whole-numbered weights."""
         return max(TOLERANCE * max(1.0, abs(self.bound)), 0.999 * self.packing.granularity)
 
     def take_over(self, duals: Floats) -> None:
-        """Take over feasible multipliers if their bound is better."""
+        """Adopt feasible multipliers if their bound is better."""
         bound = certified_bound(self.packing, duals)
         if bound > self.bound:
             self.bound, self.duals, self.reduced = bound, duals, reduced_costs(self.packing, duals)
 
     def sharpen(self, run: Run) -> None:
-        """Take the multipliers of the linear program itself, where there is memory for it."""
+        """Adopt the multipliers of the linear program, if there is memory to solve it."""
         packing = self.packing
         if not run.memory_allows(LinearProgram.memory(packing)):
             return

@@ -1,1 +1,1 @@
-"""The independent components of a packing, each searched by itself."""
+"""The independent components of a packing, searched separately."""

@@ -1,4 +1,4 @@
-"""Branch and bound on a component, beside other searches and after them: what it proves, and the covers it meets."""
+"""Branch and bound on a component, during and after other searches, for its bound and its covers."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
-# nodes of the proof of what a metaheuristic leaves open
+# nodes for a component that a metaheuristic leaves open
 _NODES = 2000
-# nodes times columns between two looks at the user
+# nodes times columns between two checks for a stop by the user
 _AT_ONCE = 20_000
 
 
@@ -51,15 +51,15 @@ class Branching:
         )
 
     def advance(self, nodes: int, *, gives: bool = True) -> int:
-        """Take over the best cover, and do some nodes; what is proved then is the component's.
+        """Search some nodes from the component's best cover, and raise the component's bound.
 
-        So is a better cover, if the search ``gives`` what it finds. Returns the number of nodes done.
+        With ``gives`` the component also gets a better cover, if one is found. Returns the number of nodes done.
         """
         component, search, before = self._component, self.search, self.search.nodes
         search.weight = min(search.weight, component.weight)
         search.run(nodes)
         if gives and search.columns is not None and search.weight < component.weight:
-            # where it is better by less than the tolerance, too: a search that ended so has proved this cover alone
+            # even a cover better by less than the tolerance: the search has proved this one optimal, not the other
             owner = Cover.of(component.packing, search.columns).owner
             component.best, component.weight = owner, component.weight_of(owner)
         component.proven = max(component.proven, min(search.lower_bound, component.weight))
@@ -67,18 +67,18 @@ class Branching:
 
 
 def close(component: Component, run: Run) -> None:
-    """Raise what is proved of an open component by a short branch and bound; its cover stays."""
+    """Raise the bound of an open component by a short branch and bound; its cover stays."""
     if component.closed or run.should_stop():
         return
     branching = Branching(component, run)
-    # kernels do not hear Ctrl-C: few nodes at a time where each takes long
+    # Ctrl-C does not interrupt kernels: few nodes at a time where each takes long
     at_once = min(max(_AT_ONCE // component.packing.num_columns, 1), 50)
     while not branching.search.done and branching.search.nodes < _NODES and not run.should_stop():
         branching.advance(at_once, gives=False)
 
 
 def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) -> tuple[float, Floats]:
-    """Return a valid bound, made tight enough to prove this choice of columns where it is optimal.
+    """Return a valid bound, tight enough to prove this choice of columns if it is optimal.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def bound_of_choice(packing: Packing, columns: NDArray[np.integer], run: Run) ->
     Returns
     -------
     float, float array
-        The bound and the multipliers that give its dual part.
+        The bound, and the multipliers of its dual part.
     """
     duals = dual_bound(packing, run=run)
     components = split_components(packing, duals, np.arange(packing.num_columns))

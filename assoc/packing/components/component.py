@@ -23,7 +23,7 @@ from assoc.packing.run import Run, memory_allows
 Owner = NDArray[np.int32]
 
 
-# cluster searches between two looks at the gap and at the clock
+# cluster searches between two checks of the gap and of the clock
 _AT_ONCE = 10
 
 
@@ -40,21 +40,21 @@ class Component(Priced):
     bound : float
         Valid lower bound of the component.
     origin : int array, shape (N,)
-        The columns' places in the packing that the solver was given.
+        Indices of the columns in the solver's packing.
     best : int32 array, shape (R,), or None
         Owner of each row in the best complete cover known.
     weight : float
         Its weight; ``inf`` when none is known.
     deadline : float
-        When time is over, by the kernels' clock (clock.py).
+        Time limit by the kernels' clock (clock.py).
     refinement : str
         What improves covers (`SearchParameters`).
     proven : float
-        A lower bound by branch and bound, which the multipliers alone do not give.
+        A lower bound by branch and bound, above that of the multipliers.
     worker : int
-        Which of several workers searches it (team.py).
+        Number of the worker that searches it (team.py).
     iterations, stalled : int
-        Iterations of a metaheuristic, and those since the best cover became better.
+        Iterations of a metaheuristic, and those since the best cover improved.
     """
 
     origin: NDArray[np.int64]
@@ -73,7 +73,7 @@ class Component(Priced):
 
     @property
     def arrays(self) -> PackingArrays:
-        """The packing as searches see it (``insertion.search_arrays``)."""
+        """The packing with search weights (``insertion.search_arrays``)."""
         if self._arrays is None:
             self._arrays = search_arrays(self.packing)
         return self._arrays
@@ -85,9 +85,9 @@ class Component(Priced):
 
     @property
     def lower_bound(self) -> float:
-        """No cover weighs less, by the multipliers or by branch and bound."""
+        """Lower bound on all covers, by the multipliers or by branch and bound."""
         if self.closed and self.packing.granularity:
-            # nothing fits between the bound and the cover
+            # no weight is possible between the bound and the cover
             return self.weight
         return min(max(self.bound, self.proven), self.weight)
 
@@ -103,9 +103,9 @@ class Component(Priced):
 
     @property
     def temperature(self) -> float:
-        """Scale of the reduced costs that matter: a share of the gap, at most of the weights' spread."""
+        """Scale of the relevant reduced costs: a share of the gap, but at most of the weights' spread."""
         weights = self.packing.weights
-        # weights that are all alike have no spread, and a size all the same
+        # equal weights have no spread, so take their size
         spread = float(np.ptp(weights)) or abs(float(weights[0]))
         widest = max(0.02 * spread, 1e-12)
         if self.weight < np.inf:
@@ -126,15 +126,15 @@ class Component(Priced):
         return weight_of(self.packing, owner)
 
     def offer(self, owner: Owner, weight: float) -> bool:
-        """Keep a cover if it is complete and better than the best; whether it was."""
+        """Keep a cover if it is complete and better than the best; return whether it was."""
         if weight < self.weight - self.tolerance and self.is_complete(owner):
-            # summed anew: bounds of whole-numbered weights are rounded up to it, and moves add up what they change
+            # recomputed: moves accumulate rounding errors, and bounds of whole-numbered weights are rounded up to it
             self.best, self.weight = owner.copy(), self.weight_of(owner)
             return True
         return False
 
     def offer_greedy(self) -> None:
-        """Offer the cover that always takes the column of least reduced cost, improved by insertion."""
+        """Offer the greedy cover by reduced cost, improved by insertion."""
         cover = Cover.empty(self.packing)
         cover.add_greedily(ascending(self.reduced))
         if self.inserts:
@@ -142,13 +142,13 @@ class Component(Priced):
         self.offer(cover.owner, cover.weight)
 
     def offer_start(self, run: Run) -> None:
-        """Offer what the run's start chooses of this component."""
+        """Offer the run's start, restricted to this component."""
         if run.start is not None:
             cover = Cover.of(self.packing, np.flatnonzero(np.isin(self.origin, run.start)))
             self.offer(cover.owner, cover.weight)
 
     def random_cover(self, strictness: float, rng: np.random.Generator) -> Owner:
-        """Return a random greedy cover; the larger ``strictness``, the more the reduced costs decide."""
+        """Return a random greedy cover; with larger ``strictness`` the reduced costs decide more."""
         trail = Trail.without_pheromone(self.prices, strictness, self.temperature)
         owner, _ = walk(self.arrays, self.prices, trail, 1, self.inserts, rng, self.deadline)
         return np.asarray(owner)
@@ -162,9 +162,9 @@ class Component(Priced):
         return self._may_dive and not self.closed and not self.late
 
     def dive(self, number: int, rng: np.random.Generator, trail: Floats | None = None, beta: float = 1.0) -> Owner:
-        """Return a cover built in the linear program (`Diver.dive`), and completed by insertion.
+        """Return a cover built in the linear program (`Diver.dive`) and completed by insertion.
 
-        Dives of successive numbers differ in strictness. ``trail`` is tau_j^alpha of each column.
+        The strictness varies with ``number``. ``trail`` is tau_j^alpha of each column.
         """
         if self._diver is None:
             known = np.zeros(0, dtype=np.int64) if self.best is None else self.best_columns()
@@ -185,7 +185,7 @@ class Component(Priced):
         return self.search_clusters(owner, self.weight_of(owner), rng, clusters)
 
     def search_clusters(self, owner: Owner, weight: float, rng: np.random.Generator, tries: int) -> float:
-        """Improve a complete cover of this weight in place by exact sub-steps (refinement full); return its weight."""
+        """Improve a complete cover of this weight in place by exact sub-steps, if refined fully; return its weight."""
         if self.refinement != "full" or not tries or self._has_nothing_to_gain(weight):
             return weight
         if self._cluster_search is None:
@@ -202,12 +202,12 @@ class Component(Priced):
         return weight
 
     def refine(self, run: Run, clusters: int) -> None:
-        """Improve the best cover by exact sub-steps: so many for every 30 rows."""
+        """Improve the best cover by exact sub-steps: ``clusters`` for every 30 rows."""
         left = clusters * max(1, self.packing.num_rows // 30)
         while self.best is not None and self.refinement == "full" and left > 0:
             if self.closed or run.should_stop():
                 return
             self.search_clusters(self.best, self.weight, run.rng, min(left, _AT_ONCE))
-            # summed anew: changes of the order of rounding would add up to an improvement that is none
+            # recomputed: rounding errors would add up to a false improvement
             self.weight = self.weight_of(self.best)
             left -= _AT_ONCE

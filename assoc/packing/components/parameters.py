@@ -1,4 +1,4 @@
-"""Parameters that all searches by components have. Imports nothing slow: ``--help`` reads it."""
+"""Parameters of all searches by components. Imports nothing slow: ``--help`` reads it."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ REFINEMENTS = ("none", "local", "full")
 
 @dataclass(frozen=True)
 class SearchParameters(Parameters):
-    """How long `search_components` searches, and how much it does besides the metaheuristic.
+    """How long `search_components` searches, and how it refines the metaheuristic's covers.
 
     Attributes
     ----------
     iterations : int
-        Iterations (cycles, generations) on one component at the most.
+        Most iterations (cycles, generations) on one component.
     patience : int
-        A component is left after so many iterations without improvement.
+        The search of a component ends after this many iterations without improvement.
     refinement : str
-        What improves the metaheuristic's covers. "none": nothing, the metaheuristic is alone; "local": insertion with
-        ejection, and matching halves of all tuples anew; "full": exact sub-steps and dives, too.
+        What improves the metaheuristic's covers. "none": nothing; "local": insertion with ejection, and dimensionwise
+        search; "full": exact sub-steps and dives, too.
     clusters : int
-        With refinement "full": exact sub-steps on each new cover, and for every 30 measurements on the best cover after
-        each iteration.
+        With refinement "full": number of exact sub-steps on each new cover, and for every 30 measurements on the best
+        cover after each iteration.
     workers : int
-        Searches at a time on each component, on threads, which exchange their best covers after every iteration. The
-        result depends on the seed and on their number.
+        Number of parallel searches on each component, in threads, which exchange their best covers after every
+        iteration. The result depends on the seed and on this number.
     """
 
     iterations: int = field(default=1000, metadata={"help": "iterations on one component at the most"})
@@ -45,7 +45,7 @@ class SearchParameters(Parameters):
         self._require(self.refinement in REFINEMENTS, "refinement", ", ".join(REFINEMENTS))
 
     def memory(self, num_columns: int, num_rows: int) -> tuple[float, str, str] | None:
-        """A stack for each further worker, and a copy of what searches keep."""
+        """Bytes for the stack of each further worker, and for its copy of a search's data."""
         if self.workers == 1:
             return None
         needed = (10e6 + 200.0 * num_columns) * (self.workers - 1)

@@ -20,8 +20,8 @@ from assoc.packing.run import Outcome, Run
 
 # covers from the linear program with which a search begins
 _DIVES = 3
-# components of fewer rows are bounded before they are searched, and not only after that: it takes less time than an
-# iteration, and a search that has the optimum knows it
+# components of fewer rows are bounded before the search, too: it takes less time than an iteration, and the search
+# can stop at a proved optimum
 _SMALL = 30
 
 
@@ -48,7 +48,7 @@ def search_components(
     InfeasibleError
         A component has no complete cover, or none was found.
     """
-    # without a solution at the time limit there would be nothing to return: the bound gets a share of the time
+    # the bound gets only a share of the time: without a solution at the time limit there would be nothing to return
     share = Run(run.rng, time_limit=run.time_limit and 0.3 * run.time_limit, started=run.started)
     duals = dual_bound(packing, run=share)
     components = split_components(packing, duals, np.arange(packing.num_columns))
@@ -65,21 +65,21 @@ def search_components(
         if not share.should_stop():
             component.sharpen(share)
         for number in range(_DIVES):
-            # the first one whatever the share: what it finds is worth more than all that comes after it
+            # the first one in any case: it gains more than all later ones
             if component.dives and (number == 0 or not share.should_stop()):
                 component.settle(component.dive(number, run.rng), run.rng, parameters.clusters)
-        # what no better cover can use is gone before the search begins
+        # drop columns that no better cover can use before the search begins
         parts.extend(split_component(component) or [component])
     workers = parameters.workers
     pool = ThreadPoolExecutor(workers, "assoc-search") if workers > 1 else None
     with pool or nullcontext():
-        # the covers that components begin with count as iterations
+        # the first covers count as iterations
         searches = _Searches(run=run, iterations=len(parts), make=make, parameters=parameters, pool=pool)
         tasks = [_Task(component, searches) for component in parts]
         searches.record(tasks)
         searches.take(tasks)
     if searches.cut_off:
-        # said only now: a run that is stopped neither searches other components nor raises their bounds
+        # set only now: a run that is stopped neither searches other components nor raises their bounds
         run.stopped_by = run.stopped_by or "iterations"
     return searches.outcome(duals)
 
@@ -89,7 +89,7 @@ class _Searches(Turns):
     make: Make
     parameters: SearchParameters
     pool: ThreadPoolExecutor | None
-    # whether one was ended by the number of iterations
+    # whether the number of iterations ended a search
     cut_off: bool = False
 
 
@@ -102,7 +102,7 @@ class _Task:
     team: Team | None = None
 
     def turn(self) -> bool:
-        """Up to ten iterations, until one improves the cover; then the bound is raised by a short branch and bound."""
+        """Do up to ten iterations, until one improves the cover; then raise the bound by a short branch and bound."""
         component, limits, run = self.component, self.all.parameters, self.all.run
         if self.team is None:
             if component.packing.num_rows < _SMALL and component.best is not None:
@@ -122,10 +122,10 @@ class _Task:
                 close(component, run)
                 return True
             if component.stalled == 0:
-                # fewer columns may do now
+                # fewer columns may suffice now
                 return False
         return False
 
     def split(self) -> list[_Task]:
-        """Tasks for what is left of the component."""
+        """Tasks for the remaining components."""
         return [_Task(one, self.all) for one in split_component(self.component) or ()]

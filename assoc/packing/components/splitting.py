@@ -1,4 +1,4 @@
-"""A packing taken apart into its components, and a component after its columns became fewer."""
+"""Split a packing into components, and a component again after columns were dropped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from assoc.packing.packing import Packing
 
 
 def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64]) -> list[Component]:
-    """Return the components of a packing, none with a cover yet.
+    """Return the components of a packing, without covers.
 
     Raises
     ------
@@ -35,10 +35,10 @@ def split_components(packing: Packing, duals: Floats, origin: NDArray[np.int64])
 
 
 def split_component(whole: Component, share: float = 2 / 3) -> list[Component] | None:
-    """Drop the columns that no better solution can use; None unless at most ``share`` of them are left.
+    """Drop the columns that no better solution can use; None if more than ``share`` of them are left.
 
-    What is left may fall apart: components, each with its share of the best cover and of what is proved. A cover of one
-    with the best covers of the others is a cover of the whole, and weighs no less than the whole's bound.
+    The rest may split into components, each with its part of the best cover and of the bound. A cover of one
+    component and the best covers of the others together cover the whole, and weigh no less than the whole's bound.
     """
     if whole.best is None:
         return None
@@ -66,7 +66,7 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
 
 
 def give_covers(components: list[Component], packing: Packing, owner: NDArray[np.int32]) -> None:
-    """Give each component of a packing its share of a complete cover (owner of each row of the packing)."""
+    """Give each component of a packing its part of a complete cover (owner of each row of the packing)."""
     for c, component in enumerate(components):
         own = owner[packing.row_start[c] : packing.row_start[c + 1]]
         component.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)

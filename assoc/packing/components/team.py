@@ -1,8 +1,8 @@
-"""Several searchers on copies of one component, each on a thread of its own: they exchange their best covers.
+"""Several searchers on copies of one component, each in its own thread; they exchange their best covers.
 
-In every round each member does one iteration, and what it found is refined; branch and bound goes on by some nodes
-where that pays; then all take over the best cover of the round. Members have random generators of their own and wait
-for one another, so that the result is a matter of the seed and of their number, and not of which was quicker.
+In every round each member does one iteration and refines its best cover; branch and bound searches some more nodes
+where that pays; then all take over the best cover of the round. Members have separate random generators and wait for
+one another, so that the result depends only on the seed and the number of members, not on timing.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from assoc.packing.components.closing import Branching
 from assoc.packing.components.component import Component
 from assoc.packing.run import Run
 
-# rows for which branch and bound beside pays: fewer are bounded before, and with more it seldom ends in time
+# rows for which branch and bound during the search pays: fewer are bounded before, with more it seldom ends in time
 _LEAST, _MOST = 30, 150
-# its nodes after each iteration
+# nodes of that branch and bound after each iteration
 _NODES = 10
 
 
@@ -28,7 +28,7 @@ class Searcher(Protocol):
     """A metaheuristic at work on one component."""
 
     def iterate(self, component: Component, rng: np.random.Generator) -> None:
-        """Do one iteration and ``offer`` what it finds to the component."""
+        """Do one iteration and ``offer`` the covers found to the component."""
 
 
 Make = Callable[[Component, np.random.Generator], Searcher]
@@ -42,13 +42,13 @@ class Team:
     make : callable
         Makes a searcher.
     component : Component
-        Gets the best cover of all.
+        Gets the best cover of all members.
     run : Run
     clusters : int
         As in `SearchParameters`.
     workers : int
     pool : ThreadPoolExecutor, optional
-        With as many threads; none for a single worker.
+        Threads for all workers; not needed for a single one.
     """
 
     def __init__(
@@ -66,18 +66,18 @@ class Team:
             self._members = [(component, make(component, run.rng), run)]
             return
         self._members = []
-        # from what it draws, and not Generator.spawn: that counts how often it was called, and knows no state set later
+        # seeds are drawn: Generator.spawn depends on the number of earlier calls, and ignores a state set later
         seeds = np.random.SeedSequence(run.rng.integers(2**63, size=4).tolist()).spawn(workers)
         for number, rng in enumerate(map(np.random.default_rng, seeds)):
-            # a cover of its own, too: it is refined in place
+            # copy the cover, too: it is refined in place
             best = None if component.best is None else component.best.copy()
-            own = replace(component, best=best, worker=number, _cluster_search=None, _diver=None)
-            # a run of its own: the same clock, another generator
-            aside = Run(rng, time_limit=run.time_limit, started=run.started, reserve=run.reserve)
-            self._members.append((own, make(own, rng), aside))
+            member = replace(component, best=best, worker=number, _cluster_search=None, _diver=None)
+            # a separate run: the same clock, another generator
+            member_run = Run(rng, time_limit=run.time_limit, started=run.started, reserve=run.reserve)
+            self._members.append((member, make(member, rng), member_run))
 
     def iterate(self) -> None:
-        """One iteration of every member, and what it found refined; the best goes to the component and to all."""
+        """Do one iteration of every member and refine the result; the component and all members get the best cover."""
         whole = self._component
         for own, _, _ in self._members:
             own.iterations, own.stalled = whole.iterations, whole.stalled
@@ -94,7 +94,7 @@ class Team:
                 own.offer(whole.best, whole.weight)
 
     def _branch(self) -> None:
-        """Some nodes of branch and bound, where that pays."""
+        """Search some nodes by branch and bound, where that pays."""
         component = self._component
         pays = component.refinement == "full" and _LEAST <= component.packing.num_rows < _MOST
         if not pays or component.best is None or component.closed or self._run.should_stop():

@@ -1,4 +1,4 @@
-"""Components that take turns at being searched, each until its search is over."""
+"""Search components in turns, each until its search is over."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from assoc.packing.kernels.sorting import ascending
 from assoc.packing.neighbourhoods.cover import Cover
 from assoc.packing.run import Outcome, Run
 
-# share of a component's gap by which its bound has risen when the trace says so
+# share of a component's gap by which its bound must rise for a new point of the trace
 _WORTH = 0.02
 
 
@@ -29,28 +29,28 @@ class Task(Protocol):
     component: Component
 
     def turn(self) -> bool:
-        """Search for a moment; whether the search is over."""
+        """Search for a moment; return whether the search is over."""
         ...
 
     def split(self) -> Sequence[Task]:
-        """Tasks for what is left of the component, where that is much less by now; none: it stays as it is."""
+        """Tasks for the remaining components, if the component has become much smaller; else empty."""
         ...
 
 
 @dataclass(slots=True, kw_only=True)
 class Turns:
-    """The searches of all components of a packing, and what is known of those that are over.
+    """The searches of all components of a packing, and the results of those that are over.
 
-    Weights and bounds are added up exactly: over thousands of components a plain sum can lose more than the bounds'
+    Weights and bounds are summed exactly: over thousands of components the error of a plain sum can exceed the bounds'
     margins for rounding.
 
     Attributes
     ----------
     run : Run
     iterations : int
-        Of all searches.
+        Total over all searches.
     columns, weights, bounds : lists
-        Of the components that are done.
+        Results of the components that are done.
     """
 
     run: Run
@@ -72,7 +72,7 @@ class Turns:
             task = waiting.popleft()
             component = task.component
             weight, bound = component.weight, component.lower_bound
-            # who has a cover takes no turn after time is over, or thousands of components would take one each
+            # after time is over only components without a cover take a turn: there may be thousands
             over = component.closed or (component.best is not None and self.run.should_stop()) or task.turn()
             if over and component.best is None:
                 complete_greedily(component, self.run)
@@ -89,21 +89,21 @@ class Turns:
                 self.bounds.append(component.lower_bound)
 
     def record(self, tasks: Iterable[Task] = ()) -> None:
-        """Add a point to the trace, with what is known of the components that are not done."""
+        """Add a point to the trace, with the current weights and bounds of the components that are not done."""
         components = [task.component for task in tasks]
         weight = math.fsum([*self.weights, *(component.weight for component in components)])
         bound = math.fsum([*self.bounds, *(component.lower_bound for component in components)])
         self.run.record(self.iterations, weight, bound)
 
     def outcome(self, duals: Floats | None) -> Outcome:
-        """What all searches together have found; ``duals`` as in `Outcome`."""
+        """The result of all searches together; ``duals`` as in `Outcome`."""
         self.record()
         chosen = np.concatenate(self.columns) if self.columns else np.zeros(0, dtype=np.int64)
         return Outcome(chosen, self.iterations, math.fsum(self.bounds), duals)
 
 
 def complete_greedily(component: Component, run: Run) -> None:
-    """Last resort for a component in which no iteration covered all that must be covered."""
+    """Last resort for a component without a complete cover."""
     cover = Cover.empty(component.packing)
     cover.add_greedily(ascending(component.reduced))
     if not cover.complete(run):

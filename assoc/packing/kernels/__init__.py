@@ -1,1 +1,1 @@
-"""Compiled tools that know no packing: matching, sorting, a heap."""
+"""Compiled general-purpose tools: matching, sorting, a heap."""

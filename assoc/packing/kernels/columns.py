@@ -1,4 +1,4 @@
-"""What kernels ask of one column: its first row, and whether its rows are free.
+"""Queries on one column: its first row, and whether its rows are uncovered.
 
 ``cols`` has shape (N, S): the rows of each column by sensor, -1 where the sensor missed.
 """
@@ -12,9 +12,9 @@ from assoc._system.compiled import inner_njit
 
 @inner_njit
 def first_row(cols: Any, j: int) -> int:
-    """Row of column j in the first sensor that it has; -1 for a column without rows.
+    """The first row of column j, by sensor; -1 for a column without rows.
 
-    A column is met once in each of its rows: where it must count once, it counts in this one.
+    A loop over rows meets a column once in each of its rows: to count it only once, count it in its first.
     """
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0:
@@ -24,7 +24,7 @@ def first_row(cols: Any, j: int) -> int:
 
 @inner_njit
 def fits(cols: Any, owner: Any, j: int) -> bool:
-    """Whether all rows of column j are free; ``owner`` is the column that covers each row, -1 for none."""
+    """Whether all rows of column j are uncovered; ``owner`` is the column that covers each row, -1 for none."""
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0 and owner[cols[j, s]] >= 0:
             return False

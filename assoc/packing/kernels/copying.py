@@ -1,7 +1,7 @@
-"""Copying one list over another one, number by number.
+"""Copy an array element by element.
 
-``target[:] = source`` would do the same. With each such line numba compiles into a kernel the text of the error for
-lengths that differ, and that takes longer than most kernels.
+For each ``target[:] = source`` numba would compile the error message for unequal lengths into the kernel, which takes
+longer than compiling most kernels.
 """
 
 from __future__ import annotations
@@ -13,6 +13,6 @@ from assoc._system.compiled import inner_njit
 
 @inner_njit
 def copy_to(target: Any, source: Any) -> None:
-    """Copy a list over another one of the same length."""
+    """Copy an array to another one of the same length."""
     for i in range(target.size):
         target[i] = source[i]

@@ -1,7 +1,7 @@
-"""The smallest and the largest of many numbers that are not negative, several at a time.
+"""Vectorised minimum and maximum of non-negative floats.
 
-Such numbers are ordered as their bits are, read as whole numbers. Of whole numbers compilers find the smallest without
-a branch, for several at a time; of floating point they may not, as among these there can be what is no number.
+Non-negative floats have the same order as their bits read as integers. Compilers vectorise the minimum of integers
+without branches; for floats they may not, because of NaN.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from assoc._system.compiled import inner_njit
 
 @inner_njit
 def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
-    """The first place of the smallest of the first ``count`` numbers, given as their bits; ``count`` where it is 0."""
+    """Index of the smallest of the first ``count`` numbers, given as their bits; ``count`` if that is 0."""
     least = np.int64(2**63 - 1)
     for a in range(count):
         least = min(least, bits[a])
@@ -26,7 +26,7 @@ def place_of_smallest(bits: NDArray[np.int64], count: int) -> int:
 
 @inner_njit
 def place_of_largest(bits: NDArray[np.int64], count: int) -> int:
-    """The first place of the largest of the first ``count`` numbers, given as their bits; -1 where all are 0."""
+    """Index of the largest of the first ``count`` numbers, given as their bits; -1 if all are 0."""
     most = np.int64(0)
     for a in range(count):
         most = max(most, bits[a])

@@ -11,7 +11,7 @@ from assoc._system.compiled import inner_njit
 
 @inner_njit
 def doubled(array: Any) -> Any:
-    """Return a copy with twice the room."""
+    """Return a copy of twice the size."""
     larger = np.empty(2 * array.size, array.dtype)
     for i in range(array.size):
         larger[i] = array[i]
@@ -20,7 +20,7 @@ def doubled(array: Any) -> Any:
 
 @inner_njit
 def doubled_rows(table: Any) -> Any:
-    """Return a copy of a table with room for twice as many rows."""
+    """Return a copy of a table with twice as many rows."""
     num, width = table.shape
     larger = np.empty((2 * num, width), table.dtype)
     for i in range(num):
@@ -46,7 +46,7 @@ def push(key: Any, item: Any, size: int, value: float, thing: int) -> None:
 
 @inner_njit
 def pop(key: Any, item: Any, size: int) -> None:
-    """Remove the root; ``size`` is what is left."""
+    """Remove the root; ``size`` is the number of items left."""
     value = key[size]
     thing = item[size]
     place = 0

@@ -1,9 +1,9 @@
 """Two-dimensional assignment: exact, sparse, with slack on either side, and with its duals.
 
-Rows are matched to columns at the cost of the edge; a row or column left alone costs what its side's slack
-costs (``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima
-and the augmenting row reduction of [1]_, then Dijkstra over a heap from every row that is left. A row's slack is a
-private column at the end of any path.
+Rows are matched to columns at the cost of the edge; an unmatched row or column costs its slack
+(``inf``: it must be matched). Shortest augmenting paths with potentials: a cheap start by row minima
+and the augmenting row reduction of [1]_, then Dijkstra with a heap from every row that is left. A row's slack is a
+private column at which any path can end.
 
 The duals solve
 
@@ -31,16 +31,16 @@ from assoc.packing.kernels.heap import doubled, pop, push
 
 
 class Matching(NamedTuple):
-    """A two-dimensional assignment and its proof.
+    """A two-dimensional assignment and the multipliers that prove it.
 
     Attributes
     ----------
     row_edge : int64 array, shape (n,)
-        The chosen edge of each row (a place in ``indices``), or -1.
+        The chosen edge of each row (an index into ``indices``), or -1.
     row_duals, column_duals : float arrays, shapes (n,) and (m,)
         u and v of the module's dual problem.
     cost : float
-        Total cost, what is left alone included.
+        Total cost, including that of unmatched rows and columns.
     """
 
     row_edge: NDArray[np.int64]
@@ -50,7 +50,7 @@ class Matching(NamedTuple):
 
 
 class _Costs(NamedTuple):
-    """What is to be matched, as the kernels below take it; see `match`."""
+    """The problem as the kernels below take it; see `match`."""
 
     indptr: Any
     indices: Any
@@ -61,7 +61,7 @@ class _Costs(NamedTuple):
 
 
 class _State(NamedTuple):
-    """A matching that grows, and its duals; a column's dual is ``base + v``."""
+    """A partial matching and its duals; a column's dual is ``base + v``."""
 
     row_edge: Any
     u: Any
@@ -69,7 +69,7 @@ class _State(NamedTuple):
     owner: Any
     """Row that each column is matched to, or -1."""
     pending: Any
-    """Rows that are not matched yet, as many as are counted beside it."""
+    """Rows that are not matched yet; their number is kept separately."""
 
 
 def match(
@@ -86,12 +86,12 @@ def match(
     costs : array_like of float, shape (E,)
         Cost of each edge, of any sign; ``inf`` forbids it.
     row_slack, column_slack : array_like of float, shapes (n,) and (m,)
-        Cost of leaving a row or column alone; ``inf`` where it must be matched.
+        Cost of leaving a row or column unmatched; ``inf`` where it must be matched.
 
     Raises
     ------
     InfeasibleError
-        Not everything that must be matched can be.
+        Some row or column that must be matched cannot be.
     """
     edge_costs = np.ascontiguousarray(costs, dtype=np.float64)
     rows = np.ascontiguousarray(row_slack, dtype=np.float64)
@@ -119,7 +119,7 @@ def match_sparse(
 ) -> float:  # fmt: skip
     """Fill ``row_edge``, ``u`` and ``v``; return the total cost, ``inf`` where there is no matching."""
     n, m = row_slack.size, column_slack.size
-    # a column that must be matched gets a price for staying alone that no matching can make up for
+    # a column that must be matched gets a slack so large that no matching can compensate for it
     largest = 0.0
     for k in range(indptr[n]):
         if costs[k] < np.inf:
@@ -193,7 +193,7 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
                 j = indices[k]
                 value = costs[k] - base[j] - v[j]
                 if value < least:
-                    # a parallel edge to the same column is no second choice, but only makes the step smaller
+                    # a parallel edge to the same column is not a second choice; it would only make the step smaller
                     second = min(second, least)
                     least, best = value, k
                 elif value < second:
@@ -226,7 +226,7 @@ def _reduce_rows(problem: _Costs, state: _State, num_pending: int) -> int:
 
 @inner_njit
 def _augment_all(problem: _Costs, state: _State, num_pending: int) -> bool:
-    """Shortest augmenting path from each pending row; False when one must be matched and cannot be."""
+    """Augment along a shortest path from each pending row; False if a row that must be matched cannot be."""
     indptr, indices, costs, row_slack, base = problem
     row_edge, u, v, owner, pending = state
     m = base.size

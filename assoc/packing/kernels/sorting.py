@@ -1,6 +1,6 @@
-"""Sorting a million weights in hundredths of a second: what stands before every greedy choice.
+"""Sort a million weights in hundredths of a second, for greedy choices.
 
-Kernels sort by `order_of`: with each ``np.argsort`` numba would compile its own sorting into them.
+Kernels call `order_of`: for each ``np.argsort`` numba would compile another sort into the kernel.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from numpy.typing import NDArray
 from assoc._system.compiled import njit
 from assoc._types import Floats
 
-# bits of a digit; below so many numbers counting digits does not pay
+# bits of a digit; for fewer numbers radix sort does not pay
 _BITS = 11
 _FEW = 5000
-# so many numbers are sorted by insertion, before runs of them are merged
+# length of the runs sorted by insertion before they are merged
 _RUN = 16
 
 
 def ascending(values: Floats) -> NDArray[np.int32]:
-    """Return the places of numbers in ascending order, ties in their order (a stable argsort)."""
+    """Return a stable argsort of floats."""
     if values.size < _FEW:
         return np.argsort(values, kind="stable").astype(np.int32)
-    # adding 0 makes -0.0 equal to 0.0 in its bits, too
+    # adding 0 turns -0.0 into 0.0, so that equal numbers have equal bits
     order: NDArray[np.int32] = _by_digits((values + 0.0).view(np.int64))
     return order
 
 
 def ascending_whole(values: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return the same for whole numbers >= 0."""
+    """Return a stable argsort of integers >= 0."""
     if values.size < _FEW:
         return np.argsort(values, kind="stable").astype(np.int32)
-    # in order by their bits as positive floats are
+    # as floats, these bits have the same order
     order: NDArray[np.int32] = _by_digits(np.ascontiguousarray(values))
     return order
 
@@ -45,7 +45,7 @@ def _order_by_numpy(values: Any) -> Any:
 
 @partial(njit, stand_in=_order_by_numpy)
 def order_of(values: Any) -> Any:
-    """Return the places of numbers in ascending order, ties in their order: a stable argsort, for kernels."""
+    """Return a stable argsort, for kernels."""
     num = values.size
     order, other = np.empty(num, np.int64), np.empty(num, np.int64)
     for i in range(num):
@@ -77,7 +77,7 @@ def order_of(values: Any) -> Any:
 
 @njit
 def _by_digits(bits: Any) -> Any:
-    """Sort floats by their bits, eleven at a time from the lowest; digits that all share are passed over."""
+    """Radix sort of floats by their bits, eleven at a time from the lowest; digits equal in all are skipped."""
     num = bits.size
     digits = 6
     base = 1 << _BITS
@@ -86,7 +86,7 @@ def _by_digits(bits: Any) -> Any:
     order = np.empty(num, np.int32)
     for i in range(num):
         order[i] = i
-        # negative floats: all bits turned; others: the sign's bit set
+        # negative floats: invert all bits; others: set the sign bit
         key = np.uint64(~bits[i] if bits[i] < 0 else bits[i] ^ np.int64(-9223372036854775808))
         keys[i] = key
         for d in range(digits):

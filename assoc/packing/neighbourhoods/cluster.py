@@ -1,13 +1,13 @@
-"""Cluster search: free a cluster of rows, fix what its multipliers allow, search the rest in full.
+"""Cluster search: free a cluster of rows, fix columns by its multipliers, search the rest exhaustively.
 
-Near the optimum the columns that a better choice can use are few. For a cluster of rows, closed under the
-present choice, they are the columns of reduced cost below the cluster's excess (the sum of reduced costs of
-what is chosen there). Multipliers of the cluster's own rows are then raised by smoothed coordinate ascent
-(as in bounds/dual_ascent.py); after each temperature the columns which the new bound excludes are dropped, and when it
-excludes all the cluster is proven. What is left is searched depth first: always the row with the fewest
-columns, cut off by the sum of the least reduced costs per sensor.
+Near the optimum few columns can be part of a better choice. For a cluster of rows, closed under the present
+choice, they are the columns of reduced cost below the cluster's excess (the sum of reduced costs of
+the columns chosen there). The multipliers of the cluster's rows are then raised by smoothed coordinate ascent
+(as in bounds/dual_ascent.py). After each temperature the columns that the new bound excludes are dropped; if it
+excludes all, the present choice is proved optimal. The rest is searched depth first: always the row with the fewest
+columns, with the sum of the least reduced costs per sensor as the bound.
 
-A row with slack that stays uncovered is a column of its own, of reduced cost -u_r.
+A row with slack that stays uncovered is a separate column of reduced cost -u_r.
 
 Clusters grow while they can be solved, and shrink when they cannot.
 """
@@ -42,7 +42,7 @@ _TOO_LARGE = 0.2
 
 
 class _Effort(NamedTuple):
-    """How much is tried: clusters, rows of each, least difference of two costs, nodes, share of ties taken."""
+    """Limits of a search: clusters, rows of each, least difference of two costs, nodes, share of ties taken."""
 
     tries: int
     size: int
@@ -57,7 +57,7 @@ class ClusterSearch:
     Parameters
     ----------
     priced : Priced
-        One component; the multipliers of this moment are kept.
+        One component; its present multipliers are kept.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class ClusterSearch:
         tries: int,
         deadline: float = np.inf,
     ) -> float:
-        """Improve a complete cover of this weight in place by some clusters; return its weight then."""
+        """Improve a complete cover of this weight in place by some clusters; return its new weight."""
         change, unfinished = self.search(packing.arrays, owner, rng, tries, deadline)
         if unfinished > _TOO_LARGE:
             self.size = max(self.size - 6, min(_LEAST, self._most))
@@ -174,7 +174,7 @@ def _take(cols: Any, owner: Any, r: int, local: Any, rows: Any, num: int) -> int
 def _grow(
     packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, size: int, local: Any, rows: Any
 ) -> int:
-    """Fill ``rows`` with a cluster and ``local`` with its numbering; starts where something is to be gained."""
+    """Fill ``rows`` with a cluster and ``local`` with its numbering; starts at a row with a possible gain."""
     cols, row_ptr = packing.cols, packing.row_ptr
     reduced, duals = prices
     num_rows = owner.size
@@ -206,7 +206,7 @@ def _grow(
 def _search_clusters(
     packing: PackingArrays, by_row: Any, prices: Prices, owner: Any, rng: Any, effort: _Effort, deadline: float
 ) -> Any:
-    """Try clusters; the change of weight, and how many were not searched to the end."""
+    """Try clusters; return the change of weight, and the number not searched to the end."""
     cols = packing.cols
     reduced, duals = prices
     tries, size, step, node_limit, sideways = effort

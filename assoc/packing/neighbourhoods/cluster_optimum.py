@@ -1,4 +1,4 @@
-"""The exact half of cluster search: which columns a cluster's duals leave, and the best choice among them.
+"""The exact part of cluster search: the columns that a cluster's multipliers leave, and the best choice of them.
 
 See cluster.py for the method. A column is described by ``place``: the cluster's row for each sensor, or
 -1; a row with slack that stays uncovered is a column with that one row and ``origin`` -1.
@@ -21,7 +21,7 @@ _SWEEPS = 8
 
 
 class ClusterColumns(NamedTuple):
-    """Room for the columns of a cluster: their places, costs, and columns of the packing (-1: stays uncovered)."""
+    """Buffers for the columns of a cluster: places, costs, and columns of the packing (-1: stays uncovered)."""
 
     place: Any
     cost: Any
@@ -29,7 +29,7 @@ class ClusterColumns(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """Room for the ascent on a cluster: its columns by place, its multipliers, smoothed primal values."""
+    """Buffers for the ascent on a cluster: its columns by place, its multipliers, smoothed primal values."""
 
     pointer: Any
     by_place: Any
@@ -38,7 +38,7 @@ class Sweep(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What the depth-first search keeps to: total cost, that of the present choice, least gain, nodes."""
+    """Limits of the depth-first search: total cost, cost of the present choice, least gain, nodes."""
 
     budget: float
     present: float
@@ -50,7 +50,7 @@ class Limits(NamedTuple):
 def collect(
     packing: PackingArrays, by_row: Any, prices: Prices, rows: Any, local: Any, limit: float, found: ClusterColumns
 ) -> int:
-    """List the columns within the cluster of reduced cost up to ``limit``; -1 when they are too many."""
+    """List the columns within the cluster of reduced cost up to ``limit``; -1 if they are too many."""
     cols, slack, row_ptr = packing.cols, packing.slack, packing.row_ptr
     reduced, duals = prices
     place, cost, origin = found
@@ -121,9 +121,9 @@ def _index(place: Any, count: int, num: int, pointer: Any, by_place: Any) -> Non
 
 @inner_njit
 def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperature: float, sweep: Sweep) -> Any:
-    """Raise the cluster's multipliers, drop what they exclude; ``cost`` becomes the new reduced cost.
+    """Raise the cluster's multipliers, drop the columns that they exclude; ``cost`` becomes the new reduced cost.
 
-    Returns what is left and the bound; nothing is left where the bound exceeds the budget.
+    Returns the number of columns left and the bound; none are left if the bound exceeds the budget.
     """
     place, cost, origin = found
     pointer, by_place, u, primal = sweep
@@ -179,7 +179,7 @@ def tighten(found: ClusterColumns, count: int, num: int, budget: float, temperat
 def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits, lists: Any, best: Any) -> Any:
     """Choose columns that cover each of ``num`` places once, of total cost up to ``budget``.
 
-    ``lists[0]`` has the columns in order of cost. A choice equal to the present one is passed over; after
+    ``lists[0]`` has the columns in order of cost. A choice equal to the present one is skipped; after
     any other only those better than the present by ``step`` count. Returns the cost (``inf``: none), the
     number of columns in ``best``, and the nodes used (more than the limit: not searched to the end).
     """
@@ -246,7 +246,7 @@ def depth_first(place: Any, cost: Floats, current: Any, num: int, limits: Limits
                 for s in range(num_sensors):
                     worst = max(worst, per_sensor[s])
                 at[depth] = 1 if spent[depth] + worst <= budget else size[depth] + 1
-        # the next column that covers the place of the branch
+        # the next column that covers the place branched on
         e = -1
         while at[depth] <= size[depth]:
             f = lists[depth, at[depth]]

@@ -14,7 +14,7 @@ from assoc.packing.neighbourhoods.insertion import add_greedily, insert_and_ejec
 from assoc.packing.packing import Packing
 from assoc.packing.run import Run
 
-# seconds for the way out of a dead end when time is over
+# seconds to complete a cover when time is over
 _GRACE = 0.02
 
 
@@ -68,7 +68,7 @@ class Cover:
         insert_and_eject(search_arrays(self.packing), self.owner, rows, deadline)
 
     def complete(self, run: Run) -> bool:
-        """Cover all rows without slack, by ejections and then by a search; False where that fails.
+        """Cover all rows without slack, by ejections and then by a search; return False if that fails.
 
         Raises
         ------
@@ -77,12 +77,12 @@ class Cover:
         """
         if self.is_complete:
             return True
-        # a moment beyond the time, if need be: most dead ends are left in less, and there is nothing else to return
+        # a moment beyond the time, if necessary: it usually suffices, and there is nothing else to return
         self.improve(max(run.deadline(), time.monotonic() + _GRACE))
         if self.is_complete:
             return True
         if run.fallback is not None and run.should_stop():
-            # there is something else to return
+            # there is another solution to return
             return False
         columns = first_solution(self.packing, run)
         if columns is None:
@@ -103,7 +103,7 @@ def is_complete(packing: Packing, owner: NDArray[np.int32]) -> bool:
 
 @inner_njit
 def own(cols: Any, j: int, owner: Any) -> None:
-    """Make column j the owner of its rows."""
+    """Choose column j: make it the owner of its rows."""
     for s in range(cols.shape[1]):
         if cols[j, s] >= 0:
             owner[cols[j, s]] = j
@@ -111,14 +111,14 @@ def own(cols: Any, j: int, owner: Any) -> None:
 
 @njit
 def own_all(cols: Any, columns: Any, owner: Any) -> None:
-    """Make these columns the owners of their rows."""
+    """Choose columns: make them the owners of their rows."""
     for j in columns:
         own(cols, j, owner)
 
 
 @njit
 def chosen_columns(cols: Any, owner: Any) -> Any:
-    """The chosen columns, ascending, in the type of ``owner``."""
+    """The chosen columns, ascending, of the dtype of ``owner``."""
     chosen = np.zeros(cols.shape[0], np.bool_)
     count = 0
     for j in owner:

@@ -1,10 +1,9 @@
 """Dimensionwise search: split the sensors into two parts and re-match the halves of all tuples, exactly.
 
-Every chosen tuple falls into two halves, one for each part of the sensors; a free measurement is a half of
-its own. Which halves belong together at the least cost is a two-dimensional assignment over the listed
-tuples (kernels/matching.py). A half may stay alone: as the tuple that it is, where that is listed, or broken up
-into false alarms. Over all splits (one sensor against the others for S = 3, all 2^(S-1) - 1 bipartitions
-for S up to 6) until none improves.
+Every chosen tuple splits into two halves, one for each part of the sensors; an uncovered measurement is also a half.
+The cheapest pairing of halves is a two-dimensional assignment over the listed tuples (kernels/matching.py). An
+unmatched half becomes a tuple, if that is listed, or false alarms. The search repeats all splits (one sensor against
+the others for S = 3, all 2^(S-1) - 1 bipartitions for S up to 6) until none improves.
 
 References
 ----------
@@ -51,16 +50,16 @@ def improve_dimensionwise(packing: Packing, owner: NDArray[np.int32], deadline: 
 
 
 def splits(num_sensors: int) -> NDArray[np.int64]:
-    """Return the bipartitions of the sensors as bit sets: all of them up to 6 sensors, else the single ones."""
+    """Return the bipartitions of the sensors as bit sets: all for up to 6 sensors, else one against the others."""
     if num_sensors <= _MOST_SPLITS_FOR:
-        # the complement is the same split
+        # a set and its complement are the same split
         return np.arange(1, max(1 << (num_sensors - 1), 2), dtype=np.int64)
     return np.left_shift(np.int64(1), np.arange(num_sensors, dtype=np.int64))
 
 
 @njit
 def _improve(packing: PackingArrays, owner: Any, masks: Any, deadline: float) -> float:
-    """Re-match by one split after the other; the change of weight."""
+    """Re-match by one split after the other; return the change of weight."""
     cols, slack, row_ptr, row_cols = packing.cols, packing.slack, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
     sensor = np.zeros(owner.size, np.int64)
@@ -69,7 +68,7 @@ def _improve(packing: PackingArrays, owner: Any, masks: Any, deadline: float) ->
             for s in range(num_sensors):
                 if cols[row_cols[row_ptr[r]], s] == r:
                     sensor[r] = s
-    # halves that must be matched are best the rows of the assignment
+    # halves that must be matched should be the rows of the assignment
     must = 0
     for r in range(owner.size):
         if not slack[r]:
@@ -125,11 +124,11 @@ def _halves(cols: Any, owner: Any, sensor: Any, mask: int, side: int, half: Any,
 
 @inner_njit
 def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> int:
-    """Which half on a side column j has in full: -1 none at all, -2 only some rows or several halves."""
+    """The half that is column j's part on a side; -1 if it has no rows there, -2 if its part is not one whole half."""
     found = -1
     members = 0
     one = True
-    # one way out: with several, numba counts references to the arrays at each call, which takes longer than all of it
+    # a single return: with several, numba counts array references at each call, which takes longer than the rest
     for s in range(cols.shape[1]):
         q = cols[j, s]
         if q >= 0 and (mask >> s) & 1 == side:
@@ -143,7 +142,7 @@ def _match_of(cols: Any, j: int, mask: int, side: int, half: Any, size: Any) -> 
 
 @inner_njit
 def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> float:
-    """Re-match the halves of one split; returns the change of weight (0: nothing better)."""
+    """Re-match the halves of one split; return the change of weight (0: nothing better)."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     row_ptr, row_cols = packing.row_ptr, packing.row_cols
     num_rows = owner.size
@@ -201,7 +200,7 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
     indptr[num_left] = count
     price = right_alone.copy()
     if left_must == num_left and num_left == num_right:
-        # all on the left must be matched, so all on the right will be
+        # all on the left must be matched, so that all on the right will be
         for q in range(num_right):
             price[q] = 0.0
     before = _weight(cols, weights, owner)
@@ -224,7 +223,7 @@ def _rematch(packing: PackingArrays, owner: Any, sensor: Any, mask: int) -> floa
     for q in range(num_right):
         if not taken[q] and right_column[q] >= 0:
             own(cols, right_column[q], owner)
-    # summed as before: among costs that cancel, rounding alone would be an improvement, and for ever
+    # summed as before: else rounding of costs that cancel could look like an improvement again and again
     change = _weight(cols, weights, owner) - before
     if change < 0.0:
         return change

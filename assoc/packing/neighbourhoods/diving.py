@@ -1,18 +1,17 @@
-"""Dives: covers begun in the linear program, column by column, and ended by a short branch and bound.
+"""Dives: covers built column by column in the linear program, and completed by a short branch and bound.
 
-The linear program is solved for the columns of small reduced cost, with cuts. A diver draws some of its fractional
+The linear program is solved for the columns of small reduced cost, with cuts. A dive draws some of its fractional
 columns, each column j with a probability proportional to
 
     tau_j^alpha x_j^beta
 
-where x_j, the visibility, is how much of it the program takes; they are fixed, what shares a row with them goes, and
-the dual simplex method goes on from where it was, some exchanges each time. So each choice knows what the choices
-before it cost, and what is left can still bring. The first choices cost next to nothing, and some are made at a time.
-The last ones cost nearly all that a dive loses: what then lies open fits together badly, and no single one of them is
-the fault. So the dive ends while a share of the rows is open, or before the choices that lift the bound beyond the best
-cover, and branch and bound (branching/short_search.py) covers what is left, as a problem of its own. The share grows
-while these searches end early, and shrinks when they do not end at all. What they learn of pairs is kept from dive to
-dive.
+where x_j, the visibility, is its value in the program. The drawn columns are fixed, columns that share a row with them
+are dropped, and the dual simplex method continues with a few pivots. So each choice takes into account the cost of the
+choices before it and the potential of the remaining columns. The first choices cost very little, and several are made
+at a time. The last ones cause most of a dive's loss: the remaining rows fit together badly, without any single choice
+at fault. So the dive stops while a share of the rows is open, or before choices that raise the bound beyond the best
+cover, and branch and bound (branching/short_search.py) covers the rest as a separate problem. The share grows when
+these searches end early, and shrinks when they do not finish. Their pseudo-costs of pairs are kept from dive to dive.
 
 References
 ----------
@@ -40,36 +39,36 @@ from assoc.packing.simplex.dual import OPTIMAL, STOPPED
 from assoc.packing.simplex.linear_program import LinearProgram, Relaxation
 from assoc.packing.simplex.program import all_allowed, all_reduced_costs
 
-# rows for which a dive pays: fewer are solved exactly, and the inverse of more takes too long
+# rows for which a dive pays: fewer are solved exactly, and for more the inverse takes too long
 _LEAST, _MOST = 30, 900
-# columns of the program for each row, those of least reduced cost; how often they are chosen anew where the program
-# with cuts would take others
+# columns of the program for each row, those of least reduced cost; how often they are chosen again where cuts change
+# the reduced costs
 _CORE = 40
 _ROUNDS = 3
-# of the rows that are still to be covered by choices: those covered before the program is solved again
+# share of the rows still to be covered by choices that is covered before the program is solved again
 _BATCH = 0.1
-# shares of the rows that are left to branch and bound: at first (but so many rows), at the least and at the most (all
-# would be an exact solver), and how they change
+# share of the rows left to branch and bound: at first (but this many rows), least and largest (all rows would make an
+# exact solver), and how it changes
 _START, _ROWS = 0.35, 40
 _LOWEST, _HIGHEST = 0.2, 0.9
 _GROW, _SHRINK = 0.03, 0.02
-# nodes of one such search
+# nodes of one of these searches
 _NODES = 24
-# values this near to 0 and 1 are whole
+# values this near to 0 and 1 count as whole
 _WHOLE = 1e-6
 
 
 class Diver:
-    """The linear program of one component, solved; dives start there.
+    """The solved linear program of one component, from which dives start.
 
     Parameters
     ----------
     priced : Priced
         One component, with multipliers near the optimal ones.
     known : int array
-        Columns of the best cover known; none of them: none is known.
+        Columns of the best known cover; empty if none is known.
     deadline : float
-        When time is over (clock.py).
+        Time limit (clock.py).
     """
 
     def __init__(self, priced: Priced, known: NDArray[np.int64], deadline: float) -> None:
@@ -79,11 +78,11 @@ class Diver:
         reduced = priced.reduced
         count = min(_CORE * packing.num_rows, packing.num_columns - 1)
         near = np.zeros(packing.num_columns, dtype=np.bool_)
-        # what lies near the bound may hold no cover at all
+        # the columns near the bound may have no cover at all
         near[known] = True
         for _ in range(_ROUNDS):
             near |= reduced <= np.partition(reduced, count)[count]
-            # rows that must be covered keep a column each: what the program leaves out insertion may bring back
+            # rows that must be covered keep at least one column: insertion may bring back the others
             self._core: Packing = packing.restrict(near)
             self._root = root_with_cuts(self._core, priced.duals[self._core.row_origin], cutoff, deadline)
             reduced = priced.reduced if is_over(deadline) else self._reduced_costs(priced.duals)
@@ -98,9 +97,9 @@ class Diver:
         self.share = min(max(_START, _ROWS / self._core.num_rows), _HIGHEST)
 
     def _reduced_costs(self, duals: Floats) -> Floats:
-        """Reduced costs of all columns by the multipliers of the root, by these where it has no such row.
+        """Reduced costs of all columns by the root's multipliers, or by ``duals`` for rows that the root lacks.
 
-        Of those at or above 0 less than all is told: without cuts.
+        Those at or above 0 without the cuts do not include the cuts.
         """
         rows, root = self._core.row_origin, self._root
         size, own = self._packing.num_rows, self._core.num_rows
@@ -108,7 +107,7 @@ class Diver:
         sets[:, rows] = root.sets
         extended = np.concatenate([duals, root.duals[own:]])
         extended[rows] = root.duals[:own]
-        # cuts make columns dearer, never cheaper: of most no more need be known
+        # cuts only raise reduced costs, so that only columns below 0 need them
         reduced = reduced_costs(self._packing, extended[:size])
         below = np.flatnonzero(reduced < 0.0)
         program = with_cuts(self._packing.cols[below], self._packing.weights[below], size, sets)
@@ -122,28 +121,28 @@ class Diver:
 
     @staticmethod
     def memory(packing: Packing) -> float:
-        """Bytes that dives in a component take."""
+        """Bytes that dives take in a component."""
         rows = MOST_ROWS * packing.num_rows
-        # with the mark of its root
+        # including the mark of its root
         program = 2.0 * LinearProgram.memory(packing, int(rows) - packing.num_rows)
         return program + short_memory(packing, rows)
 
     def dive(
         self, trail: Floats, strictness: float, rng: np.random.Generator, cutoff: float, deadline: float
     ) -> NDArray[np.int32]:
-        """Return a cover, perhaps of a part of the rows alone.
+        """Return a cover, perhaps of only a part of the rows.
 
         Parameters
         ----------
         trail : float array, shape (N,)
             tau_j^alpha of each column of the component.
         strictness : float
-            beta: the larger, the more the program's values decide.
+            beta: the larger, the more weight the program's values have.
         rng : Generator
         cutoff : float
-            Covers of this weight or more are not looked for.
+            Only covers of less weight are searched for.
         deadline : float
-            When time is over (clock.py).
+            Time limit (clock.py).
         """
         self._program.back()
         at = _Descent(self._core, self._program, self._relaxed, cutoff)
@@ -163,31 +162,31 @@ class Diver:
 
 
 def _drawn(columns: NDArray[np.int64], chances: Floats, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Columns in the order in which they are drawn, one after the other, by their chances."""
+    """Columns in random order, drawn one after the other with these relative probabilities."""
     likely = chances > 0.0
-    # the largest of Gumbel numbers added to the logarithms is a draw by the chances, the next one is of those left
+    # Gumbel trick: sorting log probabilities plus Gumbel noise draws without replacement
     keys = np.log(chances[likely]) + rng.gumbel(size=np.count_nonzero(likely))
     return columns[likely][np.argsort(-keys, kind="stable")]
 
 
 class _Descent:
-    """A dive on its way: the program, and what has been fixed.
+    """A dive in progress: the program and the fixed columns.
 
     Parameters
     ----------
     packing : Packing
     program : LinearProgram
-        Of this packing, solved.
+        The packing's program, solved.
     relaxed : Relaxation
     cutoff : float
-        Covers of this weight or more are not looked for.
+        Only covers of less weight are searched for.
     """
 
     def __init__(self, packing: Packing, program: LinearProgram, relaxed: Relaxation, cutoff: float) -> None:
         self._packing, self._program, self._cutoff = packing, program, cutoff
         self.relaxed = relaxed
         self._fixed: list[int] = []
-        # columns that may still be taken, and those that are fixed
+        # columns that are still allowed, and those that are fixed
         self._columns = np.ones(packing.num_columns, dtype=np.bool_)
         self._covered = np.zeros(packing.num_rows, dtype=np.bool_)
 
@@ -197,18 +196,18 @@ class _Descent:
         return int(np.count_nonzero(~self._covered))
 
     def open_columns(self) -> NDArray[np.int64]:
-        """Columns of which the program takes a part."""
+        """Columns with a fractional value in the program."""
         primal = self.relaxed.primal
         return np.flatnonzero((primal > _WHOLE) & (primal < 1.0 - _WHOLE) & self._columns)
 
     def fix(self, drawn: NDArray[np.int64], rows: float, deadline: float) -> bool:
-        """Fix columns in their order, those that fit, until they cover so many rows (one at the least).
+        """Fix the columns that fit, in this order, until they cover ``rows`` rows, but at least one column.
 
-        Where nothing below the cutoff is left then, nothing is fixed; whether it was.
+        If no cover below the cutoff would remain, nothing is fixed. Returns whether columns were fixed.
         """
         packing = self._packing
         before = self._columns.copy(), self._covered.copy(), len(self._fixed)
-        # what nothing lighter can use goes for good
+        # columns that no lighter cover can use are dropped for good
         self._columns &= self.relaxed.reduced <= self._cutoff - self.relaxed.bound
         self._columns[self._fixed] = True
         more = 0
@@ -230,7 +229,7 @@ class _Descent:
             return True
         self._columns, self._covered, count = before
         del self._fixed[count:]
-        # from the mark it is nearer than from what was taken back
+        # the mark is a nearer start than the basis of the rejected choice
         self._program.back()
         slack = packing.slack & ~self._covered
         self.relaxed = self._program.solve(columns=self._columns, slack=slack, deadline=deadline)
@@ -238,13 +237,13 @@ class _Descent:
 
     @property
     def fixed(self) -> NDArray[np.int64]:
-        """Columns that are fixed."""
+        """The fixed columns."""
         return np.array(self._fixed, dtype=np.int64)
 
     def completed(self, limits: Limits, lessons: Lessons) -> tuple[NDArray[np.int64], bool]:
-        """Search a cover lighter than the cutoff with what is fixed; what is fixed alone where none was found.
+        """Search for a cover lighter than the cutoff with the fixed columns; if none is found, return only these.
 
-        And whether the search came to its end.
+        Also returns whether the search came to its end.
         """
         relaxed = self.relaxed
         columns = self._columns & (relaxed.reduced <= self._cutoff - relaxed.bound)

@@ -1,11 +1,11 @@
 """Insertion with ejection: the local search that all heuristic solvers share.
 
-A cover is held as the owner of each row: the chosen column that uses it, or -1. Inserting a column ejects
-the owners of its rows; the rows that this frees can be used by other columns. Rows that changed are looked
-at again until nothing improves.
+A cover is stored as the owner of each row: the chosen column that uses it, or -1. Inserting a column ejects
+the owners of its rows; other columns can then use their other rows. Changed rows are tried again until nothing
+improves.
 
-Without dummies some rows must be covered. A penalty larger than any sum of weights is then taken off each
-column for every such row, so that covering comes before cost; what the penalty adds is known and removed.
+Without dummies some rows must be covered. A penalty larger than any sum of weights is then subtracted from each
+column for every such row, so that covering comes before cost.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from assoc._system.compiled import inner_njit, njit
 from assoc._types import Floats
 from assoc.packing.packing import Packing, PackingArrays
 
-# columns looked at between two looks at the clock: about a millisecond
+# columns tried between two checks of the clock: about a millisecond
 _LOOK = 50_000
 
 
 def search_arrays(packing: Packing) -> PackingArrays:
-    """Return the packing with the weights to search by: where rows must be covered, penalised ones."""
+    """Return the packing with weights for searches: penalised ones if rows must be covered."""
     arrays = packing.arrays
     return arrays._replace(weights=penalised(arrays)) if packing.is_axial else arrays
 
 
 @njit
 def penalised(packing: PackingArrays) -> Floats:
-    """Weights with a penalty taken off for every row without slack that a column covers."""
+    """Weights less a penalty for every row without slack that a column covers."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     widest = 0.0
     for weight in weights:
@@ -47,7 +47,7 @@ def penalised(packing: PackingArrays) -> Floats:
 
 @njit
 def add_greedily(packing: PackingArrays, order: Any, owner: Any) -> None:
-    """Add columns in the given order while they fit; those of rows with slack alone only at negative weight."""
+    """Add columns in the given order while they fit; columns of rows that all have slack only at negative weight."""
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     num_sensors = cols.shape[1]
     for j in order:
@@ -87,7 +87,7 @@ def insertion_gain(cols: Any, weights: Floats, owner: Any, j: int) -> float:
 
 @inner_njit
 def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int:
-    """Eject the owners of column j's rows and insert it; rows that lost their owner go to ``changed``."""
+    """Eject the owners of column j's rows and insert it; append rows that lost their owner to ``changed``."""
     num_sensors = cols.shape[1]
     for s in range(num_sensors):
         r = cols[j, s]
@@ -109,7 +109,7 @@ def insert(cols: Any, owner: Any, j: int, changed: Any, num_changed: int) -> int
 
 @njit
 def insert_and_eject(packing: PackingArrays, owner: Any, rows: Any, deadline: float) -> float:
-    """Insert with ejection around ``rows`` and all rows that change, until time is over; the sum of the gains."""
+    """Insert with ejection at ``rows`` and all rows that change, until time is over; return the sum of the gains."""
     cols, weights, row_ptr, row_cols = packing.cols, packing.weights, packing.row_ptr, packing.row_cols
     num_sensors = cols.shape[1]
     queue = np.empty(owner.size, np.int32)

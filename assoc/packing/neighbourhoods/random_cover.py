@@ -1,7 +1,7 @@
-"""A random greedy cover: the walk that ants, breeding and tabu search share.
+"""Random greedy covers, used by ants, breeding and tabu search.
 
-Rows are visited in random order. For a row that is still uncovered a column is drawn among those that fit, and
-staying uncovered where the row has slack, with probability proportional to
+Rows are visited in random order. For each uncovered row one of the columns that fit is drawn, or none if the row has
+slack, with probability proportional to
 
     tau_j^alpha exp(-beta 2^(ant mod 10) rc_j / T)
 
@@ -26,7 +26,7 @@ from assoc.packing.packing import PackingArrays
 
 
 class Trail(NamedTuple):
-    """What draws a walk.
+    """Pheromone and parameters of a walk's draws.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Trail(NamedTuple):
     alpha, beta : float
         Exponents of the pheromone and of the visibility.
     temperature : float
-        Scale of the reduced costs that matter.
+        Scale of the relevant reduced costs.
     """
 
     pheromone: Floats
@@ -46,13 +46,13 @@ class Trail(NamedTuple):
 
     @classmethod
     def without_pheromone(cls, prices: Prices, strictness: float, temperature: float) -> Trail:
-        """Return the trail that only reduced costs draw."""
+        """Return a trail in which only reduced costs count."""
         return cls(np.ones(prices.reduced.size), np.ones(prices.duals.size), 1.0, strictness, temperature)
 
 
 @inner_njit
 def _first_fitting(packing: PackingArrays, owner: Any, r: int) -> int:
-    """The first column of a row that fits; -1: none does."""
+    """The first column of a row that fits; -1 if none does."""
     for k in range(packing.row_ptr[r], packing.row_ptr[r + 1]):
         if fits(packing.cols, owner, packing.row_cols[k]):
             return int(packing.row_cols[k])
@@ -63,10 +63,10 @@ def _first_fitting(packing: PackingArrays, owner: Any, r: int) -> int:
 def walk(
     packing: PackingArrays, prices: Prices, trail: Trail, ants: int, inserts: bool, rng: Any, deadline: float
 ) -> Any:
-    """Let all ants build a cover, until time is over; the best one and its weight.
+    """Let all ants build a cover, until time is over; return the best one and its weight.
 
-    With ``inserts`` each cover is improved by insertion with ejection. A cover that leaves open what must be covered
-    is taken only where no ant did better.
+    With ``inserts`` each cover is improved by insertion with ejection. An incomplete cover is returned only if no ant
+    built a complete one.
     """
     cols, weights, slack = packing.cols, packing.weights, packing.slack
     row_ptr, row_cols = packing.row_ptr, packing.row_cols
@@ -75,7 +75,7 @@ def walk(
     num, num_sensors = cols.shape
     num_rows = slack.size
     value = np.empty(num)
-    # in loops: a power of an array is rounded otherwise where it is interpreted
+    # in loops: numpy's powers of arrays are rounded differently where this is interpreted
     trace, slack_trace = np.empty(num), np.empty(num_rows)
     for j in range(num):
         trace[j] = trail.pheromone[j] ** alpha
@@ -92,7 +92,7 @@ def walk(
     for ant in range(ants):
         if timed and now() > deadline:
             break
-        # ants differ in how strictly they follow the visibility: some explore, some refine
+        # ants follow the visibility more or less strictly: some explore, some refine
         strictness = beta * 2.0 ** (ant % 10) / temperature
         for j in range(num):
             power = strictness * reduced[j]
@@ -111,7 +111,7 @@ def walk(
             total = stay[r]
             for k in range(row_ptr[r], row_ptr[r + 1]):
                 j = row_cols[k]
-                # most values are 0, which is quicker to see than whether a column fits
+                # most values are 0, which is quicker to test than whether a column fits
                 if value[j] > 0.0 and fits(cols, owner, j):
                     total += value[j]
             draw = rng.random() * total - stay[r]
