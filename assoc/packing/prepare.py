@@ -118,9 +118,9 @@ def conditioned(problem: AssignmentProblem) -> Iterator[Conditioned]:
         if shift == 0 and not lowered.any():
             yield Conditioned(problem)
             return
-        own = np.ldexp(np.minimum(costs, ceiling), -shift)
-        own_problem = AssignmentProblem(problem.tuples, own, problem.sizes, dummy=problem.dummy)
-        yield Conditioned(own_problem, math.ldexp(1.0, shift), lowered, ceiling - size)
+        new_costs = np.ldexp(np.minimum(costs, ceiling), -shift)
+        new_problem = AssignmentProblem(problem.tuples, new_costs, problem.sizes, dummy=problem.dummy)
+        yield Conditioned(new_problem, math.ldexp(1.0, shift), lowered, ceiling - size)
         if not lowered.any():
             return
         counts = float(costs[costs <= max(_FAR * counts, float(costs[lowered].min()))].max())

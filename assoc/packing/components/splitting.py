@@ -68,6 +68,6 @@ def split_component(whole: Component, share: float = 2 / 3) -> list[Component] |
 def give_covers(components: list[Component], packing: Packing, owner: NDArray[np.int32]) -> None:
     """Give each component of a packing its part of a complete cover (owner of each row of the packing)."""
     for c, component in enumerate(components):
-        own = owner[packing.row_start[c] : packing.row_start[c + 1]]
-        component.best = np.where(own >= 0, own - packing.col_start[c], -1).astype(np.int32)
+        part = owner[packing.row_start[c] : packing.row_start[c + 1]]
+        component.best = np.where(part >= 0, part - packing.col_start[c], -1).astype(np.int32)
         component.weight = component.weight_of(component.best)

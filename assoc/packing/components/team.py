@@ -79,19 +79,19 @@ class Team:
     def iterate(self) -> None:
         """Do one iteration of every member and refine the result; the component and all members get the best cover."""
         whole = self._component
-        for own, _, _ in self._members:
-            own.iterations, own.stalled = whole.iterations, whole.stalled
+        for member, _, _ in self._members:
+            member.iterations, member.stalled = whole.iterations, whole.stalled
         if self._pool is None:
             self._step(0)
         else:
             list(self._pool.map(self._step, range(len(self._members))))
-        for own, _, _ in self._members:
-            if own.best is not None:
-                whole.offer(own.best, own.weight)
+        for member, _, _ in self._members:
+            if member.best is not None:
+                whole.offer(member.best, member.weight)
         self._branch()
-        for own, _, _ in self._members:
+        for member, _, _ in self._members:
             if whole.best is not None:
-                own.offer(whole.best, whole.weight)
+                member.offer(whole.best, whole.weight)
 
     def _branch(self) -> None:
         """Search some nodes by branch and bound, where that pays."""

@@ -102,11 +102,11 @@ class Diver:
         Those at or above 0 without the cuts do not include the cuts.
         """
         rows, root = self._core.row_origin, self._root
-        size, own = self._packing.num_rows, self._core.num_rows
+        size, count = self._packing.num_rows, self._core.num_rows
         sets = np.zeros((len(root.sets), size), dtype=np.bool_)
         sets[:, rows] = root.sets
-        extended = np.concatenate([duals, root.duals[own:]])
-        extended[rows] = root.duals[:own]
+        extended = np.concatenate([duals, root.duals[count:]])
+        extended[rows] = root.duals[:count]
         # cuts only raise reduced costs, so that only columns below 0 need them
         reduced = reduced_costs(self._packing, extended[:size])
         below = np.flatnonzero(reduced < 0.0)
@@ -212,15 +212,15 @@ class _Descent:
         self._columns[self._fixed] = True
         more = 0
         for j in drawn:
-            own_rows = packing.cols[j][packing.cols[j] >= 0]
-            if self._covered[own_rows].any():
+            rows_of_column = packing.cols[j][packing.cols[j] >= 0]
+            if self._covered[rows_of_column].any():
                 continue
-            for r in own_rows:
+            for r in rows_of_column:
                 self._columns[packing.row_cols[packing.row_ptr[r] : packing.row_ptr[r + 1]]] = False
-            self._covered[own_rows] = True
+            self._covered[rows_of_column] = True
             self._columns[j] = True
             self._fixed.append(int(j))
-            more += own_rows.size
+            more += rows_of_column.size
             if more >= rows:
                 break
         slack = packing.slack & ~self._covered
