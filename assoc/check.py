@@ -3,19 +3,19 @@
     python -m assoc.check PROBLEM SOLUTION        is it feasible, and what does it cost?
     python -m assoc.check PROBLEM PROOF           the same, and the lower bound that the proof gives
 
-Needs only Python: copy it anywhere. It shares no code with the solvers. Numbers are whole multiples of 1e-60:
-nothing is ever rounded. Exit code 0: the claims of the file hold; 1: they do not; 2: a file cannot be read.
+Needs nothing but Python: copy it anywhere. It shares no code with the solvers. Numbers are whole multiples of 1e-60:
+nothing is ever rounded. Exit code 0: the file's claims hold; 1: they do not; 2: a file cannot be read.
 
 Why a proof holds. Every measurement (row) must be in exactly one chosen tuple. For any multipliers u of the rows, a
-solution costs at least sum(u) if no tuple costs less than the sum of its measurements' u; where one does, the u of
-its first row is lowered by the difference. A solution with a tuple exceeds sum(u) at least by the tuple's cost above
-its u: a tuple for which that is beyond the target, the cost of the given solution, is left out; so are tuples that
-cost no less than their measurements alone. Rows that share no tuple, directly or through others, are bounded
-separately. In a tree, a node branches on whether rows a and b are in one tuple: in one child only tuples with both or
-neither remain, in the other those without both; its bound is the least of its leaves'. A cut is an odd number n of
-rows: chosen tuples contain at most (n - 1) / 2 pairs of them (half the sum of the rows, rounded down); it is a further
-row with a multiplier of at most 0. Costs are multiples of a unit, and so is the cost of a solution: bounds are rounded
-up to the next multiple.
+solution costs at least sum(u) if no tuple costs less than the sum of u over its measurements; where a tuple does, the u
+of its first row is lowered by the difference. If a tuple costs x more than the sum of its u, any solution with it costs
+at least sum(u) + x: if that exceeds the target, the cost of the given solution, the tuple is dropped. So are tuples
+that cost at least as much as their measurements alone. Components, rows not connected by tuples, are bounded
+separately. A node of a tree branches on whether rows a and b are in one tuple: in one child only tuples with both or
+neither remain, in the other none with both; the tree's bound is the least of its leaves'. A cut is a set of n rows,
+n odd: at most (n - 1) / 2 pairs of them are in chosen tuples (half the sum of the rows, rounded down); it is one more
+row, with a multiplier of at most 0. Costs are multiples of a unit, and so are solutions' costs: bounds are rounded up
+to the next multiple.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from collections import Counter
 DECIMALS = 60
 NUMBER = re.compile(r"[+-]?[0-9]{1,400}(\.[0-9]{0,60})?([eE][+-]?[0-9]{1,3})?")
 MOST_ROWS, MOST_BYTES, DEEPEST = 1_000_000, 200_000_000, 1_000
-UNPACKED, TIMES = 4_000_000, 30  # bytes that a compressed file may hold, or so many times its own size
+UNPACKED, TIMES = 4_000_000, 30  # most bytes of an unpacked file, or this many times its packed size
 Row = tuple[int, int]  # sensor, index from 1; cuts are (-1, number)
 Column = tuple[int, tuple[Row, ...]]  # cost, rows
 
@@ -82,26 +82,24 @@ class Problem:
 
     def __init__(self, sizes: list[int], dummies: bool, costs: dict[tuple[int, ...], int]) -> None:
         self.sizes, self.dummies, self.costs = sizes, dummies, costs
-        lines = sorted(f"{key} {cost}" for key, cost in costs.items())
+        lines = sorted(f"{indices} {cost}" for indices, cost in costs.items())
         self.digest = hashlib.sha256("\n".join([f"{sizes} {dummies}", *lines]).encode()).hexdigest()
         self.rows = [(s, i) for s, size in enumerate(sizes) for i in range(1, size + 1)]
         # without dummies only the measurements of the smallest sensors must be used
         self.needed = {row for row in self.rows if dummies or sizes[row[0]] == min(sizes)}
         self.unit = math.gcd(*costs.values()) or 1
-        every = [(cost, tuple((s, i) for s, i in enumerate(key) if i)) for key, cost in costs.items()]
-        alone = {members[0]: cost for cost, members in every if len(members) == 1}
+        every = [(cost, tuple((s, i) for s, i in enumerate(indices) if i)) for indices, cost in costs.items()]
+        alone = {rows[0]: cost for cost, rows in every if len(rows) == 1}
         if dummies and len(alone) < len(self.rows):
             raise ValueError("with dummies, each measurement must be listed as a tuple of its own")
-        # tuples that can be part of an optimum
+        # tuples that can be in a cheapest solution
         self.columns = [
-            (c, members)
-            for c, members in every
-            if len(members) == 1 or not dummies or c < sum(alone[r] for r in members)
+            (c, rows) for c, rows in every if len(rows) == 1 or not dummies or c < sum(alone[r] for r in rows)
         ]
 
 
 def read_text(path: str) -> str:
-    """Return the content of a file, which may be compressed by xz."""
+    """Return the text of a file, plain or packed by xz."""
     most = min(MOST_BYTES, max(UNPACKED, TIMES * os.path.getsize(path))) if path.endswith(".xz") else MOST_BYTES
     with lzma.open(path) if path.endswith(".xz") else open(path, "rb") as file:
         content = file.read(most + 1)
@@ -121,40 +119,41 @@ def read_problem(path: str) -> Problem:
         raise ValueError(f"expected sizes, up to {MOST_ROWS} measurements in all, and 'dummies yes' or 'dummies no'")
     costs: dict[tuple[int, ...], int] = {}
     for words in lines:
-        key, cost = tuple(map(_whole, words[1:])), number(words[0])
-        if len(key) != len(sizes) or not (any(key) if dummies else all(key)) or any(map(int.__gt__, key, sizes)):
+        indices, cost = tuple(map(_whole, words[1:])), number(words[0])
+        fits = len(indices) == len(sizes) and not any(map(int.__gt__, indices, sizes))
+        if not fits or not (any(indices) if dummies else all(indices)):
             raise ValueError(f"{' '.join(words):.60}: no tuple of these sizes{'' if dummies else ', without dummies'}")
-        costs[key] = min(cost, costs.get(key, cost))
+        costs[indices] = min(cost, costs.get(indices, cost))
         count -= 1
     if count:
-        raise ValueError("the number of tuples is not the one that is announced")
+        raise ValueError("the number of tuples differs from the one in the header")
     return Problem(sizes, dummies, costs)
 
 
 def cost_of(problem: Problem, chosen: list[tuple[int, ...]], claim: object = None) -> int:
-    """Return the cost of a choice of tuples; refuse it if it is no solution, or if its cost is not as claimed."""
+    """Return the cost of a choice of tuples; refuse it if it is not a solution, or its cost is not the claimed one."""
     used: set[Row] = set()
-    for each in chosen:
-        if each not in problem.costs:
-            raise RefusedError(f"the solution has the tuple {each}, which is not in the problem")
-        for s, i in enumerate(each):
+    for indices in chosen:
+        if indices not in problem.costs:
+            raise RefusedError(f"the solution has the tuple {indices}, which is not in the problem")
+        for s, i in enumerate(indices):
             if (s, i) in used:
                 raise RefusedError(f"the solution uses measurement {i} of sensor {s + 1} twice")
-        used |= {(s, i) for s, i in enumerate(each) if i}
+        used |= {(s, i) for s, i in enumerate(indices) if i}
     for s, i in sorted(problem.needed - used):
         raise RefusedError(f"the solution does not use measurement {i} of sensor {s + 1}")
-    cost = sum(problem.costs[each] for each in chosen)
+    cost = sum(problem.costs[indices] for indices in chosen)
     if claim is not None and number(claim) != cost:
         raise RefusedError(f"the solution costs {shown(cost)}, not {claim:.60}")
     return cost
 
 
 def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row], list[Column]]]:
-    """Return rows that are connected, with their tuples."""
+    """Return the components: connected rows, with their tuples."""
     group = {row: [row] for row in every}
-    for _, members in columns:
-        for row in members[1:]:
-            small, large = sorted((group[members[0]], group[row]), key=len)
+    for _, rows in columns:
+        for row in rows[1:]:
+            small, large = sorted((group[rows[0]], group[row]), key=len)
             if small is not large:
                 large += small
                 group.update(dict.fromkeys(small, large))
@@ -165,13 +164,13 @@ def components(every: list[Row], columns: list[Column]) -> list[tuple[list[Row],
 
 
 def bounded(columns: list[Column], needed: set[Row], u: dict[Row, int], sides: dict[Row, int]) -> int | None:
-    """Return the bound of multipliers, after lowering them; None where a needed row has no tuple."""
-    if not needed <= {row for _, members in columns for row in members}:
+    """Return the bound of multipliers, after lowering them; None if a needed row has no tuple."""
+    if not needed <= {row for _, rows in columns for row in rows}:
         return None
     for row in u.keys() - needed:
         u[row] = min(u[row], 0)  # a row that may stay uncovered must not raise the bound
-    for cost, members in columns:
-        u[members[0]] += min(cost - sum(u[row] for row in members), 0)
+    for cost, rows in columns:
+        u[rows[0]] += min(cost - sum(u[row] for row in rows), 0)
     return sum(value * sides.get(row, 1) for row, value in u.items())
 
 
@@ -181,7 +180,7 @@ def cheap(columns: list[Column], u: dict[Row, int], most: int) -> list[Column]:
 
 
 def with_cuts(cuts: object, rows: set[Row], columns: list[Column]) -> tuple[list[Column], dict[Row, int]]:
-    """Return the columns with the cuts as rows, once for each pair of a cut's rows in them; and the cuts' sides."""
+    """Return the columns with the cuts as further rows, once per pair of the cut's rows; and the cuts' sides."""
     cuts_of, sides = {row: list[Row]() for row in rows}, dict[Row, int]()
     for index, cut in enumerate(_listed(cuts)):
         inside = [_as_row(row) for row in _listed(cut)]
@@ -234,24 +233,24 @@ def tree_bound(tree: dict[str, object], columns: list[Column], rows: list[Row], 
 
 
 def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
-    """Return the lower bound that a proof gives, at most the target (the cost of a solution)."""
+    """Return the lower bound that a proof gives; it is at most the target, the cost of a solution."""
     if proof.get("problem") != problem.digest:
         raise RefusedError("the proof is for another problem")
     columns, bound, u = problem.columns, None, dict.fromkeys(problem.rows, 0)
     for stage in _listed(proof.get("multipliers")) or [None]:
         by_sensor = zip(_listed(stage, len(problem.sizes)), problem.sizes, strict=True)
-        values = [number(value) for of_sensor, size in by_sensor for value in _listed(of_sensor, size)]
-        if bound is not None:  # no solution below the target has the tuples that the stage before left out
+        values = [number(value) for listed, size in by_sensor for value in _listed(listed, size)]
+        if bound is not None:  # no solution below the target has the columns that the stage before excludes
             columns = cheap(columns, u, target - bound)
         u = dict(zip(problem.rows, values, strict=True))
         bound = bounded(columns, problem.needed, u, {})
         if bound is None:
             return target
     trees: dict[tuple[Row, ...], dict[str, object]] = {}
-    for given in _listed(proof.get("trees")):
-        if not isinstance(given, dict):
+    for entry in _listed(proof.get("trees")):
+        if not isinstance(entry, dict):
             raise ValueError("a tree must have rows and nodes")
-        trees[tuple(map(_as_row, _listed(given.get("rows"))))] = given
+        trees[tuple(map(_as_row, _listed(entry.get("rows"))))] = entry
     total = 0
     for rows, inside in components(problem.rows, columns):
         tree, part = trees.pop(tuple(sorted(rows)), None), sum(u[row] for row in rows)
@@ -264,7 +263,7 @@ def proved(problem: Problem, proof: dict[str, object], target: int) -> int:
 
 
 def check(problem: Problem, text: str) -> list[str]:
-    """Return lines that say what holds; raise `RefusedError` where a claim does not."""
+    """Return the claims that hold, in lines; raise `RefusedError` if one does not."""
     if not text.lstrip().startswith("{"):
         lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
         if not lines or lines[0] != ["assoc-solution", "1"]:
@@ -277,17 +276,17 @@ def check(problem: Problem, text: str) -> list[str]:
     proof = json.loads(text, parse_float=str, parse_int=str)
     if proof.get("format") != "assoc-proof" or proof.get("version") != "1":
         raise ValueError("expected the format 'assoc-proof', version 1")
-    chosen = [tuple(map(_whole, _listed(words))) for words in _listed(proof.get("tuples"))]
+    chosen = [tuple(map(_whole, _listed(indices))) for indices in _listed(proof.get("tuples"))]
     cost = cost_of(problem, chosen, proof.get("cost"))
     bound = proved(problem, proof, cost)
     if "bound" in proof and bound < number(proof["bound"]):
         raise RefusedError(f"the proof gives the bound {shown(bound)}, not {proof['bound']:.60}")
-    said = f"proved: no solution costs less than {shown(bound)} (gap {shown(cost - bound)})"
-    return [f"feasible, cost {shown(cost)}", said]
+    conclusion = f"proved: no solution costs less than {shown(bound)} (gap {shown(cost - bound)})"
+    return [f"feasible, cost {shown(cost)}", conclusion]
 
 
 def main(words: list[str]) -> int:
-    """Run the program; returns its exit code."""
+    """Run the program; its exit code."""
     if len(words) != 2 or words[0].startswith("-"):
         print(__doc__)
         return 0 if words[:1] in (["-h"], ["--help"]) else 2

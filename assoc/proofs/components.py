@@ -1,4 +1,4 @@
-"""Which components of a proof need a tree, and the trees as they are written."""
+"""Find the components of a proof that need a tree, and format the trees for the file."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from assoc.packing.packing import Packing, assemble
 from assoc.packing.run import memory_allows
 from assoc.proofs.tree import Aim, Tree, prove_by_tree
 
-# share of a component's cost up to which a gap is rounding
+# gaps up to this share of a component's cost are rounding
 CLOSED = 1e-9
 _ONE = 10**check.DECIMALS
 
 
 class Parts(NamedTuple):
-    """A problem's columns as a packing, and the way back.
+    """A problem's columns as a packing, and the data to convert results back.
 
     Attributes
     ----------
     packing : Packing
         ``row_origin`` are global row numbers.
     duals : float array, shape (R,)
-        Its multipliers.
+        Multipliers of the packing.
     alone : float array
-        Cost of each global row as a false alarm (0 without dummies): what multipliers are above these.
+        Cost of each global row as a false alarm (0 without dummies); multipliers are relative to these.
     rows : list of (sensor, index)
-        Names of the global rows.
+        Sensor and index of each global row.
     unit : float
         Costs of solutions are multiples of it.
     """
@@ -46,36 +46,36 @@ class Parts(NamedTuple):
 
 
 def packing_of(columns: list[check.Column], exact: check.Problem, alone: Floats, granularity: float) -> Packing:
-    """The packing of the columns that are left; a row whose false alarm is not has no slack."""
-    number = {row: place for place, row in enumerate(exact.rows)}
+    """The packing of the remaining columns; a row whose false alarm was dropped has no slack."""
+    number = {row: index for index, row in enumerate(exact.rows)}
     slack = np.array([row not in exact.needed for row in exact.rows])
-    used = [own for own in columns if not exact.dummies or len(own[1]) > 1]
+    used = [rows for rows in columns if not exact.dummies or len(rows[1]) > 1]
     table = np.full((len(used), len(exact.sizes)), -1, dtype=np.int32)
     weights = np.empty(len(used))
-    for place, (cost, own) in enumerate(used):
-        for row in own:
-            table[place, row[0]] = number[row]
-        weights[place] = cost / _ONE
+    for index, (cost, rows) in enumerate(used):
+        for row in rows:
+            table[index, row[0]] = number[row]
+        weights[index] = cost / _ONE
     weights -= np.where(table >= 0, alone[table], 0.0).sum(axis=1)
     if exact.dummies:
-        for _, own in columns:
-            if len(own) == 1:
-                slack[number[own[0]]] = True
+        for _, rows in columns:
+            if len(rows) == 1:
+                slack[number[rows[0]]] = True
     return assemble(table, weights, slack, np.arange(len(used), dtype=np.int32), granularity)
 
 
 def trees_of(parts: Parts, chosen: dict[tuple[check.Row, ...], int], aim: Aim) -> list[dict[str, Any]]:
-    """Trees for the components whose multipliers do not prove that the chosen tuples are the best, widest gap first."""
+    """Trees for the components whose multipliers do not prove the chosen tuples optimal, widest gap first."""
     packing = parts.packing
     component_of = np.full(len(parts.rows), -1)
     for c in range(packing.num_components):
         component_of[packing.row_origin[packing.row_start[c] : packing.row_start[c + 1]]] = c
-    number = {row: place for place, row in enumerate(parts.rows)}
+    number = {row: index for index, row in enumerate(parts.rows)}
     targets = np.zeros(packing.num_components)
     np.subtract.at(targets, component_of[component_of >= 0], parts.alone[component_of >= 0])
     exactly = [0] * packing.num_components
-    for own, cost in chosen.items():
-        c = component_of[number[own[0]]]
+    for members, cost in chosen.items():
+        c = component_of[number[members[0]]]
         if c >= 0:
             targets[c] += cost / _ONE
             exactly[c] += cost
@@ -89,33 +89,33 @@ def trees_of(parts: Parts, chosen: dict[tuple[check.Row, ...], int], aim: Aim) -
         needed = work_memory(MOST_ROWS * rows.size, columns, packing.num_sensors)
         if targets[c] - gaps[c] >= enough or not memory_allows(needed):
             continue
-        own_aim = replace(aim, target=float(targets[c]), enough=float(enough))
-        own_duals = parts.duals[packing.row_start[c] : packing.row_start[c + 1]]
-        tree = prove_by_tree(packing.component(int(c)), own_duals, own_aim, parts.alone[rows])
+        component_aim = replace(aim, target=float(targets[c]), enough=float(enough))
+        component_duals = parts.duals[packing.row_start[c] : packing.row_start[c + 1]]
+        tree = prove_by_tree(packing.component(int(c)), component_duals, component_aim, parts.alone[rows])
         aim = replace(aim, nodes=max(aim.nodes - len(tree.nodes), 1))
         trees.append(_written(tree, [list(parts.rows[row]) for row in rows], parts.alone[rows], exactly[c]))
     return trees
 
 
 def _written(tree: Tree, rows: list[list[int]], alone: Floats, target: int) -> dict[str, Any]:
-    """A tree with the names of its rows: sensor and index, counted from 1."""
+    """A tree with its rows as sensor and index, counted from 1."""
     names = [[sensor + 1, index] for sensor, index in rows]
     base = np.concatenate([alone, np.zeros(len(tree.sets))])
     nodes: list[dict[str, Any]] = []
     for node in tree.nodes:
         written: dict[str, Any] = {}
         if node.duals.size:
-            # what rounding to some digits had made short is short again; numpy would overflow
+            # adding the base lengthened the rounded decimals; Python's round, as numpy's would overflow
             written["multipliers"] = [round(value, 12) for value in (node.duals + base).tolist()]
         if node.pair is not None:
             written |= {"pair": [names[row] for row in node.pair], "children": list(node.children)}
         nodes.append(written)
-    cuts = [[names[row] for row in np.flatnonzero(one)] for one in tree.sets]
+    cuts = [[names[row] for row in np.flatnonzero(members)] for members in tree.sets]
     return {"rows": names, "target": decimal(target), "cuts": cuts, "nodes": nodes}
 
 
 def decimal(value: int) -> str:
-    """Return a multiple of 1e-60 as the decimal number that it is."""
+    """Return a multiple of 1e-60 as an exact decimal number."""
     digits = str(abs(value)).rjust(check.DECIMALS + 1, "0")
     whole, fraction = digits[: -check.DECIMALS], digits[-check.DECIMALS :].rstrip("0")
     return ("-" if value < 0 else "") + whole + ("." + fraction if fraction else "")

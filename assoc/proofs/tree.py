@@ -1,9 +1,9 @@
-"""A tree that proves how little a component can weigh: multipliers at its leaves, pairs of rows at its nodes.
+"""A tree that proves a lower bound of a component: multipliers at its leaves, pairs of rows at its nodes.
 
-Each node is a linear program, with the cuts that the root has. Where its bound does not reach what is to be proved, the
-node asks whether two rows are in one column (Ryan and Foster's branching), as the search of `exact` does: either no
-column remains that has just one of them, or none that has both. Columns too dear for anything below the target are left
-out before.
+Each node is a linear program, with the root's cuts. If its bound is below the bound to prove, the node branches on
+whether two rows are in one column (Ryan and Foster's branching), as the search of `exact` does: either no column with
+only one of them remains, or none with both. Before that, columns whose reduced cost excludes them from solutions below
+the target are dropped.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from assoc.packing.simplex.basis import Basis, basis_of
 from assoc.packing.simplex.dual import OPTIMAL, Effort, most_exchanges, solve_dual
 from assoc.packing.simplex.program import Allowed, Program, all_allowed, all_reduced_costs, certified, make_feasible
 
-# a share of the target that is rounding
+# rounding error, as a share of the target
 _ROUNDING = 1e-9
-# digits after the point with which multipliers are tried, the shortest first
+# numbers of decimals to try for multipliers, the least first
 _DIGITS = (2, 4, 6, 9)
 
 
@@ -37,13 +37,13 @@ class Node:
     Attributes
     ----------
     duals : float array, shape (rows and cuts,)
-        Multipliers; at a node with a pair they say which columns are left out, and are empty if none are.
+        Multipliers; at a node with a pair they determine the dropped columns, and are empty if none are dropped.
     bound : float
-        What they prove below this node.
+        Lower bound of this node, which they prove.
     pair : (int, int) or None
         Two rows.
     children : (int, int)
-        Places in the list of nodes: the rows together, the rows apart.
+        Indices of the nodes with the rows together and apart.
     """
 
     duals: Floats
@@ -67,18 +67,18 @@ class Tree:
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """What a tree is to prove.
+    """The goal and the limits of a tree.
 
     Attributes
     ----------
     target : float
-        The weight that is known.
+        Weight of the known solution.
     enough : float
-        A node is closed when its bound has reached this.
+        A node is closed when its bound reaches this.
     nodes : int
-        At the most; what is then open stays a leaf, with what it proves.
+        Most nodes; open nodes then become leaves, with their bounds.
     deadline : float
-        When time is over (clock.py).
+        Time limit (clock.py).
     """
 
     target: float
@@ -88,7 +88,7 @@ class Aim:
 
 
 class _Open(NamedTuple):
-    """A node that waits: what it allows, and the basis of its parent with its multipliers."""
+    """An open node: its index, what it allows, and its parent's basis and multipliers."""
 
     place: int
     allowed: Allowed
@@ -97,7 +97,7 @@ class _Open(NamedTuple):
 
 
 def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> Tree:
-    """Return a tree that proves as much as can be proved within its aim.
+    """Return a tree that proves the best bound within the limits of its aim.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> 
         Multipliers to start from.
     aim : Aim
     base : float array, shape (R,)
-        What is added to the multipliers where they are written: their sums are what is rounded.
+        Added to the multipliers when they are written, and before they are rounded.
     """
     search = _Search(component, duals, aim, base)
     while search.waiting:
@@ -116,13 +116,13 @@ def prove_by_tree(component: Packing, duals: Floats, aim: Aim, base: Floats) -> 
 
 
 class _Search:
-    """A depth-first search that writes down its nodes."""
+    """A depth-first search that records its nodes."""
 
     def __init__(self, component: Packing, duals: Floats, aim: Aim, base: Floats) -> None:
         root = root_with_cuts(component, duals, aim.enough, aim.deadline)
         self._component, self._aim, self._program = component, aim, root.program
         self._base = np.concatenate([base, np.zeros(len(root.sets))])
-        # slack of cuts is never left out
+        # slack of cuts is never dropped
         self._is_cut = np.arange(root.slack.size) >= component.num_rows
         self._margin = _ROUNDING * max(1.0, abs(aim.target))
         self._trials = new_trials(root.program, component.num_rows)
@@ -130,7 +130,7 @@ class _Search:
         self.waiting = [_Open(0, all_allowed(root.program, root.slack), root.variable, root.duals)]
 
     def visit(self, task: _Open) -> None:
-        """Bound a node, and divide it where that is not enough."""
+        """Bound a node, and branch if the bound is not enough."""
         program, aim, tree = self._program, self._aim, self.tree
         node = tree.nodes[task.place]
         basis = basis_of(program, task.allowed, task.variable, task.duals)
@@ -158,26 +158,26 @@ class _Search:
             tree.nodes.append(Node(np.empty(0), node.bound))
 
     def _bound(self, allowed: Allowed, duals: Floats) -> float:
-        """The bound of multipliers, which are made feasible."""
+        """Make the multipliers feasible and return their bound."""
         make_feasible(self._program, allowed, duals)
         return float(certified(self._program, allowed, duals))
 
     def _left(self, allowed: Allowed, node: Node) -> Allowed:
-        """Columns and slack without those that cost too much for anything below the target."""
+        """Columns and slack without those that no solution below the target has."""
         most = self._aim.target - node.bound + self._margin
         columns = allowed.columns & (all_reduced_costs(self._program, node.duals) <= most)
         slack = allowed.slack & ((-node.duals <= most) | self._is_cut)
         return Allowed(np.flatnonzero(columns).astype(np.int32), columns, slack)
 
     def _question(self, allowed: Allowed, basis: Basis) -> tuple[int, int] | None:
-        """The pair of rows on which to divide; None where there is none."""
+        """The pair of rows to branch on; None if there is none."""
         effort = Effort(self._aim.enough, 0, self._aim.deadline)
         counts = np.empty(self._component.num_rows, np.int32)
-        one, two = _pair(self._program, self._component.cols, allowed, basis, self._trials, counts, effort)
-        return None if one < 0 else (int(one), int(two))
+        first, second = _pair(self._program, self._component.cols, allowed, basis, self._trials, counts, effort)
+        return None if first < 0 else (int(first), int(second))
 
     def _shorten(self, node: Node, allowed: Allowed) -> None:
-        """Round the multipliers of a leaf to as few digits as still prove enough."""
+        """Round the multipliers of a leaf to the fewest decimals that prove enough."""
         for digits in _DIGITS:
             short = np.round(node.duals + self._base, digits) - self._base
             bound = self._bound(allowed, short.copy())
@@ -190,7 +190,7 @@ class _Search:
 def _pair(
     program: Program, cols: Any, allowed: Allowed, basis: Basis, trials: Trials, counts: Any, effort: Effort
 ) -> Any:
-    """The pair that branch and bound would choose, or any that is open; -1, -1: there is none."""
+    """The pair that branch and bound would choose, or any open one; -1, -1 if there is none."""
     count = doubtful_pairs(cols, basis, trials)
     if count > 0:
         which, _ = decide(program, cols, allowed, basis, trials, count, effort)

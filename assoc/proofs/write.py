@@ -1,4 +1,4 @@
-"""Proofs on disk: what a solution's optimality rests on, for `assoc.check` to replay (docs/proofs.md)."""
+"""Write proofs of a solution's optimality for `assoc.check` to replay (docs/proofs.md)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from assoc.proofs.tree import Aim
 from assoc.solution import Solution
 
 _NODES = 100_000
-# the second stage has what the first has not found too dear
+# the second stage has the columns that the first does not exclude
 _STAGES = 2
 _ONE = 10**check.DECIMALS
 # multipliers below this are 0: a float has up to 17 digits after its leading zeros
@@ -40,8 +40,9 @@ def write_proof(
 ) -> float:
     """Write a proof of how far a solution can be from the optimum; ``python -m assoc.check`` replays it.
 
-    Any solver's solution will do. The bound is proved anew, component by component: by multipliers where they suffice,
-    and else by a tree of linear programs. Before it is written the proof is replayed in exact arithmetic.
+    The solution may come from any solver. The bound is proved from scratch, component by component: by multipliers
+    where they suffice, else by a tree of linear programs. The proof is replayed in exact arithmetic before it is
+    written.
 
     Parameters
     ----------
@@ -51,14 +52,14 @@ def write_proof(
         ``problem.save("problem.txt")`` writes the form that `assoc.check` reads beside the proof.
     solution : Solution
     nodes : int
-        Nodes of all trees at the most; what is then open lowers the bound.
+        Most nodes of all trees together; nodes left open lower the bound.
     time_limit : float, optional
-        Seconds after which no tree grows any further.
+        Seconds after which trees stop growing.
 
     Returns
     -------
     float
-        The lower bound that the proof gives.
+        The proved lower bound.
 
     Raises
     ------
@@ -97,7 +98,7 @@ def write_proof(
 
 
 def exact_problem(problem: AssignmentProblem) -> check.Problem:
-    """Return a problem as the checker reads it from text: each cost is the shortest decimal that stands for it.
+    """Return a problem as the checker reads it from text: each cost as its shortest decimal representation.
 
     Raises
     ------
@@ -105,24 +106,24 @@ def exact_problem(problem: AssignmentProblem) -> check.Problem:
         A cost has more decimals than the checker reads.
     """
     costs: dict[tuple[int, ...], int] = {}
-    for one, cost in zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True):
+    for indices, cost in zip(map(tuple, problem.tuples.tolist()), problem.costs.tolist(), strict=True):
         try:
             value = check.number(repr(cost))
         except ValueError as error:
             raise InvalidInputError(f"problem: cost {error}") from None
-        costs[one] = min(value, costs.get(one, value))
+        costs[indices] = min(value, costs.get(indices, value))
     return check.Problem(problem.sizes.tolist(), problem.dummy, costs)
 
 
 def _proved(
     problem: AssignmentProblem, exact: check.Problem, chosen: list[tuple[int, ...]], aim: Aim
 ) -> tuple[list[list[list[float]]], list[dict[str, Any]]]:
-    """The stages, multipliers of all measurements by sensor, and a tree for each component that they leave open."""
+    """The stages (multipliers of all measurements by sensor), and a tree for each component that they leave open."""
     cost = check.cost_of(exact, chosen)
     prepared = prepare(problem)
     offsets = np.cumsum([0, *problem.sizes.tolist()])
     alone = prepared.single_cost if problem.dummy else np.zeros(offsets[-1])
-    # a tree may lose a little on whole numbers: not where costs are finer than weights, as where all are 0
+    # whole-numbered weights allow trees a tolerance: not if costs are finer than the weights, as where all weights are 0
     granularity = prepared.packing.granularity if exact.unit >= _ONE else 0.0
     columns, packing = exact.columns, replace(prepared.packing, granularity=granularity)
     stages: list[list[list[float]]] = []
@@ -130,7 +131,7 @@ def _proved(
         duals = dual_bound(packing)
         whole = np.array(alone, dtype=np.float64)
         whole[packing.row_origin] += duals
-        # of so small a number the checker would not read all decimals
+        # the checker does not read all decimals of numbers this small
         whole[np.abs(whole) < _TINY] = 0.0
         stages.append([whole[first:last].tolist() for first, last in zip(offsets[:-1], offsets[1:], strict=True)])
         u = {row: check.number(repr(value)) for row, value in zip(exact.rows, whole.tolist(), strict=True)}
@@ -148,14 +149,14 @@ def _proved(
 
 
 def _of_columns(exact: check.Problem, chosen: list[tuple[int, ...]]) -> dict[tuple[check.Row, ...], int]:
-    """What a solution's columns cost; a tuple that is none, as it costs no less, stands for its false alarms.
+    """Costs of a solution's columns. A tuple that costs no less than its false alarms is replaced by these.
 
-    Its measurements may be in several components.
+    The measurements of such a tuple may be in several components.
     """
-    cost_of = {own: cost for cost, own in exact.columns}
+    cost_of = {rows: cost for cost, rows in exact.columns}
     columns: dict[tuple[check.Row, ...], int] = {}
-    for one in chosen:
-        own = tuple((s, i) for s, i in enumerate(one) if i)
-        for part in [own] if own in cost_of else [(row,) for row in own]:
+    for indices in chosen:
+        rows = tuple((s, i) for s, i in enumerate(indices) if i)
+        for part in [rows] if rows in cost_of else [(row,) for row in rows]:
             columns[part] = cost_of[part]
     return columns
